@@ -1,0 +1,336 @@
+"""NumPy solver of the balance, batched over instants: tail velocities from shape and shape rates. No CasADi.
+
+Isotropic friction is the gradient of a strictly convex, coercive dissipation potential, so Armijo-damped Newton on that
+potential converges from any start. Unequal coefficients have no potential; there Newton steps are taken while they
+reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
+reweighted least squares) is the safeguard when a Newton step fails.
+
+Velocities are solved for at the midpoint of the slowest link, the *anchor*: a link at stick moves at speeds of order
+delta, which the tail velocity could only represent to 1e-16 in absolute terms. So forces stay accurate down to
+delta = 1e-14.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
+from colloc.body import TAIL, Chain
+from colloc.errors import NotConvergedError, ProblemError
+from colloc.friction import Friction, link_dissipation
+
+_ARMIJO = 1e-4
+_HALVINGS = 12
+_FIXED_POINT_STEPS_AFTER_FAILURE = 3
+_DIRECT_ITERATIONS = 60
+_TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
+METHODS = ("auto", "newton", "fixed_point")
+
+
+@dataclass(frozen=True)
+class BalanceSolution:
+    """Tail velocities that balance the body, instant by instant.
+
+    Attributes
+    ----------
+    z : (3, n_time)
+        Tail velocity (u, v, omega) in the body frame.
+    residual : (n_time,)
+        Largest of |net force| and |torque about the anchor| / body length, in units of the largest coefficient.
+    iterations : (n_time,)
+        Newton and fixed-point steps taken.
+    converged : (n_time,)
+        Whether the residual reached the tolerance.
+    anchor : (n_time,)
+        The slowest link, in whose velocity the instant was solved.
+    anchor_velocity : (3, n_time)
+        Velocity of the midpoint of the anchor, and its rotation rate, in body-frame axes.
+    """
+
+    z: np.ndarray
+    residual: np.ndarray
+    iterations: np.ndarray
+    converged: np.ndarray
+    anchor: np.ndarray
+    anchor_velocity: np.ndarray
+
+    def require(self) -> BalanceSolution:
+        """This solution, or a `NotConvergedError` naming the instants that failed."""
+        if not self.converged.all():
+            bad = np.flatnonzero(~self.converged)
+            raise NotConvergedError(
+                f"the balance did not converge at {bad.size} of {self.converged.size} instants "
+                f"(first: {bad[:5].tolist()}, worst residual {self.residual[bad].max():.1e})."
+            )
+        return self
+
+
+class _Batch:
+    """Instants that share an anchor, with the operations of an iteration on subsets of them."""
+
+    def __init__(
+        self, body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, reference: int | None
+    ) -> None:
+        self.body, self.friction, self.reference = body, friction, reference
+        self.angles, self.rates = angles, rates
+
+    def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
+        return instant(
+            self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference
+        )
+
+    def merit(self, now: Instant, force: np.ndarray, delta: np.ndarray) -> np.ndarray:
+        """What a step has to reduce: the potential where there is one, else half the squared residual."""
+        if self.friction.isotropic:
+            potential = link_dissipation(*now.velocity, self.body.length_column(), delta)
+            return self.friction.mu_t * potential.sum(axis=0)
+        return 0.5 * np.sum(force * force, axis=0)
+
+
+def _residual(force: np.ndarray, friction: Friction) -> np.ndarray:
+    return np.abs(force).max(axis=0) / friction.largest
+
+
+def _iterate(
+    batch: _Batch, z: np.ndarray, delta: np.ndarray, tolerance: float, max_iterations: int, method: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Newton and fixed-point steps from z; returns z, residual, iterations."""
+    body, friction = batch.body, batch.friction
+    n_time = z.shape[1]
+    z = z.copy()
+    residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
+    owed = np.full(n_time, np.iinfo(int).max if method == "fixed_point" else 0)
+    active = np.arange(n_time)
+    now = batch.at(active, z, delta)
+    force = net_force(now.posture, now.force)
+    merit = batch.merit(now, force, delta)
+    while True:
+        residual[active] = _residual(force, friction)
+        keep = (residual[active] > tolerance) & (iterations[active] < max_iterations)
+        if not keep.any():
+            return z, residual, iterations
+        active, force, merit, d = active[keep], force[:, keep], merit[keep], delta[:, active[keep]]
+        now = Instant(*(type(part)(*(a[:, keep] for a in part)) for part in now))
+        newton = owed[active] == 0
+        step = np.empty_like(force)
+        for matrix, chosen in ((balance_jacobian, newton), (secant_matrix, ~newton)):
+            if chosen.any():
+                posture = type(now.posture)(*(a[:, chosen] for a in now.posture))
+                velocity = type(now.velocity)(*(a[:, chosen] for a in now.velocity))
+                step[:, chosen] = _solve3(matrix(body, friction, posture, velocity, d[:, chosen]), force[:, chosen])
+        slope = -np.sum(force * step, axis=0) if friction.isotropic else -2.0 * merit
+        accepted = np.zeros(active.size, dtype=bool)
+        alpha = np.ones(active.size)
+        trial = z[:, active] + step
+        parts = batch.at(active, trial, d)
+        new_force = net_force(parts.posture, parts.force)
+        new_merit = batch.merit(parts, new_force, d)
+        posture, velocity, link_force = ([np.array(a) for a in part] for part in parts)
+        for halving in range(_HALVINGS + 1):
+            slack = 8e-16 * merit if friction.isotropic else 0.0
+            accepted = ~newton | (new_merit <= merit + _ARMIJO * alpha * slope + slack)
+            if accepted.all() or halving == _HALVINGS:
+                break
+            retry = np.flatnonzero(~accepted)
+            alpha[retry] *= 0.5 if halving < 4 else 0.1
+            trial[:, retry] = z[:, active[retry]] + alpha[retry] * step[:, retry]
+            again = batch.at(active[retry], trial[:, retry], d[:, retry])
+            new_force[:, retry] = net_force(again.posture, again.force)
+            new_merit[retry] = batch.merit(again, new_force[:, retry], d[:, retry])
+            for target, source in ((velocity, again.velocity), (link_force, again.force)):
+                for old, new in zip(target, source, strict=True):
+                    old[:, retry] = new
+        owed[active[~newton]] -= 1
+        z[:, active[accepted]] = trial[:, accepted]
+        iterations[active] += 1
+        failed = ~accepted
+        if failed.any():
+            if method == "newton":
+                iterations[active[failed]] = max_iterations
+            owed[active[failed]] = _FIXED_POINT_STEPS_AFTER_FAILURE
+            back = batch.at(active[failed], z[:, active[failed]], d[:, failed])
+            new_force[:, failed], new_merit[failed] = force[:, failed], merit[failed]
+            for target, source in ((velocity, back.velocity), (link_force, back.force)):
+                for old, new in zip(target, source, strict=True):
+                    old[:, failed] = new
+        now = Instant(type(now.posture)(*posture), type(now.velocity)(*velocity), type(now.force)(*link_force))
+        force, merit = new_force, new_merit
+
+
+def _solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve ``matrix[t] x[:, t] = right[:, t]`` after symmetric scaling; where that is singular, the step is zero."""
+    diagonal = np.sqrt(np.clip(np.abs(np.einsum("tii->ti", matrix)), _TINY, _HUGE))
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = matrix / diagonal[:, :, None] / diagonal[:, None, :]
+        singular = ~(np.abs(np.linalg.det(scaled)) > _TINY)
+        scaled[singular] = np.eye(3)
+        x = (np.linalg.solve(scaled, (right.T / diagonal)[:, :, None])[:, :, 0] / diagonal).T
+    x[:, singular | ~np.isfinite(x).all(axis=0)] = 0.0
+    return x
+
+
+def _ladder(delta: float) -> np.ndarray:
+    """Regularisations from 1 down to delta, for instants that do not converge directly."""
+    count = max(2, int(np.ceil(-np.log10(delta) / 0.5)) + 1)
+    return np.geomspace(1.0, delta, count)
+
+
+def _rereferenced(batch: _Batch, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
+    now = batch.at(np.arange(z.shape[1]), z, delta)
+    half = 0.5 * batch.body.length_column()
+    speed = np.abs(now.velocity.vs) + np.abs(now.velocity.vn) + half * np.abs(now.velocity.w)
+    anchor = np.argmin(speed, axis=0)
+    vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
+    c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
+    return anchor, np.stack([vs * c - vn * s, vs * s + vn * c, w])
+
+
+def solve_balance(
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    *,
+    start: np.ndarray | None = None,
+    tolerance: float = 1e-11,
+    max_iterations: int = 2000,
+    method: str = "auto",
+) -> BalanceSolution:
+    """Tail velocities that put the body in force and torque balance, for a batch of instants.
+
+    Parameters
+    ----------
+    body : Chain
+    friction : Friction
+    angles, rates : (n_joint, n_time)
+        Joint angles [rad] and their rates [rad/time].
+    delta : float
+        Regularisation speed, > 0.
+    start : (3, n_time), optional
+        Tail velocities to start from; by default the links' mean rotation is taken out of a body at rest.
+    tolerance : float
+        Largest net force or torque (over the largest coefficient) at which an instant counts as converged.
+    max_iterations : int
+        Steps allowed to an instant in each of at most three attempts.
+    method : {"auto", "newton", "fixed_point"}
+        "auto" damps Newton and falls back on the paper's fixed point; the others are for comparison.
+
+    Returns
+    -------
+    BalanceSolution
+        With ``converged`` per instant; nothing is raised for an instant that fails (see `BalanceSolution.require`).
+
+    Raises
+    ------
+    ProblemError
+        For arrays of wrong shape, non-finite numbers or delta that is not positive.
+    """
+    angles, rates = np.array(angles, dtype=float, ndmin=2), np.array(rates, dtype=float, ndmin=2)
+    n_time = angles.shape[1]
+    if angles.shape != (body.n_joint, n_time) or rates.shape != angles.shape:
+        raise ProblemError(
+            f"angles and rates must both have shape (n_joint, n_time) = ({body.n_joint}, n), "
+            f"not {angles.shape} and {rates.shape}."
+        )
+    if not (np.isfinite(delta) and delta > 0):
+        raise ProblemError(f"delta must be a positive finite number, not {delta!r}.")
+    if method not in METHODS:
+        raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
+    if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
+        raise ProblemError("angles and rates must be finite.")
+    z = np.zeros((3, n_time))
+    if start is not None:
+        z = np.array(start, dtype=float)
+        if z.shape != (3, n_time) or not np.isfinite(z).all():
+            raise ProblemError(f"start must be finite with shape (3, {n_time}).")
+
+    # work in units of the largest rate: the law is homogeneous once delta scales along
+    speed = np.abs(rates).max(axis=0)
+    speed[speed == 0] = 1.0
+    scaled_rates, scaled_delta = rates / speed, (delta / speed)[None]
+    everything = np.arange(n_time)
+    tail = _Batch(body, friction, angles, scaled_rates, TAIL)
+    if start is None:
+        anchor, velocity = np.full(n_time, body.n_link // 2), np.zeros((3, n_time))
+    else:
+        anchor, velocity = _rereferenced(tail, z / speed, scaled_delta)
+
+    solution = _State(anchor, velocity, np.full(n_time, np.inf), np.zeros(n_time, dtype=int))
+    problem = (body, friction, angles, scaled_rates)
+    budget = max_iterations if method != "auto" else min(max_iterations, _DIRECT_ITERATIONS)
+    _advance(solution, problem, everything, scaled_delta, tolerance, budget, method)
+    if method == "auto":
+        bad = np.flatnonzero(solution.residual > tolerance)
+        if bad.size:
+            solution.velocity[:, bad] = 0.0
+            for level in _ladder(float(scaled_delta[0, bad].min())):
+                now = np.maximum(scaled_delta, level)
+                _advance(solution, problem, bad, now, tolerance, min(max_iterations, 4 * _DIRECT_ITERATIONS), method)
+            bad = np.flatnonzero(solution.residual > tolerance)
+            if bad.size:
+                _advance(solution, problem, bad, scaled_delta, tolerance, max_iterations, "fixed_point")
+
+    tail_z = np.empty((3, n_time))
+    for link in np.unique(solution.anchor):
+        chosen = np.flatnonzero(solution.anchor == link)
+        posture = body.posture(angles[:, chosen], int(link))
+        tail_z[:, chosen] = body.tail_velocity(
+            posture, scaled_rates[:, chosen], solution.velocity[:, chosen], int(link)
+        )
+    return BalanceSolution(
+        tail_z * speed,
+        solution.residual,
+        solution.iterations,
+        solution.residual <= tolerance,
+        solution.anchor,
+        solution.velocity * speed,
+    )
+
+
+@dataclass
+class _State:
+    """Current anchors, anchor velocities, residuals and step counts of all instants; updated in place."""
+
+    anchor: np.ndarray
+    velocity: np.ndarray
+    residual: np.ndarray
+    iterations: np.ndarray
+
+
+def _advance(
+    state: _State,
+    problem: tuple[Chain, Friction, np.ndarray, np.ndarray],
+    chosen: np.ndarray,
+    delta: np.ndarray,
+    tolerance: float,
+    max_iterations: int,
+    method: str,
+) -> None:
+    """Iterate the chosen instants, moving the anchor to the slowest link as long as that still helps."""
+    body, friction, angles, rates = problem
+    todo = chosen
+    for _ in range(body.n_link):
+        moved = []
+        for link in np.unique(state.anchor[todo]):
+            members = todo[state.anchor[todo] == link]
+            batch = _Batch(body, friction, angles[:, members], rates[:, members], int(link))
+            z, residual, iterations = _iterate(
+                batch, state.velocity[:, members], delta[:, members], tolerance, max_iterations, method
+            )
+            state.iterations[members] += iterations
+            state.residual[members] = residual
+            state.velocity[:, members] = z
+            failed = residual > tolerance
+            if failed.any():
+                anchor, velocity = _rereferenced(batch, z, delta[:, members])
+                change = failed & (anchor != link)
+                state.anchor[members[change]] = anchor[change]
+                state.velocity[:, members[change]] = velocity[:, change]
+                moved.append(members[change])
+        todo = np.concatenate(moved) if moved else np.array([], dtype=int)
+        if not todo.size:
+            return

@@ -1,0 +1,194 @@
+"""A problem: body, friction, class of gaits, guess and discretisation; frozen and validated when it is made."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.body import Chain
+from colloc.contact import crossing_depth
+from colloc.errors import ProblemError
+from colloc.friction import Friction
+from colloc.gait import Fourier, Harmonic
+from colloc.schemes import scheme
+
+_CHECKED_PHASES = 2000
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A value to hold the result against.
+
+    Parameters
+    ----------
+    efficiency : float
+    tolerance : float
+        Largest difference that counts as agreement.
+    source : str
+        Where the value comes from.
+    """
+
+    efficiency: float
+    tolerance: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Maximise d/W over a class of gaits.
+
+    Parameters
+    ----------
+    name : str
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``.
+    guess : Fourier
+        An admissible gait to start from; it is projected onto the class `gait`.
+    body : Chain
+    friction : Friction
+    gait : Harmonic
+        The class of gaits; which paths in shape space are allowed decides the answer.
+    delta : float
+        Regularisation speed of friction at which the problem is finally solved, in body lengths per period.
+    delta_start : float
+        Where the continuation in delta begins.
+    joint_limit : float
+        Largest |joint angle| [rad], at most pi.
+    smallest_shape_speed : float
+        Lower bound on the root-mean-square shape speed [rad per radian of phase]. It keeps the search away from gaits
+        whose speeds sink to delta, where regularised friction is viscous and efficiency meaningless.
+    intervals : int
+        Mesh intervals on the part of the period that is solved.
+    scheme : str
+        Collocation scheme, see `colloc.schemes.scheme`.
+    """
+
+    name: str
+    guess: Fourier
+    body: Chain = Chain()
+    friction: Friction = Friction()
+    gait: Harmonic = Harmonic()
+    delta: float = 1e-4
+    delta_start: float = 0.1
+    joint_limit: float = float(np.pi)
+    smallest_shape_speed: float = 0.1
+    intervals: int = 30
+    scheme: str = "gauss-3"
+
+    def __post_init__(self) -> None:
+        self._check_types()
+        self._check_numbers()
+        self._check_symmetry()
+        self._check_guess()
+
+    def _check_types(self) -> None:
+        if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
+            raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        for field, kind in (("guess", Fourier), ("body", Chain), ("friction", Friction), ("gait", Harmonic)):
+            if not isinstance(getattr(self, field), kind):
+                raise ProblemError(f"{field} must be a {kind.__name__}, not {type(getattr(self, field)).__name__}.")
+
+    def _check_numbers(self) -> None:
+        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+                raise ProblemError(f"{field} must be a finite number, not {value!r}.")
+        if self.delta <= 0:
+            raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
+        if self.delta_start < self.delta:
+            object.__setattr__(self, "delta_start", self.delta)
+        if not 0 < self.joint_limit <= np.pi + 1e-12:
+            raise ProblemError(f"joint_limit must lie in (0, pi], not {self.joint_limit:g}.")
+        if self.smallest_shape_speed <= 0:
+            raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
+        collocation = scheme(self.scheme)
+        if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
+            raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
+        points = self.intervals * (collocation.s - collocation.left)
+        needed = 4 * self.gait.harmonics
+        if points < needed or self.intervals < 2:
+            raise ProblemError(
+                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot resolve "
+                f"{self.gait.harmonics} harmonics; use at least {max(2, -(-needed // max(1, collocation.s - collocation.left)))}."
+            )
+        if self.intervals > 100_000:
+            raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
+
+    def _check_symmetry(self) -> None:
+        if self.gait.symmetry == "bilateral":
+            if not self.body.symmetric:
+                raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
+            if not self.friction.reversible:
+                raise ProblemError(
+                    "a bilateral gait closes its rotation only if mu_b = mu_f; use symmetry 'none' or 'antipodal'."
+                )
+
+    def _check_guess(self) -> None:
+        if self.guess.n_joint != self.body.n_joint:
+            raise ProblemError(
+                f"guess has {self.guess.n_joint} joints but a body of {self.body.n_link} links has {self.body.n_joint}."
+            )
+        parameters = self.gait.parameters(self.guess)
+        guess = self.gait.fourier(parameters, self.body.n_joint)
+        rms = np.sqrt(0.5 * np.sum(np.arange(1, guess.n_harmonic + 1) ** 2 * (guess.cos**2 + guess.sin**2)))
+        if rms < self.smallest_shape_speed:
+            raise ProblemError(
+                f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
+                f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
+            )
+        angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
+        largest = np.abs(angles).max(axis=1)
+        if (largest > self.joint_limit + _SLACK).any():
+            joint = int(np.argmax(largest))
+            raise ProblemError(
+                f"guess is inadmissible: joint {joint + 1} reaches {largest[joint]:.4g} rad, "
+                f"beyond the limit {self.joint_limit:.4g}; make its amplitude smaller."
+            )
+        depth = crossing_depth(self.body, angles)
+        if depth.max() > _SLACK:
+            when = np.argmax(depth) / _CHECKED_PHASES
+            raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
+
+    def with_(self, **changes: object) -> Problem:
+        """A copy with some fields changed, validated anew."""
+        return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
+
+    def to_dict(self) -> dict:
+        """All fields as plain numbers, strings and lists (JSON)."""
+        fields = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        fields["guess"] = {k: getattr(self.guess, k).tolist() for k in ("mean", "cos", "sin")}
+        for name in ("body", "friction", "gait"):
+            fields[name] = dataclasses.asdict(fields[name])
+        return fields
+
+    @classmethod
+    def from_dict(cls, fields: dict) -> Problem:
+        """The problem that `to_dict` wrote.
+
+        Raises
+        ------
+        ProblemError
+            If a field is missing, unknown or has an unusable value.
+        """
+        try:
+            fields = dict(fields)
+            fields["guess"] = Fourier(**fields["guess"])
+            fields["body"] = Chain(tuple(fields["body"]["lengths"]))
+            fields["friction"] = Friction(**fields["friction"])
+            fields["gait"] = Harmonic(**fields["gait"])
+            return cls(**fields)
+        except (KeyError, TypeError) as error:
+            raise ProblemError(f"not the description of a problem: {error}.") from None
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the fields: equal problems have equal hashes."""
+        text = json.dumps(self.to_dict(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+_NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

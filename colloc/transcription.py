@@ -1,0 +1,304 @@
+"""Direct collocation of a problem: decision variables, constraints and objective on a mesh.
+
+Decision variables: gait parameters p; at every point joint angles, joint rates, tail velocity z and the lifted link
+forces; the tail's orientation theta at every site; distance x and work W at every edge. Rates, velocities and delta are
+per radian of phase, so that all variables are O(1).
+
+The balance itself is a step function of the tail velocity as delta goes to 0. Lifted forces cure that: each force is
+tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0, and the balance is linear in the forces.
+x is the displacement of the centre of mass along a fixed direction. The first orientation is free, so maximising x
+turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from colloc.blocks import Assembly, Block
+from colloc.gait import Fourier
+from colloc.kernels import gait_check, lifted_point, mean_square, minus_efficiency, shape_checks
+from colloc.mesh import Mesh, uniform_mesh
+from colloc.problem import Problem
+from colloc.schemes import scheme
+
+RADIANS = 2 * np.pi
+"""Radians of phase per period: rates, velocities and delta of the transcription are those per period divided by it."""
+
+_SAMPLES_PER_CELL = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where each kind of variable sits in the vector x: index arrays, ``(n_component, n_position)``."""
+
+    parameters: np.ndarray
+    theta: np.ndarray
+    distance: np.ndarray
+    work: np.ndarray
+    angles: np.ndarray
+    rates: np.ndarray
+    z: np.ndarray
+    forces: np.ndarray
+    n: int
+
+
+def _layout(problem: Problem, mesh: Mesh) -> Layout:
+    n_joint, n_link = problem.body.n_joint, problem.body.n_link
+    sizes = {
+        "parameters": (problem.gait.size(n_joint), 1),
+        "theta": (1, mesh.n_site),
+        "distance": (1, mesh.n + 1),
+        "work": (1, mesh.n + 1),
+        "angles": (n_joint, mesh.n_point),
+        "rates": (n_joint, mesh.n_point),
+        "z": (3, mesh.n_point),
+        "forces": (3 * n_link, mesh.n_point),
+    }
+    indices, start = {}, 0
+    for name, (rows, columns) in sizes.items():
+        indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
+        start += rows * columns
+    return Layout(n=start, **indices)
+
+
+@dataclass(eq=False)
+class Group:
+    """Constraint rows of one kind: bounds, linear part, and what the outputs of each named block contribute."""
+
+    name: str
+    lower: np.ndarray
+    upper: np.ndarray
+    linear: sparse.csr_matrix
+    parts: dict[str, sparse.csr_matrix] = field(default_factory=dict)
+
+    @property
+    def m(self) -> int:
+        return self.lower.size
+
+
+def _selector(columns: np.ndarray, n: int) -> sparse.csr_matrix:
+    """``(len(columns), n)`` matrix that picks entries of a vector."""
+    rows = np.arange(columns.size)
+    return sparse.csr_matrix((np.ones(columns.size), (rows, columns)), shape=(columns.size, n))
+
+
+@dataclass(frozen=True, eq=False)
+class Transcription:
+    """A problem on a mesh, ready for a solver of nonlinear programs.
+
+    Attributes
+    ----------
+    problem : Problem
+    mesh : Mesh
+    layout : Layout
+    assembly : Assembly
+    lower, upper : (n,)
+        Bounds of the variables.
+    constraint_lower, constraint_upper : (m,)
+    groups : dict of str to slice
+        Names of the constraint rows, in order.
+    checks : list of (name, function)
+        Shape functions whose largest value in each mesh cell is constrained.
+    """
+
+    problem: Problem
+    mesh: Mesh
+    layout: Layout
+    assembly: Assembly
+    lower: np.ndarray
+    upper: np.ndarray
+    constraint_lower: np.ndarray
+    constraint_upper: np.ndarray
+    groups: dict[str, slice]
+    checks: list[tuple[str, ca.Function]]
+
+    def gait(self, x: np.ndarray) -> Fourier:
+        """The gait of a vector of variables."""
+        return self.problem.gait.fourier(x[self.layout.parameters[:, 0]], self.problem.body.n_joint)
+
+    def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
+        """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
+
+        An inequality between nodes is kept by constraining it where the gait `parameters` comes closest to it; repeated
+        at every solve this is the exchange method for semi-infinite programs.
+        """
+        blocks = (self.assembly.objective, *self.assembly.blocks)
+        worst = iter(worst_instants(self.problem, self.mesh, self.checks, parameters))
+        return [
+            _check_parameters(self.problem, next(worst)) if b.function.n_parameter else b.parameters for b in blocks
+        ]
+
+
+def worst_instants(
+    problem: Problem, mesh: Mesh, checks: list[tuple[str, ca.Function]], parameters: np.ndarray
+) -> list[np.ndarray]:
+    """For each check, the instant in every mesh cell where it comes closest to its bound, ``(n_interval,)``."""
+    gait = problem.gait.fourier(parameters, problem.body.n_joint)
+    fine = np.linspace(0.0, 1.0, _SAMPLES_PER_CELL + 1)
+    cells = np.arange(mesh.n)
+
+    def magnitude(check: ca.Function, times: np.ndarray) -> np.ndarray:
+        values = np.array(check.map(times.size)(gait.angles(times.ravel()))).reshape(times.shape)
+        return np.abs(values) if is_joint else values
+
+    result = []
+    for name, check in checks:
+        is_joint = name.startswith("joint")
+        times = mesh.edges[:-1, None] + mesh.h[:, None] * fine
+        values = magnitude(check, times)
+        best = np.argmax(values, axis=1)
+        # one parabola through the best sample and its neighbours places a maximum inside to O(step^4)
+        inner = np.clip(best, 1, _SAMPLES_PER_CELL - 1)
+        low, mid, high = (values[cells, inner + k] for k in (-1, 0, 1))
+        curvature = low - 2 * mid + high
+        with np.errstate(divide="ignore", invalid="ignore"):
+            offset = np.where(curvature < 0, 0.5 * (low - high) / curvature, 0.0)
+        offset = np.where(best == inner, np.clip(offset, -1, 1), 0.0)
+        result.append(times[cells, best] + offset * mesh.h / _SAMPLES_PER_CELL)
+    return result
+
+
+def _check_parameters(problem: Problem, times: np.ndarray) -> np.ndarray:
+    matrix = problem.gait.angle_matrix(times, problem.body.n_joint)
+    return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
+
+
+def transcribe(problem: Problem) -> Transcription:
+    """The nonlinear program of a problem on its uniform mesh."""
+    mesh = uniform_mesh(scheme(problem.scheme), problem.intervals, problem.gait.fraction)
+    layout = _layout(problem, mesh)
+    checks = shape_checks(problem.body)
+    point = lifted_point(problem.body, problem.friction)
+    n_joint, n_link = problem.body.n_joint, problem.body.n_link
+    n_parameter = layout.parameters.shape[0]
+
+    sites = np.empty(mesh.n_point, dtype=int)
+    sites[mesh.points] = mesh.sites
+    point_gather = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces])
+    blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
+    for name, check in checks:
+        function = gait_check(check, n_joint, n_parameter)
+        middles = _check_parameters(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]))
+        blocks[name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
+    blocks["shape speed"] = (
+        mean_square(ca.DM(_shape_speed_form(problem))),
+        layout.parameters,
+        np.empty((0, 1)),
+    )
+
+    groups = [
+        _gait_group("angles", layout.angles, problem.gait.angle_matrix(mesh.times, n_joint), layout),
+        _gait_group("rates", layout.rates, problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS, layout),
+        _output_group("force law", range(3 * n_link), point.n_out, mesh.n_point, layout.n),
+        _output_group("balance", range(3 * n_link, 3 * n_link + 3), point.n_out, mesh.n_point, layout.n),
+        *_orientation_groups(problem, mesh, layout),
+        _quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n),
+        _quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n),
+        *(_check_group(name, problem, mesh.n, layout.n) for name, _ in checks),
+        Group(
+            "shape speed",
+            np.array([problem.smallest_shape_speed**2]),
+            np.array([np.inf]),
+            sparse.csr_matrix((1, layout.n)),
+            {"shape speed": sparse.eye(1, format="csr")},
+        ),
+    ]
+    objective = Block(
+        minus_efficiency(),
+        np.array([[layout.distance[0, -1]], [layout.work[0, -1]]]),
+        sparse.eye(1, format="csr"),
+        np.empty((0, 1)),
+    )
+    ends = np.cumsum([0] + [g.m for g in groups])
+    return Transcription(
+        problem,
+        mesh,
+        layout,
+        Assembly(
+            layout.n,
+            objective,
+            tuple(
+                Block(function, gather, _stacked(groups, name, function.n_out * gather.shape[1]), parameters)
+                for name, (function, gather, parameters) in blocks.items()
+            ),
+            sparse.vstack([g.linear for g in groups]).tocsr(),
+        ),
+        *_variable_bounds(problem, layout),
+        np.concatenate([g.lower for g in groups]),
+        np.concatenate([g.upper for g in groups]),
+        {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, ends, ends[1:], strict=False)},
+        checks,
+    )
+
+
+def _stacked(groups: list[Group], block: str, n_source: int) -> sparse.csr_matrix:
+    return sparse.vstack([g.parts.get(block, sparse.csr_matrix((g.m, n_source))) for g in groups]).tocsr()
+
+
+def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
+    friction, length = problem.friction, problem.body.length_column()
+    tangential = max(friction.mu_f, friction.mu_b) * length
+    limit = np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+    lower[layout.forces], upper[layout.forces] = -limit, limit
+    for state in (layout.distance, layout.work):
+        lower[state[0, 0]] = upper[state[0, 0]] = 0.0
+    return lower, upper
+
+
+def _equalities(name: str, linear: sparse.spmatrix, parts: dict[str, sparse.csr_matrix] | None = None) -> Group:
+    zero = np.zeros(linear.shape[0])
+    return Group(name, zero, zero, sparse.csr_matrix(linear), parts or {})
+
+
+def _gait_group(name: str, variables: np.ndarray, matrix: np.ndarray, layout: Layout) -> Group:
+    """``variables - matrix p = 0`` at every point."""
+    parameters = _selector(layout.parameters[:, 0], layout.n)
+    rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[-1]))
+    return _equalities(name, _selector(variables.ravel(order="F"), layout.n) - rows @ parameters)
+
+
+def _output_group(name: str, outputs: range, n_out: int, n_point: int, n: int) -> Group:
+    """Outputs of the point function that have to vanish at every point."""
+    columns = (np.arange(n_point)[:, None] * n_out + np.array(outputs)).ravel()
+    return _equalities(
+        name, sparse.csr_matrix((columns.size, n)), {"point": _selector(columns, n_out * n_point)}
+    )
+
+
+def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Group]:
+    """theta' = omega, and how theta closes where no symmetry does it."""
+    state, rate = mesh.integration()
+    linear = state @ _selector(layout.theta[0], layout.n) - RADIANS * rate @ _selector(layout.z[2], layout.n)
+    groups = [_equalities("orientation", linear)]
+    sign = {"none": -1.0, "antipodal": 1.0, "bilateral": None}[problem.gait.symmetry]
+    if sign is not None:
+        first, last = layout.theta[0, 0], layout.theta[0, -1]
+        row = sparse.csr_matrix(([1.0, sign], ([0, 0], [last, first])), shape=(1, layout.n))
+        groups.append(_equalities("rotation", row))
+    return groups
+
+
+def _quadrature_group(name: str, variable: np.ndarray, output: int, n_out: int, mesh: Mesh, n: int) -> Group:
+    state, rate = mesh.quadrature()
+    pick = _selector(np.arange(mesh.n_point) * n_out + output, n_out * mesh.n_point)
+    return _equalities(name, state @ _selector(variable[0], n), {"point": (-RADIANS * rate @ pick).tocsr()})
+
+
+def _check_group(name: str, problem: Problem, n_cell: int, n: int) -> Group:
+    is_joint = name.startswith("joint")
+    limit = problem.joint_limit if is_joint else np.pi
+    lower = np.full(n_cell, -limit if is_joint else -np.inf)
+    linear = sparse.csr_matrix((n_cell, n))
+    return Group(name, lower, np.full(n_cell, limit), linear, {name: sparse.eye(n_cell, format="csr")})
+
+
+def _shape_speed_form(problem: Problem) -> np.ndarray:
+    """Matrix of the mean square shape speed per radian of phase, as a quadratic form of the gait parameters."""
+    t = np.arange(4 * problem.gait.harmonics + 4) / (4 * problem.gait.harmonics + 4)
+    rates = problem.gait.rate_matrix(t, problem.body.n_joint) / RADIANS
+    return np.einsum("tjp,tjq->pq", rates, rates) / t.size

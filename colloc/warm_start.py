@@ -1,0 +1,59 @@
+"""Feasible starting points: from a gait alone to all variables of a transcription, through the fixed-point solver."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.linalg import spsolve
+
+from colloc.balance import instant, total_power
+from colloc.fixed_point import solve_balance
+from colloc.transcription import RADIANS, Transcription
+
+
+def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: float) -> np.ndarray:
+    """Variables that satisfy every equation of the transcription but net rotation, for a gait and delta.
+
+    Parameters
+    ----------
+    transcription : Transcription
+    parameters : (n_parameter,)
+        Gait parameters.
+    delta : float
+        Regularisation speed, per period.
+
+    Returns
+    -------
+    (n,) array
+    """
+    problem, mesh, layout = transcription.problem, transcription.mesh, transcription.layout
+    x = np.zeros(layout.n)
+    x[layout.parameters[:, 0]] = parameters
+    n_joint = problem.body.n_joint
+    angles = (problem.gait.angle_matrix(mesh.times, n_joint) @ parameters).T
+    rates = (problem.gait.rate_matrix(mesh.times, n_joint) @ parameters).T / RADIANS
+    solved = solve_balance(problem.body, problem.friction, angles, rates, delta / RADIANS)
+    now = instant(problem.body, problem.friction, angles, rates, solved.z, delta / RADIANS)
+
+    state, rate = mesh.integration()
+    # theta_0 = 0 closes the system; the matrix is block bidiagonal
+    theta = np.zeros(mesh.n_site)
+    theta[1:] = spsolve(state[:, 1:].tocsc(), RADIANS * (rate @ solved.z[2]))
+    site_of_point = np.empty(mesh.n_point, dtype=int)
+    site_of_point[mesh.points] = mesh.sites
+    cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
+
+    if problem.gait.symmetry == "antipodal":
+        theta -= 0.5 * theta[-1]
+    else:  # turn the motion into +x
+        c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
+        _, quadrature = mesh.quadrature()
+        dx, dy = quadrature @ (c * cx[0] - s * cy[0]), quadrature @ (s * cx[0] + c * cy[0])
+        theta -= np.arctan2(dy.sum(), dx.sum())
+    c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
+    _, quadrature = mesh.quadrature()
+    x[layout.distance[0, 1:]] = np.cumsum(RADIANS * (quadrature @ (c * cx[0] - s * cy[0])))
+    x[layout.work[0, 1:]] = np.cumsum(RADIANS * (quadrature @ total_power(now.velocity, now.force)[0]))
+    x[layout.theta[0]] = theta
+    x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, solved.z
+    x[layout.forces] = np.concatenate(now.force)
+    return x
