@@ -66,9 +66,7 @@ def _pulled_back(posture: Posture, blocks: tuple[tuple[Array, Array, Array], ...
     return result
 
 
-def balance_jacobian(
-    body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array
-) -> np.ndarray:
+def balance_jacobian(body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """Minus the derivative of `net_force` with respect to z, ``(n_time, 3, 3)``.
 
     Symmetric positive definite for isotropic friction: the Hessian of the dissipation potential.
@@ -76,9 +74,7 @@ def balance_jacobian(
     return _pulled_back(posture, link_force_jacobian(*velocity, body.length_column(), delta, friction))
 
 
-def secant_matrix(
-    body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array
-) -> np.ndarray:
+def secant_matrix(body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """Matrix A(z) with ``net_force(z') ~ net_force(z) - A(z) (z' - z)`` when link speeds are frozen, ``(n_time, 3, 3)``.
 
     One step of the paper's fixed point (eqs. ftbtilde to deltatilde) is ``z + A(z)^-1 net_force(z)``.
@@ -86,6 +82,4 @@ def secant_matrix(
     I0, I1, I2 = link_moments(*velocity, body.length_column(), delta)
     mu_s, mu_t = friction.tangential(velocity.vs), friction.mu_t
     zero = np.zeros_like(I0)
-    return _pulled_back(
-        posture, ((mu_s * I0, zero, zero), (zero, mu_t * I0, mu_t * I1), (zero, mu_t * I1, mu_t * I2))
-    )
+    return _pulled_back(posture, ((mu_s * I0, zero, zero), (zero, mu_t * I0, mu_t * I1), (zero, mu_t * I1, mu_t * I2)))

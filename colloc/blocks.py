@@ -101,7 +101,14 @@ class Assembly:
         return self.linear.shape[0]
 
 
-def _accumulator(rows: np.ndarray, cols: np.ndarray, sources: np.ndarray, values: np.ndarray, shape, n_source: int):
+def _accumulator(
+    rows: np.ndarray,
+    cols: np.ndarray,
+    sources: np.ndarray,
+    values: np.ndarray,
+    shape: tuple[int, int],
+    n_source: int,
+) -> tuple[ca.Sparsity, sparse.csr_matrix]:
     """Sparsity of the entries (rows, cols), and the matrix that sums ``values * source`` into its nonzeros."""
     key = cols.astype(np.int64) * shape[0] + rows
     unique, inverse = np.unique(key, return_inverse=True)
@@ -202,9 +209,8 @@ def _jacobian(assembly: Assembly, blocks, mapped) -> ca.MX:
         values.append(scatter.data[which])
         stacked.append(mapped(f.jacobian, index))
         offset += n_nonzero * block.n_instance
-    pattern, accumulate = _accumulator(
-        *(np.concatenate(a) for a in (rows, cols, sources, values)), (assembly.m, assembly.n), offset
-    )
+    row, col, source, value = (np.concatenate(part) for part in (rows, cols, sources, values))
+    pattern, accumulate = _accumulator(row, col, source, value, (assembly.m, assembly.n), offset)
     return ca.MX(pattern, _dm(accumulate) @ ca.vertcat(*stacked))
 
 
@@ -225,7 +231,6 @@ def _hessian(assembly: Assembly, blocks, mapped, lam_f: ca.MX, lam_g: ca.MX) -> 
         values.append(np.where(aliased, 2.0, 1.0).ravel(order="F"))
         stacked.append(mapped(f.hessian, index, weights))
         offset += n_nonzero * block.n_instance
-    pattern, accumulate = _accumulator(
-        *(np.concatenate(part) for part in (rows, cols, sources, values)), (assembly.n, assembly.n), offset
-    )
+    row, col, source, value = (np.concatenate(part) for part in (rows, cols, sources, values))
+    pattern, accumulate = _accumulator(row, col, source, value, (assembly.n, assembly.n), offset)
     return ca.MX(pattern, _dm(accumulate) @ ca.vertcat(*stacked))

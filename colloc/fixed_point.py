@@ -17,12 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
-from colloc.body import TAIL, Chain
+from colloc.body import TAIL, Chain, LinkVelocity, Posture
 from colloc.errors import NotConvergedError, ProblemError
 from colloc.friction import Friction, link_dissipation
 
 _ARMIJO = 1e-4
-_HALVINGS = 12
+_BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
+_ROUNDING = 8e-16
 _FIXED_POINT_STEPS_AFTER_FAILURE = 3
 _DIRECT_ITERATIONS = 60
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
@@ -68,95 +69,83 @@ class BalanceSolution:
 
 
 class _Batch:
-    """Instants that share an anchor, with the operations of an iteration on subsets of them."""
+    """Instants that share a reference link: what an iteration evaluates on subsets of them."""
 
-    def __init__(
-        self, body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, reference: int | None
-    ) -> None:
+    def __init__(self, body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, reference: int | None) -> None:
         self.body, self.friction, self.reference = body, friction, reference
         self.angles, self.rates = angles, rates
 
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
-        return instant(
-            self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference
-        )
+        return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
 
-    def merit(self, now: Instant, force: np.ndarray, delta: np.ndarray) -> np.ndarray:
-        """What a step has to reduce: the potential where there is one, else half the squared residual."""
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Links ``(7, n_link, n)`` (posture, then velocity), net force ``(3, n)`` and merit ``(n,)`` at z.
+
+        The merit is what a step has to reduce: the potential where there is one, else half the squared residual.
+        """
+        now = self.at(select, z, delta)
+        force = net_force(now.posture, now.force)
         if self.friction.isotropic:
             potential = link_dissipation(*now.velocity, self.body.length_column(), delta)
-            return self.friction.mu_t * potential.sum(axis=0)
-        return 0.5 * np.sum(force * force, axis=0)
+            merit = self.friction.mu_t * potential.sum(axis=0)
+        else:
+            merit = 0.5 * np.sum(force * force, axis=0)
+        return np.stack([*now.posture, *now.velocity]), force, merit
 
-
-def _residual(force: np.ndarray, friction: Friction) -> np.ndarray:
-    return np.abs(force).max(axis=0) / friction.largest
+    def step(self, links: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
+        """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``."""
+        step = np.empty_like(force)
+        for matrix, chosen in ((balance_jacobian, newton), (secant_matrix, ~newton)):
+            if chosen.any():
+                posture, velocity = Posture(*links[:4, :, chosen]), LinkVelocity(*links[4:, :, chosen])
+                left = matrix(self.body, self.friction, posture, velocity, delta[:, chosen])
+                step[:, chosen] = _solve3(left, force[:, chosen])
+        return step
 
 
 def _iterate(
     batch: _Batch, z: np.ndarray, delta: np.ndarray, tolerance: float, max_iterations: int, method: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Newton and fixed-point steps from z; returns z, residual, iterations."""
-    body, friction = batch.body, batch.friction
+    """Damped Newton from z ``(3, n)``, with fixed-point steps where a Newton step fails; returns z, residual, iterations."""
     n_time = z.shape[1]
     z = z.copy()
     residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
-    owed = np.full(n_time, np.iinfo(int).max if method == "fixed_point" else 0)
+    fixed_point_steps_due = np.full(n_time, np.iinfo(int).max if method == "fixed_point" else 0)
     active = np.arange(n_time)
-    now = batch.at(active, z, delta)
-    force = net_force(now.posture, now.force)
-    merit = batch.merit(now, force, delta)
+    links, force, merit = batch.evaluate(active, z, delta)
     while True:
-        residual[active] = _residual(force, friction)
+        residual[active] = np.abs(force).max(axis=0) / batch.friction.largest
         keep = (residual[active] > tolerance) & (iterations[active] < max_iterations)
         if not keep.any():
             return z, residual, iterations
-        active, force, merit, d = active[keep], force[:, keep], merit[keep], delta[:, active[keep]]
-        now = Instant(*(type(part)(*(a[:, keep] for a in part)) for part in now))
-        newton = owed[active] == 0
-        step = np.empty_like(force)
-        for matrix, chosen in ((balance_jacobian, newton), (secant_matrix, ~newton)):
-            if chosen.any():
-                posture = type(now.posture)(*(a[:, chosen] for a in now.posture))
-                velocity = type(now.velocity)(*(a[:, chosen] for a in now.velocity))
-                step[:, chosen] = _solve3(matrix(body, friction, posture, velocity, d[:, chosen]), force[:, chosen])
-        slope = -np.sum(force * step, axis=0) if friction.isotropic else -2.0 * merit
-        accepted = np.zeros(active.size, dtype=bool)
+        active, links, force, merit = active[keep], links[:, :, keep], force[:, keep], merit[keep]
+        d, newton = delta[:, active], fixed_point_steps_due[active] == 0
+        step = batch.step(links, force, d, newton)
+        if batch.friction.isotropic:
+            slope, slack = -np.sum(force * step, axis=0), _ROUNDING * merit
+        else:
+            slope, slack = -2.0 * merit, np.zeros_like(merit)
         alpha = np.ones(active.size)
         trial = z[:, active] + step
-        parts = batch.at(active, trial, d)
-        new_force = net_force(parts.posture, parts.force)
-        new_merit = batch.merit(parts, new_force, d)
-        posture, velocity, link_force = ([np.array(a) for a in part] for part in parts)
-        for halving in range(_HALVINGS + 1):
-            slack = 8e-16 * merit if friction.isotropic else 0.0
-            accepted = ~newton | (new_merit <= merit + _ARMIJO * alpha * slope + slack)
-            if accepted.all() or halving == _HALVINGS:
+        new_links, new_force, new_merit = batch.evaluate(active, trial, d)
+        failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
+        for shrink in _BACKTRACKING:
+            retry = np.flatnonzero(failed)
+            if not retry.size:
                 break
-            retry = np.flatnonzero(~accepted)
-            alpha[retry] *= 0.5 if halving < 4 else 0.1
+            alpha[retry] *= shrink
             trial[:, retry] = z[:, active[retry]] + alpha[retry] * step[:, retry]
-            again = batch.at(active[retry], trial[:, retry], d[:, retry])
-            new_force[:, retry] = net_force(again.posture, again.force)
-            new_merit[retry] = batch.merit(again, new_force[:, retry], d[:, retry])
-            for target, source in ((velocity, again.velocity), (link_force, again.force)):
-                for old, new in zip(target, source, strict=True):
-                    old[:, retry] = new
-        owed[active[~newton]] -= 1
-        z[:, active[accepted]] = trial[:, accepted]
+            evaluated = batch.evaluate(active[retry], trial[:, retry], d[:, retry])
+            new_links[:, :, retry], new_force[:, retry], new_merit[retry] = evaluated
+            failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
+        trial[:, failed], new_links[:, :, failed] = z[:, active[failed]], links[:, :, failed]
+        new_force[:, failed], new_merit[failed] = force[:, failed], merit[failed]
+        z[:, active], links, force, merit = trial, new_links, new_force, new_merit
         iterations[active] += 1
-        failed = ~accepted
-        if failed.any():
-            if method == "newton":
-                iterations[active[failed]] = max_iterations
-            owed[active[failed]] = _FIXED_POINT_STEPS_AFTER_FAILURE
-            back = batch.at(active[failed], z[:, active[failed]], d[:, failed])
-            new_force[:, failed], new_merit[failed] = force[:, failed], merit[failed]
-            for target, source in ((velocity, back.velocity), (link_force, back.force)):
-                for old, new in zip(target, source, strict=True):
-                    old[:, failed] = new
-        now = Instant(type(now.posture)(*posture), type(now.velocity)(*velocity), type(now.force)(*link_force))
-        force, merit = new_force, new_merit
+        fixed_point_steps_due[active[~newton]] -= 1
+        fixed_point_steps_due[active[failed]] = _FIXED_POINT_STEPS_AFTER_FAILURE
+        if method == "newton":
+            iterations[active[failed]] = max_iterations
 
 
 def _solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -278,9 +267,7 @@ def solve_balance(
     for link in np.unique(solution.anchor):
         chosen = np.flatnonzero(solution.anchor == link)
         posture = body.posture(angles[:, chosen], int(link))
-        tail_z[:, chosen] = body.tail_velocity(
-            posture, scaled_rates[:, chosen], solution.velocity[:, chosen], int(link)
-        )
+        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], solution.velocity[:, chosen], int(link))
     return BalanceSolution(
         tail_z * speed,
         solution.residual,

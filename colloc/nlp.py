@@ -99,9 +99,7 @@ class Solver:
     ) -> NlpResult:
         """Maximise efficiency from x at regularisation `delta` (per period); multipliers are (lam_x, lam_g)."""
         t = self.transcription
-        parameters = self.oracles.parameter_vector(
-            delta / RADIANS, t.block_parameters(x[t.layout.parameters[:, 0]])
-        )
+        parameters = self.oracles.parameter_vector(delta / RADIANS, t.block_parameters(x[t.layout.parameters[:, 0]]))
         bounds = {"lbx": t.lower, "ubx": t.upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
         duals = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
         start = time.perf_counter()

@@ -108,12 +108,12 @@ class Problem:
         collocation = scheme(self.scheme)
         if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
-        points = self.intervals * (collocation.s - collocation.left)
-        needed = 4 * self.gait.harmonics
-        if points < needed or self.intervals < 2:
+        per_interval = collocation.s - collocation.left
+        fewest = max(2, -(-4 * self.gait.harmonics // per_interval))
+        if self.intervals < fewest:
             raise ProblemError(
                 f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot resolve "
-                f"{self.gait.harmonics} harmonics; use at least {max(2, -(-needed // max(1, collocation.s - collocation.left)))}."
+                f"{self.gait.harmonics} harmonics; use at least {fewest}."
             )
         if self.intervals > 100_000:
             raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")

@@ -5,7 +5,7 @@ forces; the tail's orientation theta at every site; distance x and work W at eve
 per radian of phase, so that all variables are O(1).
 
 The balance itself is a step function of the tail velocity as delta goes to 0. Lifted forces cure that: each force is
-tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0, and the balance is linear in the forces.
+tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0; the balance is linear in the forces.
 x is the displacement of the centre of mass along a fixed direction. The first orientation is free, so maximising x
 turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable.
 """
@@ -128,9 +128,7 @@ class Transcription:
         """
         blocks = (self.assembly.objective, *self.assembly.blocks)
         worst = iter(worst_instants(self.problem, self.mesh, self.checks, parameters))
-        return [
-            _check_parameters(self.problem, next(worst)) if b.function.n_parameter else b.parameters for b in blocks
-        ]
+        return [_check_parameters(self.problem, next(worst)) if b.function.n_parameter else b.parameters for b in blocks]
 
 
 def worst_instants(
@@ -265,9 +263,7 @@ def _gait_group(name: str, variables: np.ndarray, matrix: np.ndarray, layout: La
 def _output_group(name: str, outputs: range, n_out: int, n_point: int, n: int) -> Group:
     """Outputs of the point function that have to vanish at every point."""
     columns = (np.arange(n_point)[:, None] * n_out + np.array(outputs)).ravel()
-    return _equalities(
-        name, sparse.csr_matrix((columns.size, n)), {"point": _selector(columns, n_out * n_point)}
-    )
+    return _equalities(name, sparse.csr_matrix((columns.size, n)), {"point": _selector(columns, n_out * n_point)})
 
 
 def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Group]:
