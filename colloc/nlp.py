@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
 
 from colloc.blocks import Oracles, oracles
-from colloc.transcription import RADIANS, Transcription
+from colloc.layout import RADIANS
+from colloc.transcription import Transcription, worst_instants
 
 IPOPT_OPTIONS: dict[str, object] = {
     "print_level": 0,
@@ -71,6 +72,15 @@ class NlpResult:
     evaluation_seconds: float
     group_violation: dict[str, float] = field(default_factory=dict)
 
+    def accumulated(self, earlier: NlpResult) -> NlpResult:
+        """This result with the effort of an earlier solve of the same level added."""
+        return replace(
+            self,
+            iterations=self.iterations + earlier.iterations,
+            seconds=self.seconds + earlier.seconds,
+            evaluation_seconds=self.evaluation_seconds + earlier.evaluation_seconds,
+        )
+
     @property
     def optimal(self) -> bool:
         """First-order conditions hold to 1e-6, by our own measure."""
@@ -108,6 +118,20 @@ class Solver:
         stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
         return self._measured(x, lam_x, lam_g, parameters, stats, seconds)
+
+    def check_excess(self, x: np.ndarray) -> float:
+        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
+        t = self.transcription
+        parameters = x[t.layout.parameters[:, 0]]
+        worst = worst_instants(t.problem, t.mesh, t.checks, parameters)
+        gait = t.gait(x)
+        excess = 0.0
+        for (name, check), times in zip(t.checks, worst, strict=True):
+            rows = t.groups[name]
+            values = np.array(check.map(times.size)(gait.angles(times))).ravel()
+            excess = max(excess, float(np.max(values - t.constraint_upper[rows])))
+            excess = max(excess, float(np.max(t.constraint_lower[rows] - values)))
+        return excess
 
     def _measured(self, x, lam_x, lam_g, parameters, stats, seconds) -> NlpResult:
         t = self.transcription

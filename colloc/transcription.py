@@ -21,48 +21,11 @@ from scipy import sparse
 from colloc.blocks import Assembly, Block
 from colloc.gait import Fourier
 from colloc.kernels import gait_check, lifted_point, mean_square, minus_efficiency, shape_checks
-from colloc.mesh import Mesh, uniform_mesh
+from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
+from colloc.mesh import Mesh
 from colloc.problem import Problem
-from colloc.schemes import scheme
-
-RADIANS = 2 * np.pi
-"""Radians of phase per period: rates, velocities and delta of the transcription are those per period divided by it."""
 
 _SAMPLES_PER_CELL = 16
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Where each kind of variable sits in the vector x: index arrays, ``(n_component, n_position)``."""
-
-    parameters: np.ndarray
-    theta: np.ndarray
-    distance: np.ndarray
-    work: np.ndarray
-    angles: np.ndarray
-    rates: np.ndarray
-    z: np.ndarray
-    forces: np.ndarray
-    n: int
-
-
-def _layout(problem: Problem, mesh: Mesh) -> Layout:
-    n_joint, n_link = problem.body.n_joint, problem.body.n_link
-    sizes = {
-        "parameters": (problem.gait.size(n_joint), 1),
-        "theta": (1, mesh.n_site),
-        "distance": (1, mesh.n + 1),
-        "work": (1, mesh.n + 1),
-        "angles": (n_joint, mesh.n_point),
-        "rates": (n_joint, mesh.n_point),
-        "z": (3, mesh.n_point),
-        "forces": (3 * n_link, mesh.n_point),
-    }
-    indices, start = {}, 0
-    for name, (rows, columns) in sizes.items():
-        indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
-        start += rows * columns
-    return Layout(n=start, **indices)
 
 
 @dataclass(eq=False)
@@ -167,8 +130,8 @@ def _check_parameters(problem: Problem, times: np.ndarray) -> np.ndarray:
 
 def transcribe(problem: Problem) -> Transcription:
     """The nonlinear program of a problem on its uniform mesh."""
-    mesh = uniform_mesh(scheme(problem.scheme), problem.intervals, problem.gait.fraction)
-    layout = _layout(problem, mesh)
+    mesh = problem_mesh(problem)
+    layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body)
     point = lifted_point(problem.body, problem.friction)
     n_joint, n_link = problem.body.n_joint, problem.body.n_link

@@ -7,7 +7,8 @@ from scipy.sparse.linalg import spsolve
 
 from colloc.balance import instant, total_power
 from colloc.fixed_point import solve_balance
-from colloc.transcription import RADIANS, Transcription
+from colloc.layout import RADIANS
+from colloc.transcription import Transcription
 
 
 def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: float) -> np.ndarray:
