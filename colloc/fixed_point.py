@@ -166,15 +166,19 @@ def _ladder(delta: float) -> np.ndarray:
     return np.geomspace(1.0, delta, count)
 
 
-def _rereferenced(batch: _Batch, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
-    now = batch.at(np.arange(z.shape[1]), z, delta)
+def _slowest_link(batch: _Batch, z: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    """The slowest link of every instant, ``(n,)``, for z in the batch's own reference."""
+    velocity = batch.at(np.arange(z.shape[1]), z, delta).velocity
     half = 0.5 * batch.body.length_column()
-    speed = np.abs(now.velocity.vs) + np.abs(now.velocity.vn) + half * np.abs(now.velocity.w)
-    anchor = np.argmin(speed, axis=0)
+    return np.argmin(np.abs(velocity.vs) + np.abs(velocity.vn) + half * np.abs(velocity.w), axis=0)
+
+
+def _rereferenced(batch: _Batch, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
+    """Velocity ``(3, n)`` of the midpoints of the links `anchor`, for z in the batch's own reference."""
+    now = batch.at(np.arange(z.shape[1]), z, delta)
     vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
     c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
-    return anchor, np.stack([vs * c - vn * s, vs * s + vn * c, w])
+    return np.stack([vs * c - vn * s, vs * s + vn * c, w])
 
 
 def solve_balance(
@@ -243,10 +247,8 @@ def solve_balance(
     scaled_rates, scaled_delta = rates / speed, (delta / speed)[None]
     everything = np.arange(n_time)
     tail = _Batch(body, friction, angles, scaled_rates, TAIL)
-    if start is None:
-        anchor, velocity = np.full(n_time, body.n_link // 2), np.zeros((3, n_time))
-    else:
-        anchor, velocity = _rereferenced(tail, z / speed, scaled_delta)
+    anchor = np.full(n_time, body.n_link // 2)
+    velocity = np.zeros((3, n_time)) if start is None else _rereferenced(tail, z / speed, scaled_delta, anchor)
 
     solution = _State(anchor, velocity, np.full(n_time, np.inf), np.zeros(n_time, dtype=int))
     problem = (body, friction, angles, scaled_rates)
@@ -313,10 +315,10 @@ def _advance(
             state.velocity[:, members] = z
             failed = residual > tolerance
             if failed.any():
-                anchor, velocity = _rereferenced(batch, z, delta[:, members])
+                anchor = _slowest_link(batch, z, delta[:, members])
                 change = failed & (anchor != link)
                 state.anchor[members[change]] = anchor[change]
-                state.velocity[:, members[change]] = velocity[:, change]
+                state.velocity[:, members[change]] = _rereferenced(batch, z, delta[:, members], anchor)[:, change]
                 moved.append(members[change])
         todo = np.concatenate(moved) if moved else np.array([], dtype=int)
         if not todo.size:

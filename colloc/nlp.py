@@ -10,6 +10,7 @@ import numpy as np
 
 from colloc.blocks import Oracles, oracles
 from colloc.layout import RADIANS
+from colloc.problem import LIFTED
 from colloc.transcription import Transcription, worst_instants
 
 IPOPT_OPTIONS: dict[str, object] = {
@@ -23,7 +24,6 @@ IPOPT_OPTIONS: dict[str, object] = {
     "mu_init": 1e-4,
     "bound_push": 1e-5,
     "bound_frac": 1e-5,
-    "theta_max_fact": 0.1,
     "warm_start_init_point": "yes",
     "warm_start_bound_push": 1e-5,
     "warm_start_bound_frac": 1e-5,
@@ -32,8 +32,9 @@ IPOPT_OPTIONS: dict[str, object] = {
     "warm_start_mult_bound_push": 1e-5,
     "max_iter": 300,
 }
-"""theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along negative curvature
-would otherwise carry them away for good."""
+LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1}
+"""With lifted forces this decides: it keeps the iterates near the balance manifold, from which a step along negative
+curvature would otherwise carry them away for good. The velocity map needs no such leash, and is slowed by it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,8 @@ class Solver:
     def __init__(self, transcription: Transcription, options: dict[str, object] | None = None) -> None:
         self.transcription = transcription
         self.oracles: Oracles = oracles(transcription.assembly)
-        settings: dict[str, object] = {f"ipopt.{k}": v for k, v in {**IPOPT_OPTIONS, **(options or {})}.items()}
+        chosen = {**IPOPT_OPTIONS, **(LIFTED_OPTIONS if transcription.problem.formulation == LIFTED else {}), **(options or {})}
+        settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True, **self.oracles.options}
         self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)

@@ -174,7 +174,8 @@ def transcribe(problem: Problem) -> Transcription:
     velocity = VelocityMap(problem.body, problem.friction, mesh.n_point)
 
     def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
-        return velocity(local[1 : 1 + n_joint, :], local[1 + n_joint : 1 + 2 * n_joint, :], delta)
+        _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
+        return velocity(angles, rates, z, delta)
 
     objective = Block(
         minus_efficiency(),
