@@ -132,9 +132,9 @@ def _check_parameters(problem: Problem, times: np.ndarray) -> np.ndarray:
     return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
 
 
-def transcribe(problem: Problem) -> Transcription:
-    """The nonlinear program of a problem on its uniform mesh."""
-    mesh = problem_mesh(problem)
+def transcribe(problem: Problem, edges: np.ndarray | None = None) -> Transcription:
+    """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges."""
+    mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body)
     point = point_function(problem.formulation, problem.body, problem.friction)
