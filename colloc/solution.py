@@ -227,7 +227,7 @@ class Solution:
         ]
         z, theta, centre, end = self._interpolated(reduced)
         angles, rates = self.gait.angles(phase), self.gait.rates(phase)
-        if symmetry == "bilateral" and second.any():
+        if symmetry == "bilateral":
             # seen from the head the body repeats itself with reversed rates
             here = instant(
                 body, self.problem.friction, self.gait.angles(reduced), self.gait.rates(reduced), z, self.last.delta
