@@ -39,20 +39,47 @@ def link_ends(body: Chain, angles: np.ndarray, theta: np.ndarray, tail: np.ndarr
     return np.stack([tail[0] + c * x - s * y, tail[1] + s * x + c * y])
 
 
-def draw_snapshots(axes: Axes, solution: Solution, count: int = 9, periods: float = 1.0) -> None:
-    """The body in the lab frame at equal time steps, darker later, with the paths of tail and head."""
-    motion = solution.sample(np.linspace(0.0, periods, count))
-    ends = link_ends(solution.problem.body, motion.angles, motion.theta, motion.tail)
+def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
+    """The body over one period at equal time steps, side by side; below, how far its centre of mass has come."""
+    t = np.linspace(0.0, 1.0, count)
+    motion = solution.sample(t)
+    ends = link_ends(solution.problem.body, motion.angles, motion.theta, motion.tail) - motion.centre[:, None, :]
+    spacing = 1.2 * max(float(np.ptp(ends[0], axis=0).max()), 0.35)
+    low = float(ends[1].min() + min(motion.centre[1].min(), 0.0)) - 0.16
     colours = matplotlib.colormaps["cividis_r"](np.linspace(0.15, 1.0, count))
     for k in range(count):
-        axes.plot(*ends[:, :, k], "-", color=colours[k], lw=2.2, solid_capstyle="round", zorder=2 + k)
-        axes.plot(*ends[:, 1:-1, k], "o", color="white", mec=colours[k], ms=3.5, zorder=2.5 + k)
-        axes.plot(*ends[:, -1:, k], "o", color=colours[k], ms=4.5, zorder=2.5 + k)
-    fine = solution.sample(np.linspace(0.0, periods, 400))
-    axes.plot(*fine.centre, color=RED, lw=1.0, zorder=1)
-    axes.plot(*fine.centre[:, [0, -1]], "s", color=RED, ms=3.5, zorder=40)
+        x = ends[0, :, k] + k * spacing
+        y = ends[1, :, k] + motion.centre[1, k]
+        axes.plot(x, y, "-", color=colours[k], lw=2.4, solid_capstyle="round")
+        axes.plot(x[1:-1], y[1:-1], "o", color="white", mec=colours[k], ms=3.5)
+        axes.plot(x[-1:], y[-1:], "o", color=colours[k], ms=5)
+        axes.plot(k * spacing, motion.centre[1, k], "+", color=RED, ms=6)
+        axes.text(k * spacing, low + 0.09, f"{t[k]:.1f}", ha="center", va="top", fontsize=7, color=GREY)
+    scale = (count - 1) * spacing / max(abs(motion.centre[0, -1]), 1e-12)
+    axes.plot([0, (count - 1) * spacing], [low, low], color=GREY, lw=0.8)
+    axes.plot(scale * motion.centre[0], np.full(count, low), "|", color=RED, ms=9)
+    axes.text(0, low - 0.03, "centre at x = 0", fontsize=7, va="top", ha="left", color=RED)
+    axes.text(
+        (count - 1) * spacing, low - 0.03, f"x = d = {solution.distance:.4f}", fontsize=7, va="top", ha="right", color=RED
+    )
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def draw_lab(axes: Axes, solution: Solution) -> None:
+    """The body in the lab at the ends of a period, with the paths of its ends and its centre of mass."""
+    fine = solution.sample(np.linspace(0.0, 1.0, 601))
+    ends = link_ends(solution.problem.body, fine.angles, fine.theta, fine.tail)
+    axes.plot(*ends[:, 0], color=BLUE, lw=0.9, label="tail")
+    axes.plot(*ends[:, -1], color=ORANGE, lw=0.9, label="head")
+    axes.plot(*fine.centre, color=RED, lw=1.2, label="centre of mass")
+    for k, shade in ((0, "#b0b0b0"), (-1, "black")):
+        axes.plot(*ends[:, :, k], "-", color=shade, lw=2.4, solid_capstyle="round")
+        axes.plot(*ends[:, -1:, k], "o", color=shade, ms=5)
+        axes.plot(*fine.centre[:, [k]], "+", color=RED, ms=7)
     axes.set_aspect("equal", "datalim")
     axes.set(xlabel="x  [body length]", ylabel="y  [body length]")
+    axes.legend(loc="upper right", fontsize=7, handlelength=1.2)
 
 
 def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
@@ -60,7 +87,7 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
     if problem.body.n_joint == 2:
         grid = np.linspace(-np.pi, np.pi, 181)
         a, b = np.meshgrid(grid, grid)
-        allowed = crossing_depth(problem.body, np.stack([a.ravel(), b.ravel()])) == 0
+        allowed = crossing_depth(problem.body, np.stack([a.ravel(), b.ravel()])) < 1e-9
         allowed &= np.maximum(abs(a), abs(b)).ravel() <= problem.joint_limit + 1e-9
         shade = np.where(allowed.reshape(a.shape), np.nan, 1.0)
         axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
@@ -107,21 +134,24 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 
 def solution_figure(solution: Solution) -> Figure:
-    """Snapshots of the motion, the path in the joint plane, speeds and power of a solution."""
+    """Filmstrip, lab paths, path in the joint plane, speeds and power of a solution."""
     with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(10, 6.6), layout="constrained")
-        grid = figure.add_gridspec(2, 3, height_ratios=(1.15, 1), width_ratios=(1, 1, 1))
+        figure = Figure(figsize=(11, 8.2), layout="constrained")
+        grid = figure.add_gridspec(3, 3, height_ratios=(0.75, 1.25, 0.9))
         t = np.linspace(0.0, 1.0, 1201)
-        top = figure.add_subplot(grid[0, :2])
-        draw_snapshots(top, solution)
-        top.set_title(f"one period in the lab: the centre of mass (red) advances d = {solution.distance:.4f}")
-        plane = figure.add_subplot(grid[0, 2])
+        strip = figure.add_subplot(grid[0, :])
+        draw_filmstrip(strip, solution)
+        strip.set_title("one period, frame by frame (phase below; the dot is the head)")
+        lab = figure.add_subplot(grid[1, :2])
+        draw_lab(lab, solution)
+        lab.set_title("in the lab, from t = 0 (grey) to t = 1 (black)")
+        plane = figure.add_subplot(grid[1, 2])
         draw_shape_path(plane, solution.problem, solution.gait.angles(t))
         plane.set_title("gait in shape space (grey: not allowed)")
-        speeds = figure.add_subplot(grid[1, :2])
+        speeds = figure.add_subplot(grid[2, :2])
         draw_speeds(speeds, solution, t)
         speeds.set_title("speeds of the links; near δ they stick")
-        draw_power(figure.add_subplot(grid[1, 2]), solution, t)
+        draw_power(figure.add_subplot(grid[2, 2]), solution, t)
         figure.axes[-1].set_title(f"W = {solution.work:.4f} per period (ticks: mesh)")
         mu = solution.problem.friction
         verdict = "" if solution.status == "solved" else f"   —   {solution.status.upper()}"
