@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from colloc.diagnosis import explanation, redundant_equations
 from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
 from colloc.problem import Problem
@@ -119,7 +120,11 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
         result = _refine(run, result)
     solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin)
     if not result.optimal:
-        solution.message = _explained(result, run.levels[-1].delta)
+        delta = run.levels[-1].delta
+        solution.message = explanation(run.solver.transcription, result, delta)
+        redundant = redundant_equations(run.solver, feasible_point(run.solver.transcription, run.parameters, delta), delta)
+        if redundant:
+            solution.message += f" Redundant equations, which no optimiser bears: {', '.join(redundant)}."
     return solution
 
 
@@ -154,12 +159,3 @@ def _refine(run: _Run, result: NlpResult) -> NlpResult:
         if not result.optimal:
             break
     return result
-
-
-def _explained(result: NlpResult, delta: float) -> str:
-    group, size = max(result.group_violation.items(), key=lambda item: item[1])
-    where = f"largest violation {size:.1e} in '{group}'" if size > _ADMISSIBLE else f"KKT error {result.kkt_error:.1e}"
-    return (
-        f"no optimum at delta = {delta:.1e} ({result.status}; {where}). "
-        "Try another guess, a smaller delta_start, or more intervals."
-    )

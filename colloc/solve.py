@@ -40,6 +40,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mesh-tolerance", type=float, metavar="TOL", help="relative efficiency error to refine to; 0: never")
     parser.add_argument("--scheme", metavar="NAME", help="trapezoid, hermite-simpson, gauss-N or radau-N")
     parser.add_argument("--formulation", choices=("map", "lifted"), help="how the balance becomes constraints")
+    parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
     parser.add_argument("--output", metavar="PATH", default="results", help="folder, or .h5 file (default: results/NAME.h5)")
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")
@@ -56,7 +57,11 @@ def _changed(problem: Problem, options: argparse.Namespace) -> Problem:
         "scheme": options.scheme,
         "formulation": options.formulation,
     }
-    changes = {name: value for name, value in wanted.items() if value is not None}
+    changes: dict[str, object] = {name: value for name, value in wanted.items() if value is not None}
+    if options.start is not None:
+        from colloc.store import load
+
+        changes["guess"] = load(options.start).gait
     return problem.with_(**changes) if changes else problem
 
 
@@ -165,6 +170,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _solve(problem, stated.source, stated.reference, path, options, quiet)
     except CollocError as error:
         print(f"colloc: {error}", file=sys.stderr)
+        return BAD_PROBLEM
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  the reader of a pipe left; the result is saved
         return BAD_PROBLEM
     except KeyboardInterrupt:
         print("colloc: interrupted; nothing was written.", file=sys.stderr)

@@ -87,6 +87,8 @@ def test_bad_options_and_files(problem, tmp_path, capsys):
         (["--delta", "0"], "delta must be positive"),
         (["--mesh", "1"], "mesh is too small"),
         (["--output", "/proc/nowhere/x.h5"], "cannot"),
+        (["--start", str(tmp_path / "none.h5")], "there is no file"),
+        (["--start", good], "not a readable colloc solution"),
     ):
         assert main([good, *options]) == 2
         assert message in capsys.readouterr().err

@@ -10,7 +10,7 @@ LEVELS = {
     2: ["balance", "problem"],
     3: ["fixed_point", "layout", "blocks", "kernels", "velocity_callback", "replay", "warm_start", "transcription"],
     4: ["nlp", "solution", "problem_file", "store", "refinement"],
-    5: ["verify", "continuation"],
+    5: ["verify", "diagnosis", "continuation"],
     6: ["optimise", "figures", "solve"],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
