@@ -106,15 +106,12 @@ def worst_instants(
     fine = np.linspace(0.0, 1.0, _SAMPLES_PER_CELL + 1)
     cells = np.arange(mesh.n)
 
-    def magnitude(check: ca.Function, times: np.ndarray) -> np.ndarray:
-        values = np.array(check.map(times.size)(gait.angles(times.ravel()))).reshape(times.shape)
-        return np.abs(values) if is_joint else values
-
     result = []
     for name, check in checks:
-        is_joint = name.startswith("joint")
         times = mesh.edges[:-1, None] + mesh.h[:, None] * fine
-        values = magnitude(check, times)
+        values = np.array(check.map(times.size)(gait.angles(times.ravel()))).reshape(times.shape)
+        if name.startswith("joint"):
+            values = np.abs(values)
         best = np.argmax(values, axis=1)
         # one parabola through the best sample and its neighbours places a maximum inside to O(step^4)
         inner = np.clip(best, 1, _SAMPLES_PER_CELL - 1)
