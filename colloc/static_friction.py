@@ -1,6 +1,6 @@
 """Where static friction carries a link of the three-link body, and why kinetic friction alone has no solution there.
 
-A link is *held* when the largest speed on it falls below a threshold (the paper's figure 11: 1e-3 at unit larger rate and
+A link is *held* when the largest speed on it falls below a threshold (the paper's figure 9: 1e-3 at unit larger rate and
 delta = 1e-4). With kinetic friction only, forces per unit length of a held link could be 0 or mu in a body that is
 symmetric, but not in between; so a small force or couple from the other links cannot be balanced. Delta supplies the
 values in between at velocities of order delta.
@@ -19,7 +19,7 @@ from colloc.fixed_point import solve_balance
 from colloc.friction import Friction
 
 SLOW = 1e-3
-"""Speed below which the paper counts a link as held (its figure 11)."""
+"""Speed below which the paper counts a link as held (its figure 9)."""
 MIDDLE = 1
 
 
@@ -61,14 +61,14 @@ WORKED_CASES = (
     Case("E", (-2.88, -0.785), (1.0, 0.1), "one joint nearly at rest"),
     Case("F", (2.9, -2.8), (1.0, -0.5), "angles near pi and -pi"),
 )
-"""The paper describes figure 11 C-F in words; these shapes and rates lie in the regions it describes."""
+"""The paper describes figure 9 C-F in words; these shapes and rates lie in the regions it describes."""
 
 SYMMETRIC_CASES = (
     Case("A", (1.4, 1.4), (1.0, 1.0), "outer links splayed, mirror images of each other: a small force on the middle link"),
     Case("B", (1.75, 1.75), (1.0, 1.0), "outer links leaning inwards: a small force of the other sign"),
     Case("C", (2.85, -2.85), (1.0, -1.0), "symmetric about the centre: a small couple on the middle link"),
 )
-"""Figure 12 A-C: symmetric shapes and rates, so that one velocity of the middle link remains unknown."""
+"""Figure 10 A-C: symmetric shapes and rates, so that one velocity of the middle link remains unknown."""
 
 
 class Held(NamedTuple):
