@@ -18,7 +18,11 @@ from colloc.errors import StoreError
 
 
 def write_arrays(
-    path: Path, arrays: Mapping[str, Any], *, units: Mapping[str, str] | None = None, attributes: Mapping[str, Any] | None = None
+    path: Path,
+    arrays: Mapping[str, Any],
+    *,
+    units: Mapping[str, str] | None = None,
+    attributes: Mapping[str, Any] | None = None,
 ) -> None:
     """Write arrays (numbers, strings or NumPy arrays by name; "a/b" makes a group) with what describes them.
 

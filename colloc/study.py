@@ -1,7 +1,8 @@
 """Resumable studies: named parts, each a function from settings to named arrays, computed once and kept in HDF5.
 
 A part is finished when its file carries the fingerprint of its settings, of the source text of its module and of every
-colloc module that one leads to, and of the parts it needs. Change any of them, and it is computed again.
+colloc module that one leads to, and of the parts it needs. Change any of them, and it is computed again. Modules that
+only carry numbers about (this one, storing, running in parallel) do not count.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from colloc.array_store import read_arrays, read_attribute, write_arrays
 from colloc.errors import ProblemError
 
 Arrays = dict[str, Any]
+_CARRIERS = {"colloc.study", "colloc.array_store", "colloc.parallel"}
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ def source_closure(module: str, package: str = "colloc") -> dict[str, str]:
     todo = [module]
     while todo:
         name = todo.pop()
-        text = _source(name) if name not in found else None
+        text = _source(name) if name not in found and name not in _CARRIERS else None
         if text is None:
             continue
         found[name] = text
@@ -138,11 +140,12 @@ class Study:
         """Compute one part and write its file; returns the seconds it took."""
         part = self.parts[name]
         needed = {need: self.arrays(need) for need in part.needs}
+        fingerprint = self.fingerprint(name)
         start = time.perf_counter()
         arrays = part.compute(Context(self.settings(name), needed, processes))
         seconds = time.perf_counter() - start
         attributes = {
-            "fingerprint": self.fingerprint(name),
+            "fingerprint": fingerprint,
             "settings": self.settings(name),
             "seconds": seconds,
             "processes": processes,

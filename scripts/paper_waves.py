@@ -52,7 +52,9 @@ def waves(context: Context) -> Arrays:
     result: Arrays = {}
     for name, row in zip(WAVES, rows, strict=True):
         result |= {f"{name}/{key}": value for key, value in row.items()}
-    views = parallel_map(_view, [(name, settings["delta"], settings["snapshots"]) for name in WAVES], processes=context.processes)
+    views = parallel_map(
+        _view, [(name, settings["delta"], settings["snapshots"]) for name in WAVES], processes=context.processes
+    )
     for name, view in zip(WAVES, views, strict=True):
         result |= {f"{name}/{key}": value for key, value in view.items()}
     return result

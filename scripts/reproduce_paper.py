@@ -113,7 +113,7 @@ PARTS = (
         paper_waves.wave_parameters,
         settings={
             "delta": DELTA,
-            "steepness": [5, 10, 40],
+            "steepness": [5, 10, 40, 100, 400],
             "amplitude_A": [1.1, 1.5],
             "mu_A": [3, 10, 1000],
             "coarse": [[12, 4], [25, 4], [50, 4]],

@@ -1,0 +1,163 @@
+"""Rows of the table on three-link bodies: map, sweeps, optima, influence of delta, the two best motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from colloc.motion_record import third_slowest_dips
+from colloc.study import Arrays, Study
+from scripts.table_rows import Row, number_row, statement_row
+
+
+def connection(study: Study) -> Iterator[Row]:
+    made = study.arrays("connection")
+    cubic = list(made["methods"]).index("cubic")
+    for n, errors in zip(made["resolutions"], made["errors"], strict=True):
+        largest, rms, median = errors[cubic]
+        yield Row(
+            f"velocity map, {n} x {n} x {n + 1} nodes a face, cubic: error against direct solves",
+            "not printed",
+            f"largest {largest:.1e}, rms {rms:.1e}, median {median:.1e}",
+            "random shapes and rates",
+            "-",
+        )
+    faces = int(made["other/anisotropic/faces"])
+    yield statement_row("maps needed if mu_b != mu_f", "two more", f"{faces - 2} more", faces == 4)
+
+
+def sweep(study: Study) -> Iterator[Row]:
+    s = study.arrays("sweep")
+    count = int(s["inside"].sum())
+    moving = np.hypot(*np.meshgrid(s["A1"], s["B1"], indexing="ij"))[None] > 0
+    difference = np.where(moving, np.abs(s["efficiency_mapped"] - s["efficiency_direct"]), 0)
+    yield Row(
+        f"sweep over {count} gaits at 100 instants: largest efficiency error of the map route",
+        "not printed",
+        f"{np.nanmax(difference):.1e} from the direct route; {s['sample_error_mapped'].max():.1e} from 1600 instants",
+        f"direct route: {s['sample_error_direct'].max():.1e} from 1600 instants",
+        "-",
+    )
+    mapped, direct = float(s["seconds_mapped"]), float(s["seconds_direct"])
+    yield Row(
+        f"time of that sweep, through the map / directly [s], {count} gaits", "-", f"{mapped:.1f} / {direct:.1f}", "-", "-"
+    )
+    work, r = s["work_direct"], np.hypot(*np.meshgrid(s["A1"], s["B1"], indexing="ij"))
+    ring = (r > 0.7) & (r < 0.8)
+    by_A0 = np.nanmean(np.where(ring[None], work, np.nan)[s["A0"] < 2.3], axis=(1, 2))
+    spread = (by_A0.max() - by_A0.min()) / by_A0.mean()
+    yield statement_row(
+        "W does not depend strongly on A0",
+        "(statement)",
+        f"mean W at amplitude 0.75 varies by {spread:.0%} over A0",
+        spread < 0.5,
+    )
+
+
+def plane(study: Study) -> Iterator[Row]:
+    p = study.arrays("plane")
+    best = int(p["rim_distance"].argmax())
+    yield number_row(
+        "largest distance at A0 = 0",
+        "0.261",
+        float(p["rim_distance"][best]),
+        float(p["rim_distance_error"][best]) + 1e-6,
+        f"time step; at A1 = {p['rim'][1, best]:.3f}, B1 = {p['rim'][2, best]:.3f}, on the limit of contact",
+    )
+    d = p["distance"]
+    largest = np.nanmax(d)
+    lines = max(np.nanmax(d[0]), np.nanmax(d[:, 0]))
+    yield statement_row("distance along A1 = 0 and along B1 = 0", "0", f"at most {lines:.1e}", lines < 1e-3)
+    diagonal = float(np.nanmax(np.diag(d)))
+    yield statement_row(
+        "distance near A1 = B1",
+        "nearly zero",
+        f"at most {diagonal:.3f} on A1 = B1 ({diagonal / largest:.0%} of the largest)",
+        diagonal < 0.15 * largest,
+    )
+    W = p["circle_work"]
+    spread = ((W.max(axis=1) - W.min(axis=1)) / W.mean(axis=1)).max()
+    yield statement_row(
+        "W at A0 = 0", "nearly radially symmetric", f"varies by at most {spread:.0%} with direction", spread < 0.5
+    )
+
+
+def _nearest(found: Arrays, A0: float) -> int:
+    return int(np.argmin(np.abs(found["gaits"][:, 0] - A0) - 0.1 * found["efficiency"]))
+
+
+def optima(study: Study) -> Iterator[Row]:
+    found = study.arrays("optima")
+    places = [_nearest(found, a) for a in (0.0, 1.1, 2.5)]
+    delta = study.arrays("delta")["distance_work_efficiency"][:, :, 2]
+    drift = np.abs(delta / delta[:, -1:] - 1)[:, list(study.arrays("delta")["deltas"]).index(1e-4)]
+    contact = int(found["at_contact"].sum())
+    listed = ", ".join(f"{e:.4f} (A0 = {g[0]:.2f})" for e, g in zip(found["efficiency"], found["gaits"], strict=True))
+    yield Row(
+        "local maxima of the efficiency",
+        "3",
+        f"{len(found['gaits'])}, {contact} of them at the limit of contact: {listed}",
+        "grid neighbours, climbed",
+        "the three printed, and one more at the limit of contact" if len(found["gaits"]) == 4 else "-",
+    )
+    for name, i, printed, A0 in zip(
+        ("first", "second", "third"), places, ("0.259", "0.207", "0.094"), ("0", "1.1", "2.5"), strict=True
+    ):
+        e, gait, moved = float(found["efficiency"][i]), found["gaits"][i], float(found["position_error"][i])
+        error = e * float(found["relative_error"][i] + drift[: len(delta)].max())
+        where = f"time step and delta; at A0 = {gait[0]:.3f}, A1 = {gait[1]:.3f}, B1 = {gait[2]:.3f}"
+        yield number_row(f"efficiency of the {name} maximum", printed, e, error, where)
+        yield number_row(f"A0 of the {name} maximum", A0, float(gait[0]), moved, "search with half the instants")
+    for A0, best in zip(found["named_A0"], found["named_best"], strict=True):
+        yield Row(
+            f"best efficiency at exactly A0 = {A0:g}",
+            "not printed",
+            f"{best[2]:.4f} at A1 = {best[0]:.3f}, B1 = {best[1]:.3f}",
+            "grid in A1, B1 at 400 instants",
+            "-",
+        )
+    first, second = places[:2]
+    for what, key, printed in (("distance", "distance", "0.37"), ("work", "work", "0.47")):
+        ratio = float(found[key][second] / found[key][first])
+        # a flat maximum moves along d and W by more than it loses in efficiency
+        error = ratio * float(found["position_error"][[first, second]].sum())
+        yield number_row(
+            f"{what} of the second maximum over that of the first", printed, ratio, error, "position of the maxima"
+        )
+    yield number_row(
+        "distance of the first maximum",
+        "0.26",
+        float(found["distance"][first]),
+        float(found["position_error"][first]) * 0.3,
+        "position of the maximum",
+    )
+
+
+def delta(study: Study) -> Iterator[Row]:
+    made = study.arrays("delta")
+    deltas, values = made["deltas"], made["distance_work_efficiency"]
+    below = [i for i, d in enumerate(deltas) if d <= 1e-4]
+    change = np.abs(values[:, below] / values[:, below[-1:]] - 1).max(axis=(0, 1))
+    yield statement_row(
+        f"change of results for delta in (0, 1e-4], {len(values)} gaits",
+        "less than 1 %",
+        f"d {change[0]:.1e}, W {change[1]:.1e}, efficiency {change[2]:.1e} (relative)",
+        bool((change < 0.01).all()),
+        f"against delta = {deltas[-1]:g}",
+    )
+
+
+def motions(study: Study) -> Iterator[Row]:
+    made = study.arrays("motions")
+    step = float(made["D/t"][1])
+    for name, printed in (("D", ("0.07", "0.43")), ("F", ("0.33", "0.67"))):
+        t, speed = third_slowest_dips(made[f"{name}/t"], made[f"{name}/speeds"])
+        for value in printed:
+            near = np.abs(t - float(value)) < 0.05
+            if not near.any():
+                yield Row(f"motion {name}: three ends almost static at t =", value, "no such instant", "-", "does not hold")
+                continue
+            i = np.flatnonzero(near)[0]
+            what = f"motion {name}: three of four ends almost static at t = (third slowest end moves at {speed[i]:.1e})"
+            yield number_row(what, value, float(t[i]), 2 * step, "time step")
