@@ -52,6 +52,6 @@ def snapshots(motion: Motion, friction: Friction, delta: float, count: int = 10,
     angle = motion.angle(grid.nodes, t[keep])
     x, y = (grid.integrate(grid.widths * part, 0) for part in (np.cos(angle), np.sin(angle)))
     lab = tail[keep] + (x + 1j * y) * np.exp(1j * theta[keep])
-    if tail[-1].real < 0:
+    if tail[-1].real < -1e-9:
         lab = -lab  # seen from the other side, so that it advances to the right
     return Snapshots(t[keep], lab.real, lab.imag)

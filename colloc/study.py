@@ -1,8 +1,8 @@
 """Resumable studies: named parts, each a function from settings to named arrays, computed once and kept in HDF5.
 
 A part is finished when its file carries the fingerprint of its settings, of the source text of its module and of every
-colloc module that one leads to, and of the parts it needs. Change any of them, and it is computed again. Modules that
-only carry numbers about (this one, storing, running in parallel) do not count.
+colloc or scripts module that one leads to, and of the parts it needs. Change any of them, and it is computed again.
+Modules that only carry numbers about (this one, storing, running in parallel) do not count.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def _source(module: str) -> str | None:
     return Path(spec.origin).read_text(encoding="utf-8")
 
 
-def source_closure(module: str, package: str = "colloc") -> dict[str, str]:
-    """Source text of a module and of all modules of `package` it imports, directly or not, by name."""
+def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts")) -> dict[str, str]:
+    """Source text of a module and of all modules of `packages` it imports, directly or not, by name."""
     found: dict[str, str] = {}
     todo = [module]
     while todo:
@@ -79,7 +79,7 @@ def source_closure(module: str, package: str = "colloc") -> dict[str, str]:
             continue
         found[name] = text
         for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == package:
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in packages:
                 todo.append(node.module)
     return found
 
@@ -91,6 +91,8 @@ class Study:
         self.parts = {part.name: part for part in parts}
         self.folder = Path(folder)
         self.quick = quick
+        # now, while the source on disk is the source that runs
+        self._fingerprints = {name: self._fingerprint(name) for name in self.parts}
 
     def select(self, names: Sequence[str]) -> list[str]:
         """The named parts and all they need, in order.
@@ -117,13 +119,16 @@ class Study:
         return {**part.settings, **(part.quick if self.quick else {})}
 
     def fingerprint(self, name: str) -> str:
-        """SHA-256 of what the part's arrays depend on."""
+        """SHA-256 of what the part's arrays depend on, as it was when the study was made."""
+        return self._fingerprints[name]
+
+    def _fingerprint(self, name: str) -> str:
         part = self.parts[name]
         text = json.dumps(
             [
                 self.settings(name),
                 sorted(source_closure(part.compute.__module__).items()),
-                [self.fingerprint(need) for need in part.needs],
+                [self._fingerprint(need) for need in part.needs],
             ],
             sort_keys=True,
         )
@@ -140,12 +145,11 @@ class Study:
         """Compute one part and write its file; returns the seconds it took."""
         part = self.parts[name]
         needed = {need: self.arrays(need) for need in part.needs}
-        fingerprint = self.fingerprint(name)
         start = time.perf_counter()
         arrays = part.compute(Context(self.settings(name), needed, processes))
         seconds = time.perf_counter() - start
         attributes = {
-            "fingerprint": fingerprint,
+            "fingerprint": self.fingerprint(name),
             "settings": self.settings(name),
             "seconds": seconds,
             "processes": processes,

@@ -219,7 +219,8 @@ def refined_maximum(route: Route, gait: np.ndarray, *, instants: int = 800, size
     fraction = coordinates(fine)[1]
     path = ellipse(*fine)
     exact = replay(body, route.friction, lambda t: (path.angles(t), path.rates(t)), route.delta)
-    return Maximum(*(float(a) for a in fine), exact, bool(fraction > 1 - 1e-4), float(np.abs(fine - coarse).max()))
+    A0, A1, B1 = (float(a) for a in fine)
+    return Maximum(A0, A1, B1, exact, bool(fraction > 1 - 1e-4), float(np.abs(fine - coarse).max()))
 
 
 def distinct_maxima(

@@ -92,6 +92,7 @@ def _gap_arrays(case: Case, unknown: np.ndarray, delta: float) -> Arrays:
         f"{key}/gap": np.array(gap),
         f"{key}/no_solution": gap.no_solution,
         f"{key}/unbalanced": symmetric_balance(BODY, ISOTROPIC, case, unknown, delta),
+        f"{key}/kinetic": symmetric_balance(BODY, ISOTROPIC, case, unknown, 1e-12),
     }
 
 

@@ -15,14 +15,14 @@ from pathlib import Path
 from colloc.errors import CollocError
 from colloc.parallel import available_processes
 from colloc.study import Part, Study
-from scripts import paper_static, paper_three_link, paper_waves
+from scripts import paper_map, paper_static, paper_three_link, paper_waves
 
 DELTA = 1e-4
 
 PARTS = (
     Part(
         "connection",
-        paper_three_link.connection,
+        paper_map.connection,
         settings={
             "delta": 1e-5,
             "resolutions": [16, 32, 64, 128],

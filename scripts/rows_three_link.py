@@ -69,17 +69,36 @@ def plane(study: Study) -> Iterator[Row]:
     largest = np.nanmax(d)
     lines = max(np.nanmax(d[0]), np.nanmax(d[:, 0]))
     yield statement_row("distance along A1 = 0 and along B1 = 0", "0", f"at most {lines:.1e}", lines < 1e-3)
-    diagonal = float(np.nanmax(np.diag(d)))
+    diagonal, side = np.diag(d), np.asarray(p["A1"])
+    modest = float(np.nanmax(diagonal[side <= 1.4]))
     yield statement_row(
-        "distance near A1 = B1",
+        "distance along A1 = B1, up to 1.4 rad",
         "nearly zero",
-        f"at most {diagonal:.3f} on A1 = B1 ({diagonal / largest:.0%} of the largest)",
-        diagonal < 0.15 * largest,
+        f"at most {modest:.4f} ({modest / largest:.0%} of the largest)",
+        modest < 0.05 * largest,
     )
-    W = p["circle_work"]
-    spread = ((W.max(axis=1) - W.min(axis=1)) / W.mean(axis=1)).max()
     yield statement_row(
-        "W at A0 = 0", "nearly radially symmetric", f"varies by at most {spread:.0%} with direction", spread < 0.5
+        "distance along A1 = B1, up to the limit of contact",
+        "nearly zero",
+        f"at most {np.nanmax(diagonal):.3f} ({np.nanmax(diagonal) / largest:.0%} of the largest)",
+        bool(np.nanmax(diagonal) < 0.05 * largest),
+    )
+    W, radius = p["work"], np.hypot(*np.meshgrid(p["A1"], p["B1"], indexing="ij"))
+    known = np.isfinite(W)
+    correlation = float(np.corrcoef(W[known], radius[known])[0, 1])
+    factors = p["circle_work"].max(axis=1) / p["circle_work"].min(axis=1)
+    yield statement_row(
+        "W at A0 = 0 grows with the amplitude",
+        "(statement)",
+        f"correlation of W with hypot(A1, B1): {correlation:.3f}",
+        correlation > 0.9,
+    )
+    yield statement_row(
+        "W at A0 = 0 does not depend on the direction in (A1, B1)",
+        "nearly",
+        f"varies by a factor {factors.max():.2f} at amplitude {p['circle_radius'][factors.argmax()]:g}, "
+        f"{factors.min():.2f} at {p['circle_radius'][factors.argmin()]:g}",
+        bool(factors.max() < 1.25),
     )
 
 
