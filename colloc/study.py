@@ -14,6 +14,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,7 @@ def _source(module: str) -> str | None:
     return Path(spec.origin).read_text(encoding="utf-8")
 
 
+@cache
 def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts")) -> dict[str, str]:
     """Source text of a module and of all modules of `packages` it imports, directly or not, by name."""
     found: dict[str, str] = {}

@@ -21,6 +21,7 @@ This file is written by `python -m scripts.reproduce_paper{quick}`; every row by
 _ROWS: dict[str, Callable[[Study], Iterator[Row]]] = {
     "connection": rows_three_link.connection,
     "sweep": rows_three_link.sweep,
+    "pacing": rows_three_link.pacing,
     "plane": rows_three_link.plane,
     "optima": rows_three_link.optima,
     "delta": rows_three_link.delta,

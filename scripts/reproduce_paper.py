@@ -15,7 +15,7 @@ from pathlib import Path
 from colloc.errors import CollocError
 from colloc.parallel import available_processes
 from colloc.study import Part, Study
-from scripts import paper_map, paper_static, paper_three_link, paper_waves
+from scripts import paper_map, paper_pacing, paper_static, paper_three_link, paper_waves
 
 DELTA = 1e-4
 
@@ -40,6 +40,13 @@ PARTS = (
         quick={"steps": 24, "sample_every": 20},
         needs=("connection",),
         units={"A0": "rad", "A1": "rad", "B1": "rad", "distance_direct": "body lengths", "work_direct": "weight x length"},
+    ),
+    Part(
+        "pacing",
+        paper_pacing.pacing,
+        settings={"delta": DELTA, "sample_every": 10, "resolutions": [16, 32, 64], "relative": [1e-3, 1e-4, 1e-5, 1e-6]},
+        quick={"sample_every": 4, "resolutions": [16, 32], "relative": [1e-4, 1e-5]},
+        needs=("connection", "sweep"),
     ),
     Part(
         "plane",

@@ -55,6 +55,28 @@ def sweep(study: Study) -> Iterator[Row]:
     )
 
 
+def pacing(study: Study) -> Iterator[Row]:
+    made = study.arrays("pacing")
+    cubic = list(made["methods"]).index("cubic")
+    count = made["gaits"].shape[1]
+    for n, errors in zip(made["resolutions"], made["route_error"], strict=True):
+        yield Row(
+            f"largest efficiency error of the map route, {n} x {n} x {n + 1} nodes, {count} gaits",
+            "not printed",
+            f"{errors[cubic]:.1e} (linear: {errors[1 - cubic]:.1e})",
+            "against the direct route",
+            "-",
+        )
+    for relative, d, e in zip(made["relative"], made["paced_distance_change"], made["paced_efficiency_change"], strict=True):
+        yield Row(
+            f"delta = {relative:g} times the larger rate instead of 1e-4 per period, {count} gaits",
+            "not printed",
+            f"efficiency changes by at most {e:.1e}, d by {d:.1e}",
+            "direct solves, same instants",
+            "-",
+        )
+
+
 def plane(study: Study) -> Iterator[Row]:
     p = study.arrays("plane")
     best = int(p["rim_distance"].argmax())
