@@ -32,18 +32,22 @@ class Snapshots(NamedTuple):
 
 
 def snapshots(motion: Motion, friction: Friction, delta: float, count: int = 10, panels: int = 100) -> Snapshots:
-    """The body at `count` + 1 equally spaced phases of one period of an antipodal motion (paper, eqs. theta0 to y0).
+    """The body at `count` + 1 equally spaced phases of one period (paper, eqs. theta0 to y0).
 
-    For drawing: velocities are integrated by Simpson's rule on a uniform grid, panels are refined to 1e-7 only.
+    For drawing: velocities are integrated by Simpson's rule on a uniform grid, panels are refined to 1e-7 only. `count` is
+    even; of an antipodal motion half a period is solved.
     """
-    if not motion.antipodal:
-        raise ProblemError("snapshots need an antipodal motion, whose second half period mirrors the first.")
+    if count < 2 or count % 2:
+        raise ProblemError(f"count must be even and at least 2, not {count!r}.")
     t = np.linspace(0.0, 1.0, _STEPS_BETWEEN * count + 1)
-    z = solve_smooth(motion, friction, t[: t.size // 2 + 1], delta, quadrature_tolerance=1e-7).require().z
-    mirrored = np.array([[1.0], [-1.0], [-1.0]]) * z[:, 1:]
-    z = np.concatenate([z, mirrored], axis=1)
+    half = t.size // 2
+    solved = t[: half + 1] if motion.antipodal else t
+    z = solve_smooth(motion, friction, solved, delta, quadrature_tolerance=1e-7).require().z
+    if motion.antipodal:
+        z = np.concatenate([z, np.array([[1.0], [-1.0], [-1.0]]) * z[:, 1:]], axis=1)
     theta = cumulative_simpson(z[2], x=t, initial=0.0)
-    theta = theta - 0.5 * theta[t.size // 2]  # the path then advances along x
+    if motion.antipodal:
+        theta = theta - 0.5 * theta[half]  # the path then advances along x
     rate = (z[0] + 1j * z[1]) * np.exp(1j * theta)
     tail = cumulative_simpson(rate.real, x=t, initial=0.0) + 1j * cumulative_simpson(rate.imag, x=t, initial=0.0)
 
@@ -52,6 +56,8 @@ def snapshots(motion: Motion, friction: Friction, delta: float, count: int = 10,
     angle = motion.angle(grid.nodes, t[keep])
     x, y = (grid.integrate(grid.widths * part, 0) for part in (np.cos(angle), np.sin(angle)))
     lab = tail[keep] + (x + 1j * y) * np.exp(1j * theta[keep])
-    if tail[-1].real < -1e-9:
-        lab = -lab  # seen from the other side, so that it advances to the right
+    if abs(tail[-1]) > 1e-9:
+        advance = np.angle(tail[-1])
+        # antipodal paths lie along x already, up to rounding; seen from the other side they advance to the right
+        lab = lab * np.exp(-1j * (np.pi * round(advance / np.pi) if motion.antipodal else advance))
     return Snapshots(t[keep], lab.real, lab.imag)

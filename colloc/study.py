@@ -63,14 +63,17 @@ class Part:
 
 
 def _source(module: str) -> str | None:
-    spec = importlib.util.find_spec(module)
+    try:
+        spec = importlib.util.find_spec(module)
+    except ModuleNotFoundError:  # a name in a module, not a module
+        return None
     if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         return None
     return Path(spec.origin).read_text(encoding="utf-8")
 
 
 @cache
-def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts")) -> dict[str, str]:
+def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts", "problems")) -> dict[str, str]:
     """Source text of a module and of all modules of `packages` it imports, directly or not, by name."""
     found: dict[str, str] = {}
     todo = [module]
@@ -82,7 +85,7 @@ def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts"
         found[name] = text
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in packages:
-                todo.append(node.module)
+                todo += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
     return found
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from colloc.errors import CollocError
 from colloc.parallel import available_processes
 from colloc.study import Part, Study
-from scripts import paper_map, paper_pacing, paper_static, paper_three_link, paper_waves
+from scripts import paper_crawlers, paper_map, paper_pacing, paper_static, paper_three_link, paper_waves
 
 DELTA = 1e-4
 
@@ -128,6 +128,18 @@ PARTS = (
             "amplitude_B": [0.7, 0.9, 1.1],
         },
         quick={"steepness": [10], "amplitude_A": [], "mu_A": [10], "coarse": [[25, 4]], "mu_B": [1000], "amplitude_B": [0.9]},
+    ),
+    Part(
+        "crawlers",
+        paper_crawlers.crawlers,
+        settings={
+            "epsilons": [0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002],
+            "fit_below": 0.025,
+            "intervals": 2,
+            "shown": 0.1,
+            "snapshots": 12,
+        },
+        quick={"epsilons": [0.1, 0.02, 0.01], "intervals": 1},
     ),
 )
 
