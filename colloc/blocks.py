@@ -12,6 +12,7 @@ Hessian of the whole are constant sparse matrices times the stacked local nonzer
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -42,10 +43,16 @@ class LocalFunction:
 def local_function(name: str, local: ca.SX, parameter: ca.SX, delta: ca.SX, out: ca.SX) -> LocalFunction:
     """Differentiate the expression `out` for one instance."""
     weight = ca.SX.sym("weight", out.shape[0])
-    jacobian = ca.jacobian(out, local)
-    hessian = ca.triu(ca.hessian(ca.dot(weight, out), local)[0])
+    hessian = ca.hessian(ca.dot(weight, out), local)[0]
+    return _packed(name, local, parameter, delta, out, ca.jacobian(out, local), ca.triu(hessian), weight)
+
+
+def _packed(
+    name: str, local: ca.SX, parameter: ca.SX, delta: ca.SX, out: ca.SX, jacobian: ca.SX, upper: ca.SX, weight: ca.SX
+) -> LocalFunction:
+    jacobian, upper = ca.sparsify(jacobian), ca.sparsify(upper)
     jac_row, jac_col = (np.array(a, dtype=int) for a in jacobian.sparsity().get_triplet())
-    hess_row, hess_col = (np.array(a, dtype=int) for a in hessian.sparsity().get_triplet())
+    hess_row, hess_col = (np.array(a, dtype=int) for a in upper.sparsity().get_triplet())
     options = {"cse": True}
     arguments = [local, parameter, delta]
     return LocalFunction(
@@ -54,12 +61,19 @@ def local_function(name: str, local: ca.SX, parameter: ca.SX, delta: ca.SX, out:
         parameter.shape[0],
         ca.Function(name, arguments, [ca.densify(out)], options),
         ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))], options),
-        ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*hessian.nonzeros()))], options),
+        ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))], options),
         jac_row,
         jac_col,
         hess_row,
         hess_col,
     )
+
+
+def total_function(
+    name: str, local: ca.SX, parameter: ca.SX, delta: ca.SX, out: ca.SX, jacobian: ca.SX, hessian: ca.SX, weight: ca.SX
+) -> LocalFunction:
+    """A local function whose derivatives are given, because some parameters depend on the locals (see `Block.implicit`)."""
+    return _packed(name, local, parameter, delta, out, jacobian, ca.triu(hessian), weight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +87,18 @@ class Block:
         Which variables are the locals of each instance.
     scatter : sparse (n_constraint, n_out * n_instance)
         What each output contributes to each constraint; outputs are ordered instance by instance.
-    parameters : (n_parameter, n_instance)
+    parameters : (n_given, n_instance)
         Initial instance parameters; they may change between solves.
+    implicit : callable, optional
+        From the local variables ``(n_local, n_instance)`` and delta to more instance parameters, appended to the given
+        ones. The function's derivatives have to be total ones.
     """
 
     function: LocalFunction
     gather: np.ndarray
     scatter: sparse.csr_matrix
     parameters: np.ndarray
+    implicit: Callable[[ca.MX, ca.MX], ca.MX] | None = None
 
     @property
     def n_instance(self) -> int:
@@ -140,7 +158,7 @@ class Oracles:
 def oracles(assembly: Assembly) -> Oracles:
     """CasADi functions for the objective and constraints of `assembly`; cost to build does not grow with derivatives."""
     blocks = (assembly.objective, *assembly.blocks)
-    shapes = [(b.function.n_parameter, b.n_instance) for b in blocks]
+    shapes = [b.parameters.shape for b in blocks]
     x = ca.MX.sym("x", assembly.n)
     p = ca.MX.sym("p", 1 + sum(a * b for a, b in shapes))
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", assembly.m)
@@ -150,6 +168,8 @@ def oracles(assembly: Assembly) -> Oracles:
         block = blocks[index]
         local = ca.reshape(x[block.gather.ravel(order="F").tolist()], block.gather.shape)
         own = ca.reshape(p[int(offsets[index]) : int(offsets[index + 1])], shapes[index])
+        if block.implicit is not None:
+            own = ca.vertcat(own, block.implicit(local, p[0]))
         return [local, own, ca.repmat(p[0], 1, block.n_instance)]
 
     def mapped(function: ca.Function, index: int, *more: ca.MX) -> ca.MX:

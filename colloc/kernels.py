@@ -1,30 +1,56 @@
 """CasADi expressions of one mesh point: what collocation evaluates, each stated for a single instant.
 
-The physics is that of `colloc.balance` and `colloc.friction`; here it is only arranged into outputs.
+The physics is that of `colloc.balance` and `colloc.friction`; here it is only arranged into outputs. The balance itself
+is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
+*formulations* of a point:
+
+``lifted``
+    Link forces are variables, each tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0;
+    the balance is linear in the forces.
+``map``
+    The tail velocity is tied to the one that balances the body, z - Z(angles, rates) = 0, with Z from the NumPy solver
+    and its derivatives from the implicit function theorem. The velocity map is mild where the balance is not.
 """
 
 from __future__ import annotations
 
 import casadi as ca
 
-from colloc.balance import net_force, total_power
-from colloc.blocks import LocalFunction, local_function
+from colloc.balance import instant, net_force, total_power
+from colloc.blocks import LocalFunction, local_function, total_function
 from colloc.body import Chain
 from colloc.contact import crossing_bounds
 from colloc.friction import Friction, LinkForce, link_moments
+from colloc.problem import LIFTED, MAP
+
+N_RATE = 2
+"""The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
 
 
-def lifted_point(body: Chain, friction: Friction) -> LocalFunction:
-    """Force laws, balance, rate of distance and power at a point, with the link forces as variables.
+def point_function(formulation: str, body: Chain, friction: Friction) -> LocalFunction:
+    """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
 
-    Locals: theta, joint angles, joint rates, z, then tangential forces, normal forces and couples of the links.
-    Outputs: ``3 n_link`` force laws, each scaled like a velocity (F / I0 + mu v = 0); force and torque balance (3);
-    velocity of the centre of mass along the lab's x; power.
+    Locals: theta, joint angles, joint rates, z, and for "lifted" tangential forces, normal forces, couples of the links.
     """
-    n_joint, n_link = body.n_joint, body.n_link
-    theta, angles, rates, z = (ca.SX.sym(s, k) for s, k in (("theta", 1), ("q", n_joint), ("r", n_joint), ("z", 3)))
-    force = LinkForce(*(ca.SX.sym(s, n_link) for s in ("f_s", "f_n", "couple")))
-    delta = ca.SX.sym("delta")
+    return {LIFTED: _lifted_point, MAP: _map_point}[formulation](body, friction)
+
+
+def _symbols(body: Chain) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+    names = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1))
+    theta, angles, rates, z, delta = (ca.SX.sym(name, size) for name, size in names)
+    return theta, angles, rates, z, delta
+
+
+def _advance(body: Chain, theta: ca.SX, angles: ca.SX, rates: ca.SX, z: ca.SX) -> ca.SX:
+    """Velocity of the centre of mass along the lab's x."""
+    posture = body.posture(angles)
+    cx, cy = body.centre_velocity(posture, body.velocity(posture, rates, z))
+    return ca.cos(theta) * cx - ca.sin(theta) * cy
+
+
+def _lifted_point(body: Chain, friction: Friction) -> LocalFunction:
+    theta, angles, rates, z, delta = _symbols(body)
+    force = LinkForce(*(ca.SX.sym(s, body.n_link) for s in ("f_s", "f_n", "couple")))
     posture = body.posture(angles)
     velocity = body.velocity(posture, rates, z)
     vs, vn, w = velocity
@@ -36,14 +62,50 @@ def lifted_point(body: Chain, friction: Friction) -> LocalFunction:
         force.normal / I0 + mu_t * (vn + w * I1 / I0),
         (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * 6 / length,
     ]
-    cx, cy = body.centre_velocity(posture, velocity)
     out = ca.vertcat(
         *laws,
         net_force(posture, force),
-        ca.cos(theta) * cx - ca.sin(theta) * cy,
+        _advance(body, theta, angles, rates, z),
         total_power(velocity, force),
     )
     return local_function("point", ca.vertcat(theta, angles, rates, z, *force), ca.SX(0, 1), delta, out)
+
+
+def _map_point(body: Chain, friction: Friction) -> LocalFunction:
+    """Outputs z - Z, rate of distance at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter).
+
+    Derivatives of Z follow from balance(Z, y) = 0: dZ/dy = -R_z^-1 R_y. The Hessian of w.Z + w_P P(Z, y) is that of
+    w_P P + nu.R on (y, Z), pulled back along (I, dZ/dy), with nu such that the z-derivative of the whole vanishes.
+    """
+    theta, angles, rates, z, delta = _symbols(body)
+    solved = ca.SX.sym("Z", 3)
+    y = ca.vertcat(angles, rates)
+    now = instant(body, friction, angles, rates, solved, delta)
+    balance, power = net_force(now.posture, now.force), total_power(now.velocity, now.force)
+    local = ca.vertcat(theta, y, z)
+    advance = _advance(body, theta, angles, rates, z)
+    out = ca.vertcat(z - solved, advance, power)
+
+    R_z, R_y = ca.jacobian(balance, solved), ca.jacobian(balance, y)
+    P_z, P_y = ca.jacobian(power, solved), ca.jacobian(power, y)
+    slope = -ca.solve(R_z, R_y)
+    n_y = y.shape[0]
+    zeros = ca.SX(3, 1)
+    jacobian = ca.vertcat(
+        ca.horzcat(zeros, -slope, ca.SX.eye(3)),
+        ca.jacobian(advance, local),
+        ca.horzcat(ca.SX(1, 1), P_y + P_z @ slope, ca.SX(1, 3)),
+    )
+    weight = ca.SX.sym("weight", 5)
+    nu = ca.SX.sym("nu", 3)
+    both = ca.vertcat(y, solved)
+    inner = ca.hessian(weight[4] * power + ca.dot(nu, balance), both)[0]
+    nu_value = ca.solve(R_z.T, weight[0:3] - weight[4] * P_z.T)
+    inner = ca.substitute(inner, nu, nu_value)
+    frame = ca.vertcat(ca.SX.eye(n_y), slope)
+    hessian = ca.hessian(weight[3] * advance, local)[0]
+    hessian[1 : 1 + n_y, 1 : 1 + n_y] += frame.T @ inner @ frame
+    return total_function("point", local, solved, delta, out, jacobian, hessian, weight)
 
 
 def shape_checks(body: Chain) -> list[tuple[str, ca.Function]]:

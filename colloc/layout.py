@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mesh import Mesh, uniform_mesh
-from colloc.problem import Problem
+from colloc.problem import LIFTED, Problem
 from colloc.schemes import scheme
 
 RADIANS = 2 * np.pi
@@ -45,7 +45,7 @@ def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
         "angles": (n_joint, mesh.n_point),
         "rates": (n_joint, mesh.n_point),
         "z": (3, mesh.n_point),
-        "forces": (3 * n_link, mesh.n_point),
+        "forces": (3 * n_link if problem.formulation == LIFTED else 0, mesh.n_point),
     }
     indices, start = {}, 0
     for name, (rows, columns) in sizes.items():

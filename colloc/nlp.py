@@ -98,7 +98,7 @@ class Solver:
         self.oracles: Oracles = oracles(transcription.assembly)
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in {**IPOPT_OPTIONS, **(options or {})}.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
-        settings |= {"error_on_fail": False, "record_time": True, **self.oracles.options}
+        settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True, **self.oracles.options}
         self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
 
     def solve(

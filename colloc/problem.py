@@ -16,6 +16,7 @@ from colloc.friction import Friction
 from colloc.gait import Fourier, Harmonic
 from colloc.schemes import scheme
 
+MAP, LIFTED = "map", "lifted"
 _CHECKED_PHASES = 2000
 _SLACK = 1e-9
 
@@ -65,6 +66,8 @@ class Problem:
         Mesh intervals on the part of the period that is solved.
     scheme : str
         Collocation scheme, see `colloc.schemes.scheme`.
+    formulation : {"map", "lifted"}
+        How the balance becomes constraints, see `colloc.kernels`.
     """
 
     name: str
@@ -78,6 +81,7 @@ class Problem:
     smallest_shape_speed: float = 0.1
     intervals: int = 30
     scheme: str = "gauss-3"
+    formulation: str = MAP
 
     def __post_init__(self) -> None:
         self._check_types()
@@ -105,6 +109,8 @@ class Problem:
             raise ProblemError(f"joint_limit must lie in (0, pi], not {self.joint_limit:g}.")
         if self.smallest_shape_speed <= 0:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
+        if self.formulation not in (MAP, LIFTED):
+            raise ProblemError(f"formulation must be {MAP!r} or {LIFTED!r}, not {self.formulation!r}.")
         collocation = scheme(self.scheme)
         if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")

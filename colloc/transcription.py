@@ -20,10 +20,11 @@ from scipy import sparse
 
 from colloc.blocks import Assembly, Block
 from colloc.gait import Fourier
-from colloc.kernels import gait_check, lifted_point, mean_square, minus_efficiency, shape_checks
+from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function, shape_checks
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
-from colloc.problem import Problem
+from colloc.problem import LIFTED, MAP, Problem
+from colloc.velocity_callback import VelocityMap
 
 _SAMPLES_PER_CELL = 16
 
@@ -66,6 +67,8 @@ class Transcription:
         Names of the constraint rows, in order.
     checks : list of (name, function)
         Shape functions whose largest value in each mesh cell is constrained.
+    velocity : VelocityMap
+        Kept alive here for the functions that call it.
     """
 
     problem: Problem
@@ -78,6 +81,7 @@ class Transcription:
     constraint_upper: np.ndarray
     groups: dict[str, slice]
     checks: list[tuple[str, ca.Function]]
+    velocity: VelocityMap
 
     def gait(self, x: np.ndarray) -> Fourier:
         """The gait of a vector of variables."""
@@ -91,7 +95,7 @@ class Transcription:
         """
         blocks = (self.assembly.objective, *self.assembly.blocks)
         worst = iter(worst_instants(self.problem, self.mesh, self.checks, parameters))
-        return [_check_parameters(self.problem, next(worst)) if b.function.n_parameter else b.parameters for b in blocks]
+        return [_check_parameters(self.problem, next(worst)) if b.parameters.shape[0] else b.parameters for b in blocks]
 
 
 def worst_instants(
@@ -133,8 +137,8 @@ def transcribe(problem: Problem) -> Transcription:
     mesh = problem_mesh(problem)
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body)
-    point = lifted_point(problem.body, problem.friction)
-    n_joint, n_link = problem.body.n_joint, problem.body.n_link
+    point = point_function(problem.formulation, problem.body, problem.friction)
+    n_joint = problem.body.n_joint
     n_parameter = layout.parameters.shape[0]
 
     sites = np.empty(mesh.n_point, dtype=int)
@@ -154,8 +158,7 @@ def transcribe(problem: Problem) -> Transcription:
     groups = [
         _gait_group("angles", layout.angles, problem.gait.angle_matrix(mesh.times, n_joint), layout),
         _gait_group("rates", layout.rates, problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS, layout),
-        _output_group("force law", range(3 * n_link), point.n_out, mesh.n_point, layout.n),
-        _output_group("balance", range(3 * n_link, 3 * n_link + 3), point.n_out, mesh.n_point, layout.n),
+        *_point_groups(problem, point.n_out, mesh.n_point, layout.n),
         *_orientation_groups(problem, mesh, layout),
         _quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n),
         _quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n),
@@ -168,6 +171,11 @@ def transcribe(problem: Problem) -> Transcription:
             {"shape speed": sparse.eye(1, format="csr")},
         ),
     ]
+    velocity = VelocityMap(problem.body, problem.friction, mesh.n_point)
+
+    def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
+        return velocity(local[1 : 1 + n_joint, :], local[1 + n_joint : 1 + 2 * n_joint, :], delta)
+
     objective = Block(
         minus_efficiency(),
         np.array([[layout.distance[0, -1]], [layout.work[0, -1]]]),
@@ -183,7 +191,13 @@ def transcribe(problem: Problem) -> Transcription:
             layout.n,
             objective,
             tuple(
-                Block(function, gather, _stacked(groups, name, function.n_out * gather.shape[1]), parameters)
+                Block(
+                    function,
+                    gather,
+                    _stacked(groups, name, function.n_out * gather.shape[1]),
+                    parameters,
+                    velocity_map if name == "point" and problem.formulation == MAP else None,
+                )
                 for name, (function, gather, parameters) in blocks.items()
             ),
             sparse.vstack([g.linear for g in groups]).tocsr(),
@@ -193,6 +207,7 @@ def transcribe(problem: Problem) -> Transcription:
         np.concatenate([g.upper for g in groups]),
         {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, ends, ends[1:], strict=False)},
         checks,
+        velocity,
     )
 
 
@@ -202,10 +217,13 @@ def _stacked(groups: list[Group], block: str, n_source: int) -> sparse.csr_matri
 
 def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
-    friction, length = problem.friction, problem.body.length_column()
-    tangential = max(friction.mu_f, friction.mu_b) * length
-    limit = np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
-    lower[layout.forces], upper[layout.forces] = -limit, limit
+    # a function bounded by L has Fourier coefficients of at most 4 L / pi
+    lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * problem.joint_limit / np.pi
+    if problem.formulation == LIFTED:
+        friction, length = problem.friction, problem.body.length_column()
+        tangential = max(friction.mu_f, friction.mu_b) * length
+        limit = np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+        lower[layout.forces], upper[layout.forces] = -limit, limit
     for state in (layout.distance, layout.work):
         lower[state[0, 0]] = upper[state[0, 0]] = 0.0
     return lower, upper
@@ -221,6 +239,15 @@ def _gait_group(name: str, variables: np.ndarray, matrix: np.ndarray, layout: La
     parameters = _selector(layout.parameters[:, 0], layout.n)
     rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[-1]))
     return _equalities(name, _selector(variables.ravel(order="F"), layout.n) - rows @ parameters)
+
+
+def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
+    """The equations of every point: lifted force laws, then the balance (or the velocity map in its place)."""
+    n_law = n_out - N_RATE - 3
+    groups = [_output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
+    if problem.formulation == LIFTED:
+        groups.insert(0, _output_group("force law", range(n_law), n_out, n_point, n))
+    return groups
 
 
 def _output_group(name: str, outputs: range, n_out: int, n_point: int, n: int) -> Group:

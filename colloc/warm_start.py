@@ -56,5 +56,6 @@ def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: 
     x[layout.work[0, 1:]] = np.cumsum(RADIANS * (quadrature @ total_power(now.velocity, now.force)[0]))
     x[layout.theta[0]] = theta
     x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, solved.z
-    x[layout.forces] = np.concatenate(now.force)
+    if layout.forces.size:
+        x[layout.forces] = np.concatenate(now.force)
     return x
