@@ -20,6 +20,7 @@ from colloc.motion import Motion
 from colloc.point_friction import density_jacobian, force_density, regularised_speed, secant_density
 
 _MOST_PANELS = 600
+_ROUNDING = 1e-15
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class SmoothSolution:
     z : (3, n_time)
         Velocity of the tail in the axes of the frame in which Theta is measured, and the rotation rate of that frame.
     power : rate of work against friction
-    power_inside : the part of it done on the arc between the ends of `region`
+    power_inside : the part of it done on the arcs `regions`
     slowest : smallest speed of a whole panel: how fast the part at stick creeps
     residual : largest net force or torque over the largest coefficient
     quadrature_error : largest panel's difference from its halves, in force or power
@@ -113,26 +114,31 @@ class _Batch:
         speed = np.hypot(vs, vn).reshape(self.fields.panels.n, -1, z.shape[1]).max(axis=1)
         return np.where(np.diff(self.fields.panels.edges[:, self.members], axis=0) > 0, speed, np.inf)
 
+    def largest_speed(self, z: np.ndarray) -> np.ndarray:
+        """Largest speed of a node, ``(n,)``."""
+        vs, vn = node_velocity(Curve(*self.curve), z)
+        return np.hypot(vs, vn).max(axis=0)
+
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         anchor = np.argmin(self.panel_speed(z), axis=0)
         return anchor, np.take_along_axis(self.edge_velocity(z), anchor[None, None], 1)[:, 0]
 
 
 class _Fields:
-    """Theta and its rate on the panels of some instants."""
+    """Theta and its rate on the panels of some instants; rates in units of `speed` ``(n_time,)``."""
 
-    def __init__(self, motion: Motion, t: np.ndarray, panels: Panels) -> None:
+    def __init__(self, motion: Motion, t: np.ndarray, panels: Panels, speed: np.ndarray | None = None) -> None:
         self.panels = panels
         nodes = panels.nodes
         self.angle, self.rate = motion.angle(nodes, t), motion.rate(nodes, t)
-        self.edge_rate = motion.rate(panels.edges, t)
-
-
-def _halves(edges: np.ndarray) -> np.ndarray:
-    """Every panel cut in two."""
-    fine = np.empty((2 * len(edges) - 1, edges.shape[1]))
-    fine[::2], fine[1::2] = edges, 0.5 * (edges[1:] + edges[:-1])
-    return fine
+        if not (np.isfinite(self.rate).all() and np.isfinite(self.angle).all()):
+            raise ProblemError("the motion's tangent angle and rate must be finite.")
+        if speed is None:
+            speed = np.abs(self.rate).max(axis=0)
+            speed[speed == 0] = 1.0
+        self.speed = speed
+        self.rate = self.rate / speed
+        self.edge_rate = motion.rate(panels.edges, t) / speed
 
 
 def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
@@ -143,18 +149,16 @@ def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     return fine[:keep]
 
 
-def _integrals(batch: _Batch, z: np.ndarray, delta: np.ndarray) -> np.ndarray:
+def _panel_integrals(body: Curve, z: np.ndarray, delta: np.ndarray, friction: Friction, panels: Panels) -> np.ndarray:
     """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``."""
-    body = Curve(*batch.curve)
     vs, vn = node_velocity(body, z)
-    fs, fn = force_density(vs, vn, delta, batch.friction)
+    fs, fn = force_density(vs, vn, delta, friction)
     densities = (
         fs * body.cos - fn * body.sin,
         fs * body.sin + fn * body.cos,
         fs * body.arm_s + fn * body.arm_n,
         -(fs * vs + fn * vn),
     )
-    panels = Panels(batch.fields.panels.edges[:, batch.members], batch.fields.panels.order)
     return np.stack([panels.panel_sums(density) for density in densities])
 
 
@@ -170,7 +174,7 @@ def solve_smooth(
     tolerance: float = 1e-11,
     max_iterations: int = 2000,
     refinements: int = 40,
-    region: tuple[float, float] = (0.0, 0.0),
+    regions: tuple[tuple[float, float], ...] = (),
     method: str = "auto",
 ) -> SmoothSolution:
     """Velocities that put a smooth body in force and torque balance at phases t.
@@ -192,8 +196,8 @@ def solve_smooth(
         As in `colloc.fixed_point.solve_balance`.
     refinements : int
         Most halvings of a panel.
-    region : (float, float)
-        Arc whose power is reported separately; its ends should be breaks of the motion.
+    regions : tuple of (float, float)
+        Arcs whose power is reported separately; their ends should be breaks of the motion.
     method : {"auto", "newton", "fixed_point"}
 
     Raises
@@ -213,12 +217,8 @@ def solve_smooth(
     for level in range(refinements + 1):
         grid = Panels(edges, order)
         fields = _Fields(motion, t[active], grid)
-        speed = np.abs(fields.rate).max(axis=0)
-        if not (np.isfinite(speed).all() and np.isfinite(fields.angle).all()):
-            raise ProblemError("the motion's tangent angle and rate must be finite.")
         # work in units of the largest rate: the law is homogeneous once delta scales along
-        speed[speed == 0] = 1.0
-        fields.rate, fields.edge_rate = fields.rate / speed, fields.edge_rate / speed
+        speed = fields.speed
         d = (delta / speed)[None]
 
         def make(members: np.ndarray, reference: int, fields: _Fields = fields) -> _Batch:
@@ -240,18 +240,21 @@ def solve_smooth(
         split = np.zeros((grid.n, active.size), dtype=bool)
         for members, batch in _groups(state.anchor, make):
             chosen, z = active[members], state.velocity[:, members]
-            whole = _integrals(batch, z, d[:, members])
+            own = Panels(edges[:, members], order)
+            whole = _panel_integrals(Curve(*batch.curve), z, d[:, members], friction, own)
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
-            inside = (middle > region[0]) & (middle < region[1])
+            inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
             out["power"][chosen] = whole[3].sum(axis=0) * speed[members]
             out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * speed[members]
             out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]
             tail = batch.edge_velocity(z)[:, 0]
             tail[2] -= fields.edge_rate[0, members]
             z_tail[:, chosen] = tail * speed[members]
-            error = _error(motion, friction, t[chosen], edges[:, members], batch, z, d[:, members], speed[members], whole)
+            error = _panel_error(motion, friction, t[chosen], batch, z, d[:, members], speed[members])
             out["quadrature_error"][chosen] = error.max(axis=0)
-            split[:, members] = error > quadrature_tolerance
+            # two stretches at rest know each other's velocity to rounding only: no refinement beats that
+            floor = _ROUNDING * batch.largest_speed(z) / (d[0, members] + batch.panel_speed(z).min(axis=0))
+            split[:, members] = error > quadrature_tolerance + floor
         out["residual"][active] = state.residual
         n_panel[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
 
@@ -271,19 +274,26 @@ def _groups(anchor: np.ndarray, make):
         yield members, make(members, int(reference))
 
 
-def _error(
-    motion: Motion,
-    friction: Friction,
-    t: np.ndarray,
-    edges: np.ndarray,
-    batch: _Batch,
-    z: np.ndarray,
-    delta: np.ndarray,
-    speed: np.ndarray,
-    whole: np.ndarray,
+def _panel_error(
+    motion: Motion, friction: Friction, t: np.ndarray, batch: _Batch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
 ) -> np.ndarray:
-    """Largest difference of each panel's integrals from those over its halves at the same velocity, ``(n_panel, n_time)``."""
-    fine = _Fields(motion, t, Panels(_halves(edges), batch.fields.panels.order))
-    fine.rate, fine.edge_rate = fine.rate / speed, fine.edge_rate / speed
-    halves = _integrals(_Batch(fine, friction, np.arange(t.size), 2 * batch.reference), z, delta)
-    return np.abs(halves[:, ::2] + halves[:, 1::2] - whole).max(axis=0) / friction.largest
+    """How far each panel is from its two halves, ``(n_panel, n_time)``.
+
+    Every panel is taken as a body of its own that moves with its left end, so that an error is charged to the panel that
+    makes it. Compared are force, torque and power, and the velocity handed on to the right end in units of the speed of
+    the slowest panel, because that is what decides the friction there.
+    """
+    edges = batch.fields.panels.edges[:, batch.members]
+    left, right = edges[:-1].ravel(), edges[1:].ravel()
+    n_panel = len(edges) - 1
+    many = (np.tile(a, n_panel) for a in (t, speed, delta[0], delta[0] + batch.panel_speed(z).min(axis=0)))
+    t_many, speed_many, delta_many, slow_many = many
+    start = batch.edge_velocity(z)[:, :-1].reshape(3, -1)
+    results = []
+    for cuts in ([left, right], [left, 0.5 * (left + right), right]):
+        fields = _Fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
+        one = _Batch(fields, friction, np.arange(t_many.size), 0)
+        integrals = _panel_integrals(Curve(*one.curve), start, delta_many, friction, fields.panels).sum(axis=1)
+        end = one.edge_velocity(start)[:2, -1] / slow_many
+        results.append(np.concatenate([integrals / friction.largest, end]))
+    return np.abs(results[1] - results[0]).max(axis=0).reshape(n_panel, t.size)
