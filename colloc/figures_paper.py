@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from colloc import figures_bodies, figures_maps
+from colloc import figures_bodies, figures_crawlers, figures_maps
 from colloc.figures_style import styled
 from colloc.study import Study
 
@@ -21,6 +21,7 @@ FIGURES: tuple[tuple[Callable[..., list[Path]], tuple[str, ...]], ...] = (
     (figures_maps.figure_11, ("plane", "optima")),
     (figures_maps.figure_12_maps, ("sweep", "optima")),
     (figures_bodies.figure_12_motion, ("motions",)),
+    (figures_crawlers.figure_13, ("crawlers",)),
 )
 """Each figure, and the parts whose arrays it takes in this order."""
 

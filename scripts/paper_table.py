@@ -31,6 +31,7 @@ _ROWS: dict[str, Callable[[Study], Iterator[Row]]] = {
     "flap": rows_scenes.flap,
     "waves": rows_scenes.waves,
     "wave_parameters": rows_scenes.wave_parameters,
+    "crawlers": rows_scenes.crawlers,
 }
 
 

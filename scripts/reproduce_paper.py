@@ -133,13 +133,13 @@ PARTS = (
         "crawlers",
         paper_crawlers.crawlers,
         settings={
-            "epsilons": [0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002],
-            "fit_below": 0.025,
-            "intervals": 2,
+            "epsilons": [0.2, 0.1, 0.05, 0.02, 0.01, 0.005],
+            "fit_below": 0.03,
+            "intervals": 1,
             "shown": 0.1,
             "snapshots": 12,
         },
-        quick={"epsilons": [0.1, 0.02, 0.01], "intervals": 1},
+        quick={"epsilons": [0.02, 0.01], "snapshots": 2},
     ),
 )
 

@@ -124,3 +124,25 @@ def wave_parameters(study: Study) -> Iterator[Row]:
             f"{value - float(printed):+.3f}",
         )
     yield Row("wave B: mu_t that gives the printed value", "100", f"{float(made['mu_t_for_B']):.0f}", "1 (root search)", "-")
+
+
+def crawlers(study: Study) -> Iterator[Row]:
+    """Rows on the concertina crawlers (figure 13)."""
+    made = study.arrays("crawlers")
+    smallest = int(np.argmin(made["epsilon"]))
+    epsilon = made["epsilon"][smallest]
+    for name in ("isotropic", "forward easiest", "transverse easiest"):
+        for key, printed in (("d", 1), ("W_inner", 2), ("W_outer", 1)):
+            order = float(made[f"{name}/order/{key}"])
+            yield statement_row(
+                f"crawler, {name}: order of {key} in epsilon", str(printed), f"{order:.3f}", abs(order - printed) < 0.1, "fit"
+            )
+        share = made[f"{name}/efficiency"][smallest] / made[f"{name}/bound"]
+        error = made[f"{name}/error_efficiency"][smallest] / made[f"{name}/bound"]
+        yield statement_row(
+            f"crawler, {name}: efficiency at epsilon = {epsilon:g}, of the bound {float(made[f'{name}/bound']):g}",
+            "1 + O(epsilon)",
+            f"{share:.5f}",
+            bool(abs(1 - share) < 20 * epsilon),
+            f"{error:.0e} (time, panels, delta)",
+        )
