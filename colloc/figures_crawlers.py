@@ -12,11 +12,11 @@ from colloc import figures_style as style
 from colloc.study import Arrays
 
 
-def _stages(axes: Any, made: Arrays, name: str, chosen: list[int], title: str, drop: float, turn: complex = 1.0) -> None:
-    """Snapshots one below the other."""
+def _stages(axes: Any, made: Arrays, name: str, chosen: list[int], title: str, drop: complex) -> None:
+    """Snapshots, each shifted by `drop` from the one before."""
     colours = style.snapshot_colours(len(chosen))
     for row, (k, colour) in enumerate(zip(chosen, colours, strict=True)):
-        z = (made[f"{name}/x"][:, k] + 1j * made[f"{name}/y"][:, k]) * turn
+        z = made[f"{name}/x"][:, k] + 1j * made[f"{name}/y"][:, k]
         shift = row * drop
         axes.plot(z.real + shift.real, z.imag + shift.imag, color=colour, lw=1.5)
         axes.text(

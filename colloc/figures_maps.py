@@ -102,7 +102,7 @@ def figure_9(made: Arrays, folder: Path) -> list[Path]:
     nodes, ratios = made["angles"], made["ratios"]
     chosen = np.unique(np.round(np.interp((-1, -0.5, -0.05, 0, 0.05, 0.5), ratios, np.arange(ratios.size))).astype(int))
     colours = [style.SKY, style.ORANGE, style.VERMILION]
-    inside = made["inside"]
+    inside = _admissible_square(nodes)
     for face in range(2):
         for column, k in enumerate(chosen[:6]):
             axes = figure.add_subplot(grid[face, column])

@@ -33,6 +33,8 @@ _ROWS: dict[str, Callable[[Study], Iterator[Row]]] = {
     "wave_parameters": rows_scenes.wave_parameters,
     "crawlers": rows_scenes.crawlers,
 }
+_ALSO = {"optima": ("delta",), "motions": ("optima",)}
+"""Parts whose arrays the rows of another part use too."""
 
 
 def table(study: Study) -> str:
@@ -45,7 +47,7 @@ def table(study: Study) -> str:
     ]
     missing = []
     for part, rows in _ROWS.items():
-        needs = {part, *(("delta",) if part == "optima" else ())}
+        needs = {part, *_ALSO.get(part, ())}
         if not all(study.finished(name) for name in needs):
             missing.append(part)
             continue

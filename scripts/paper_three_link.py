@@ -127,10 +127,10 @@ def _replayed(task: tuple[tuple[float, float, float], float]) -> tuple[float, fl
 
 
 def delta_influence(context: Context) -> Arrays:
-    """How distance, work and efficiency of the optima and of random gaits change with delta."""
+    """How distance, work and efficiency of the maxima, in their order, and of random gaits change with delta."""
     settings = context.settings
     rng = np.random.default_rng(settings["seed"])
-    gaits = [tuple(g) for g in context.needed["optima"]["gaits"][:3]]
+    gaits = [tuple(g) for g in context.needed["optima"]["gaits"]]
     inside = context.needed["sweep"]
     chosen = rng.choice(np.flatnonzero(inside["inside"]), settings["random"], replace=False)
     axes = np.meshgrid(inside["A0"], inside["A1"], inside["B1"], indexing="ij")

@@ -123,6 +123,18 @@ def wave_parameters(study: Study) -> Iterator[Row]:
             "study of what would give the printed value",
             f"{value - float(printed):+.3f}",
         )
+    sharp = np.array(study.settings("wave_parameters")["steepness"], dtype=float)
+    if sharp.size >= 3:
+        # the corners' length falls like 1/steepness, and so does what they waste: 1/efficiency is nearly linear in it
+        cost = 1 / made["efficiency"][: sharp.size]
+        limits = [(cost[k + 1] * sharp[k + 1] - cost[k] * sharp[k]) / (sharp[k + 1] - sharp[k]) for k in (-3, -2)]
+        yield Row(
+            "wave A: corners infinitely sharp",
+            "0.93",
+            f"{1 / limits[1]:.3f}",
+            f"{abs(1 / limits[1] - 1 / limits[0]):.3f} (extrapolated from the sharpest three)",
+            f"{1 / limits[1] - 0.93:+.3f}",
+        )
     yield Row("wave B: mu_t that gives the printed value", "100", f"{float(made['mu_t_for_B']):.0f}", "1 (root search)", "-")
 
 
