@@ -33,7 +33,7 @@ _ROWS: dict[str, Callable[[Study], Iterator[Row]]] = {
     "wave_parameters": rows_scenes.wave_parameters,
     "crawlers": rows_scenes.crawlers,
 }
-_ALSO = {"optima": ("delta",), "motions": ("optima",)}
+_ALSO = {"optima": ("delta", "sweep"), "motions": ("optima",)}
 """Parts whose arrays the rows of another part use too."""
 
 
