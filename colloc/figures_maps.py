@@ -147,7 +147,8 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
     """Distance, work and efficiency for various A0: slices, the other half being the mirror image."""
     wanted = (0.0, 0.55, 1.1, 1.65, 2.2, 2.59)
     slices = [int(np.argmin(np.abs(made["A0"] - a))) for a in wanted]
-    figure, axes = plt.subplots(3, len(slices), figsize=(11, 4.6), sharex=True, sharey=True, layout="compressed")
+    figure, axes = plt.subplots(3, len(slices), figsize=(11, 4.8), sharex=True, sharey=True, layout="none")
+    figure.subplots_adjust(left=0.05, right=0.92, bottom=0.1, top=0.93, hspace=0.25, wspace=0.1)
     for row, ((key, name), text) in enumerate(zip(_MEASURES, "ABC", strict=True)):
         field = made[f"{key}_direct"]
         top = float(np.nanmax(field[slices]))
@@ -163,5 +164,5 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
                 a.plot(*found["gaits"][near, 1:].T, "*", color=style.VERMILION, ms=8, clip_on=False)
         axes[row, 0].set_ylabel(r"$B_1$")
         style.letter(axes[row, 0], text)
-        figure.colorbar(drawn, ax=axes[row], label=name, shrink=0.9, ticks=MaxNLocator(4))
+        figure.colorbar(drawn, ax=axes[row], label=name, fraction=0.02, pad=0.01, ticks=MaxNLocator(4))
     return style.save(figure, folder, "figure-12-maps-with-offset")
