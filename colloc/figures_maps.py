@@ -147,8 +147,9 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
     """Distance, work and efficiency for various A0: slices, the other half being the mirror image."""
     wanted = (0.0, 0.55, 1.1, 1.65, 2.2, 2.59)
     slices = [int(np.argmin(np.abs(made["A0"] - a))) for a in wanted]
-    figure, axes = plt.subplots(3, len(slices), figsize=(11, 4.8), sharex=True, sharey=True, layout="none")
-    figure.subplots_adjust(left=0.05, right=0.92, bottom=0.1, top=0.93, hspace=0.25, wspace=0.1)
+    margins = {"left": 0.05, "right": 0.92, "bottom": 0.1, "top": 0.93, "hspace": 0.25, "wspace": 0.1}
+    figure, axes = plt.subplots(3, len(slices), figsize=(11, 4.8), sharex=True, sharey=True, gridspec_kw=margins)
+    figure.set_layout_engine("none")  # many axes of equal scale collapse under it
     for row, ((key, name), text) in enumerate(zip(_MEASURES, "ABC", strict=True)):
         field = made[f"{key}_direct"]
         top = float(np.nanmax(field[slices]))
