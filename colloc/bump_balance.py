@@ -13,10 +13,12 @@ from colloc.arrays import Array, namespace
 from colloc.balance import balance_jacobian, net_force, secant_matrix, total_power
 from colloc.body import LinkVelocity, Posture
 from colloc.bump_body import BumpBody
-from colloc.curve import Curve, pulled_back
+from colloc.curve import Curve, node_velocity, pulled_back
 from colloc.damped_newton import State, solve, solve3, starting_state
 from colloc.friction import Friction, LinkForce, link_dissipation, link_force
 from colloc.point_friction import density_jacobian, regularised_speed, secant_density
+
+_ROUNDING = 2e-15
 
 
 class BumpInstant(NamedTuple):
@@ -62,22 +64,31 @@ class _Batch:
     """Instants of a bump body; the only reference is the bump's rear end."""
 
     def __init__(self, body: BumpBody, friction: Friction, q: np.ndarray, rates: np.ndarray) -> None:
-        self.body, self.friction, self.q, self.rates = body, friction, q, rates
+        self.body, self.friction = body, friction
+        held = bump_instant(body, friction, q, rates, np.zeros((3, q.shape[1])), np.ones((1, 1)))
+        weight = np.broadcast_to(held.bump.weight, held.vs.shape)
+        self.bump = np.stack([*held.bump[:-1], weight])
+        self.links = np.stack([*held.posture, *held.velocity, body.link_lengths(q)])
 
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        now = bump_instant(self.body, self.friction, self.q[:, select], self.rates[:, select], z, delta)
-        force, _ = balance_and_power(self.body, self.friction, now, delta)
-        length = self.body.link_lengths(self.q[:, select])
+        links, bump = self.links[:, :, select].copy(), Curve(*self.bump[:, :, select])
+        posture, length = Posture(*links[:4]), links[7]
+        # the straight parts lie along the axis: a rigid motion adds to what they do while the rear end is held
+        links[4] += z[0] - posture.y * z[2]
+        links[5] += z[1] + posture.x * z[2]
+        links[6] += z[2]
+        velocity = LinkVelocity(*links[4:7])
+        vs, vn = node_velocity(bump, np.stack([z[0], z[1], self.body.width * z[2]]))
+        load, _ = self.body.bump_load(bump, vs, vn, delta, self.friction)
+        force = net_force(posture, link_force(*velocity, length, delta, self.friction)) + load
         if self.friction.isotropic:
-            inner = np.sum(now.bump.weight * regularised_speed(now.vs, now.vn, delta), axis=0)
-            merit = link_dissipation(*now.velocity, length, delta).sum(axis=0) + self.body.width * inner
+            inner = np.sum(bump.weight * regularised_speed(vs, vn, delta), axis=0)
+            merit = link_dissipation(*velocity, length, delta).sum(axis=0) + self.body.width * inner
             merit = self.friction.mu_t * merit
         else:
             merit = 0.5 * np.sum(force * force, axis=0)
-        links = np.stack([*now.posture, *now.velocity, length]).reshape(-1, z.shape[1])
-        weight = np.broadcast_to(now.bump.weight, now.vs.shape)
-        nodes = np.stack([*now.bump[:-1], weight, now.vs, now.vn]).reshape(-1, z.shape[1])
-        return np.concatenate([links, nodes])[None], force, merit
+        nodes = np.stack([*bump, vs, vn]).reshape(-1, z.shape[1])
+        return np.concatenate([links.reshape(-1, z.shape[1]), nodes])[None], force, merit
 
     def step(self, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
         links, nodes = state[0, :16].reshape(8, 2, -1), state[0, 16:].reshape(9, -1, state.shape[2])
@@ -111,7 +122,7 @@ def solve_bump(
     rates: np.ndarray,
     delta: float,
     start: np.ndarray | None = None,
-    tolerance: float = 1e-11,
+    tolerance: float = 1e-10,
 ) -> State:
     """Velocities ``(3, n_time)`` of the bump's rear end that balance the body, with residuals.
 
@@ -124,9 +135,11 @@ def solve_bump(
         Regularisation speed in body lengths per unit of time of the rates.
     start : (3, n_time), optional
     tolerance : float
-        Largest net force or torque over the largest coefficient.
+        Largest net force or torque over the largest coefficient; not asked for below what rounding of the velocities
+        allows at this delta.
     """
     n = q.shape[1]
+    tolerance = max(tolerance, _ROUNDING * float(np.abs(rates).max()) * body.width / delta)
     state = starting_state(np.zeros(n, dtype=int), np.zeros((3, n)) if start is None else start.copy())
 
     def make(members: np.ndarray, reference: int) -> _Batch:

@@ -11,6 +11,7 @@ Velocities, distance and work are in units of the bump's width here; rotation ra
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -91,12 +92,12 @@ class BumpBody:
     def _fields(self, q: Array, rates: Array) -> tuple[Array, Array]:
         """Tangent angle and its rate at fixed arc length, at the grid's nodes."""
         xp = namespace(q, rates)
-        value, slope = self.modes_at(2 * self.grid.nodes[:, 0] - 1)
+        value, slope = _node_modes(self)
         return xp.matmul(value, q[1:, :]), xp.matmul(value, rates[1:, :]) - 2 * rates[0:1, :] * xp.matmul(slope, q[1:, :])
 
     def angles(self, b: Array) -> Array:
         """Tangent angle at the grid's nodes."""
-        return self.modes_at(2 * self.grid.nodes[:, 0] - 1)[0] @ b
+        return _node_modes(self)[0] @ b
 
     def link_lengths(self, q: Array) -> Array:
         """Lengths of the rear and front straight part, ``(2, n)``."""
@@ -167,3 +168,8 @@ class BumpBody:
             return np.concatenate([low, ends, high])
 
         return Motion(angle, rate, breaks, stages=tuple(times.tolist()), antipodal=True)
+
+
+@cache
+def _node_modes(body: BumpBody) -> tuple[np.ndarray, np.ndarray]:
+    return body.modes_at(2 * body.grid.nodes[:, 0] - 1)

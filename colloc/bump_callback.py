@@ -9,8 +9,7 @@ from colloc.bump_balance import solve_bump
 from colloc.bump_body import BumpBody
 from colloc.friction import Friction
 
-_TOLERANCE = 1e-12
-_USABLE = 1e-8
+_USABLE = 1e-7
 
 
 class BumpVelocity(ca.Callback):
@@ -46,7 +45,7 @@ class BumpVelocity(ca.Callback):
             return [ca.DM(self._z)]
         if not (np.isfinite(q).all() and np.isfinite(rates).all()):
             return [ca.DM(np.full((3, self._n_time), np.nan))]
-        solved = solve_bump(self._body, self._friction, q, rates, delta, self._z, _TOLERANCE)
+        solved = solve_bump(self._body, self._friction, q, rates, delta, self._z)
         if (solved.residual > _USABLE).any():
             return [ca.DM(np.where(solved.residual < _USABLE, solved.velocity, np.nan))]
         self._key, self._z = key, solved.velocity

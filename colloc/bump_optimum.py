@@ -30,7 +30,7 @@ def prescribed_vertices(body: BumpBody, amplitude: float, n: int) -> np.ndarray:
 
 
 def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta: float) -> np.ndarray:
-    """Variables that satisfy the transcription's equations for given coordinates ``(body.n, n + 1)`` at `delta` (per period)."""
+    """Variables that satisfy the equations for given coordinates ``(body.n, n + 1)`` at `delta` (per period)."""
     body, friction, mesh, layout = (getattr(transcription, k) for k in ("body", "friction", "mesh", "layout"))
     x = np.zeros(layout.n)
     x[layout.q] = vertices
