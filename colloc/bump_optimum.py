@@ -1,16 +1,16 @@
-"""Optimised bump crawlers: feasible starts, continuation in delta and epsilon, independent replay."""
+"""Optimised bump crawlers: feasible starts, rounds within a trust region, independent replay."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 
 from colloc.bump_balance import balance_and_power, bump_instant, solve_bump
 from colloc.bump_body import BumpBody
-from colloc.bump_transcription import POSITION_SCALE, BumpTranscription
-from colloc.errors import NotConvergedError
+from colloc.bump_transcription import POSITION_SCALE, BumpTranscription, piece_lengths, transcribe_bump
+from colloc.friction import Friction
 from colloc.layout import RADIANS
 from colloc.nlp import NlpResult, Solver
 from colloc.smooth_period import Period, measured_period
@@ -34,8 +34,7 @@ def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta:
     body, friction, mesh, layout = (getattr(transcription, k) for k in ("body", "friction", "mesh", "layout"))
     x = np.zeros(layout.n)
     x[layout.q] = vertices
-    steps = np.diff(vertices) * np.append(POSITION_SCALE, np.ones(body.modes))[:, None]
-    x[layout.piece] = np.mean(np.linalg.norm(steps, axis=0))
+    x[layout.piece] = np.mean(piece_lengths(vertices))
     interval, tau = np.repeat(np.arange(mesh.n), mesh.scheme.s), np.tile(mesh.scheme.c, mesh.n)
     q = (1 - tau) * vertices[:, interval] + tau * vertices[:, interval + 1]
     rates = (vertices[:, interval + 1] - vertices[:, interval]) / mesh.h[interval]
@@ -56,52 +55,98 @@ def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta:
 
 @dataclass(frozen=True, eq=False)
 class BumpOptimum:
-    """An optimised crawler: its polygon of amplitudes, IPOPT's result, and the independent replay."""
+    """An optimised crawler.
+
+    Attributes
+    ----------
+    vertices : (body.n, n + 1)
+        Position and amplitudes at the nodes of half a period.
+    losses : list of float
+        Loss per region length at the start and after every accepted round, balance solved exactly.
+    rounds : list of NlpResult
+        What IPOPT returned in each round.
+    """
 
     body: BumpBody
-    vertices: np.ndarray
+    friction: Friction
     delta: float
-    x: np.ndarray
-    result: NlpResult
-    replay: Period | None
+    vertices: np.ndarray
+    losses: list[float]
+    rounds: list[NlpResult]
+
+    @property
+    def efficiency(self) -> float:
+        """Efficiency on the optimisation's own mesh; `replay` is the one to quote."""
+        return 1.0 / (self.friction.smallest * (1.0 + 2 * self.body.epsilon * self.losses[-1]))
+
+    def replay(self, **settings: Any) -> Period:
+        """Distance, work and efficiency by the general smooth-body solver on finer panels and time nodes."""
+        region = (0.5 - self.body.epsilon, 0.5 + self.body.epsilon)
+        options: dict[str, Any] = {"intervals": 2, "nodes": 4, "panels": 8, "regions": (region,)} | settings
+        return measured_period(self.body.motion(self.vertices), self.friction, self.delta, **options)
 
 
 def optimise_bump(
-    transcription: BumpTranscription,
+    body: BumpBody,
+    friction: Friction,
     vertices: np.ndarray,
-    deltas: tuple[float, ...],
+    delta: float,
     *,
-    replay: bool = True,
-    options: dict[str, object] | None = None,
-    verbose: bool = False,
+    largest_angle: float = 1.5,
+    rounds: int = 10,
+    radius: float = 0.1,
+    iterations: int = 25,
 ) -> BumpOptimum:
-    """Maximise efficiency from given amplitudes, through falling deltas (per period), and replay the result.
+    """Minimise the loss from given coordinates at the nodes, in rounds within a trust region.
 
-    Raises
-    ------
-    NotConvergedError
-        If no delta could be solved to optimality.
+    Each round lets IPOPT move every coordinate by at most the radius, from a point that satisfies all equations. What
+    comes back is judged by its own loss with the balance solved exactly; a worse one is dropped and the radius reduced.
+    So the result is never worse than the start. The trust region is needed because a resting part that begins to slip
+    costs a large part of the distance at once: the optimum lies close to that cliff.
+
+    Parameters
+    ----------
+    body : BumpBody
+    friction : Friction
+    vertices : (body.n, n + 1)
+    delta : float
+        Regularisation speed, per period.
+    largest_angle : float
+        Bound on |Theta| [rad].
+    rounds, iterations : int
+        Number of rounds, and IPOPT's iterations in each.
+    radius : float
+        First radius [rad, and bump widths].
     """
-    solver = Solver(cast(Any, transcription), options)
-    x = feasible_bump(transcription, vertices, deltas[0])
-    multipliers, best = None, None
-    for delta in deltas:
-        result = solver.solve(x, delta, multipliers)
-        if verbose:
-            print(delta, result.status, result.iterations, f"{result.seconds:.1f}s", result.objective, result.kkt_error,
-                  result.violation, flush=True)  # fmt: skip
-        if result.violation > 1e-6:
-            break
-        x, multipliers, best = result.x, (result.lam_x, result.lam_g), (delta, result)
-    if best is None:
-        raise NotConvergedError(f"no delta from {deltas[0]:g} was solved (violation {result.violation:.1e}); start larger.")
-    delta, result = best
-    found = transcription.vertices(x)
-    body = transcription.body
-    played = None
-    if replay:
-        region = (0.5 - body.epsilon, 0.5 + body.epsilon)
-        played = measured_period(
-            body.motion(found), transcription.friction, delta, intervals=2, nodes=4, regions=(region,), panels=8
-        )
-    return BumpOptimum(body, found, delta, x, result, played)
+    transcription = transcribe_bump(body, friction, vertices, largest_angle=largest_angle)
+    layout = transcription.layout
+    # the interface of a transcription that the solver uses is the same
+    solver = Solver(cast(Any, transcription), {"max_iter": iterations, "theta_max_fact": 1e-3})
+
+    def start(at: np.ndarray) -> tuple[np.ndarray, float]:
+        x = feasible_bump(transcription, at, delta)
+        return x, (x[layout.work[0, -1]] / (friction.smallest * x[layout.distance[0, -1]]) - 1) / (2 * body.epsilon)
+
+    x, loss = start(vertices)
+    losses, results = [loss], []
+    for _ in range(rounds):
+        lower, upper = transcription.lower.copy(), transcription.upper.copy()
+        lower[layout.q] = np.maximum(lower[layout.q], x[layout.q] - radius)
+        upper[layout.q] = np.minimum(upper[layout.q], x[layout.q] + radius)
+        solver.transcription = cast(Any, replace(transcription, lower=lower, upper=upper))
+        result = solver.solve(x, delta)
+        results.append(result)
+        trial = np.clip(result.x[layout.q], lower[layout.q], upper[layout.q])
+        new_x, new_loss = start(trial)
+        slack = np.abs(body.angles(trial[1:])).max() - largest_angle
+        if np.isfinite(new_loss) and new_x[layout.distance[0, -1]] > 0 and new_loss < losses[-1] and slack < 1e-6:
+            small = losses[-1] - new_loss < 1e-4 * abs(new_loss)
+            x, radius = new_x, 1.5 * radius
+            losses.append(new_loss)
+            if small:
+                break
+        else:
+            radius *= 0.3
+            if radius < 1e-4:
+                break
+    return BumpOptimum(body, friction, delta, x[layout.q], losses, results)

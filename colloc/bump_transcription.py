@@ -1,7 +1,7 @@
 """Direct collocation of bump crawlers: position and modal amplitudes at the nodes are decision variables.
 
-Decision variables: coordinates q of the bump at every edge of the mesh (a straight piece between neighbours, all pieces of
-one length, itself a variable: that fixes the pace); the body's orientation theta at every site; distance x and work W at
+Decision variables: coordinates q of the bump at every edge of the mesh (a straight piece between neighbours, the pieces'
+lengths in a fixed proportion: that fixes the pace); the body's orientation theta at every site; distance x and work W at
 every edge. The velocity at every Gauss point is the one that balances the body, from the NumPy solver, with first and
 second derivatives by the implicit function theorem (as the formulation "map" of `colloc.kernels`): where straight parts
 stick, the balance as a constraint is a step, the velocity it implies is not. Only the first half period is solved, its
@@ -26,7 +26,7 @@ from colloc.friction import Friction
 from colloc.mesh import Mesh, uniform_mesh
 from colloc.schemes import scheme
 
-POSITION_SCALE = 1.5
+POSITION_SCALE = 1.3
 """What a bump's shift by its own width counts, against radians of amplitude, in the length of a piece."""
 
 
@@ -85,11 +85,18 @@ def bump_point(body: BumpBody, friction: Friction, h: float) -> LocalFunction:
 
 
 def _piece_length(n: int) -> LocalFunction:
-    """Squared length of a piece of the polygon less the common one."""
-    ends, piece = ca.SX.sym("q", 2 * n), ca.SX.sym("piece")
-    step = POSITION_SCALE * (ends[n] - ends[0]), ends[n + 1 :] - ends[1:n]
-    step = ca.vertcat(*step)
-    return local_function("piece", ca.vertcat(ends, piece), ca.SX(0, 1), ca.SX.sym("delta"), ca.dot(step, step) - piece**2)
+    """Squared length of a piece of the polygon less its share (an instance parameter) of the common one."""
+    ends, piece, ratio = ca.SX.sym("q", 2 * n), ca.SX.sym("piece"), ca.SX.sym("ratio")
+    step = ca.vertcat(POSITION_SCALE * (ends[n] - ends[0]), ends[n + 1 :] - ends[1:n])
+    return local_function(
+        "piece", ca.vertcat(ends, piece), ratio, ca.SX.sym("delta"), ca.dot(step, step) - (ratio * piece) ** 2
+    )
+
+
+def piece_lengths(vertices: np.ndarray) -> np.ndarray:
+    """Lengths of the pieces of a polygon in q, ``(n,)``."""
+    steps = np.diff(vertices)
+    return np.sqrt((POSITION_SCALE * steps[0]) ** 2 + np.sum(steps[1:] ** 2, axis=0))
 
 
 def _loss(body: BumpBody, friction: Friction) -> LocalFunction:
@@ -126,19 +133,20 @@ class BumpTranscription:
 def transcribe_bump(
     body: BumpBody,
     friction: Friction,
-    intervals: int = 24,
+    guess: np.ndarray,
     *,
     nodes: int = 2,
     largest_angle: float = 1.5,
     smallest_piece: float = 0.02,
 ) -> BumpTranscription:
-    """The nonlinear program of a crawler that starts straight, with `intervals` pieces in half a period.
+    """The nonlinear program of a crawler that starts straight.
 
     Parameters
     ----------
     body : BumpBody
     friction : Friction
-    intervals : int
+    guess : (body.n, n + 1)
+        Coordinates at the nodes; it fixes how many pieces half a period has, and their lengths relative to each other.
     nodes : int
         Gauss points on each piece.
     largest_angle : float
@@ -146,7 +154,8 @@ def transcribe_bump(
     smallest_piece : float
         Lower bound on the length of a piece, which keeps speeds away from delta.
     """
-    mesh = uniform_mesh(scheme(f"gauss-{nodes}"), intervals, np.pi)
+    mesh = uniform_mesh(scheme(f"gauss-{nodes}"), guess.shape[1] - 1, np.pi)
+    ratios = piece_lengths(guess) / np.mean(piece_lengths(guess))
     layout = _layout(body, mesh)
     n = layout.n
     point = bump_point(body, friction, float(mesh.h[0]))
@@ -196,7 +205,7 @@ def transcribe_bump(
 
     blocks = (
         Block(point, gather, scatter("point", n_source), tau, balanced),
-        Block(_piece_length(body.n), piece_gather, scatter("piece", mesh.n), np.empty((0, mesh.n))),
+        Block(_piece_length(body.n), piece_gather, scatter("piece", mesh.n), ratios[None]),
     )
     objective = Block(
         _loss(body, friction),
