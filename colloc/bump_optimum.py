@@ -53,6 +53,23 @@ def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta:
     return x
 
 
+def _loss(transcription: BumpTranscription, x: np.ndarray) -> float:
+    """Relative loss per region length, ``(W / (smallest coefficient d) - 1) / (2 epsilon)``."""
+    d, W = x[transcription.layout.distance[0, -1]], x[transcription.layout.work[0, -1]]
+    return float((W / (transcription.friction.smallest * d) - 1) / (2 * transcription.body.epsilon))
+
+
+def best_start(body: BumpBody, friction: Friction, candidates: list[np.ndarray], delta: float) -> np.ndarray:
+    """The candidate coordinates at the nodes, each ``(body.n, n + 1)``, with the smallest loss that moves forwards."""
+
+    def loss(vertices: np.ndarray) -> float:
+        transcription = transcribe_bump(body, friction, vertices)
+        x = feasible_bump(transcription, vertices, delta)
+        return _loss(transcription, x) if x[transcription.layout.distance[0, -1]] > 0 else np.inf
+
+    return min(candidates, key=loss)
+
+
 @dataclass(frozen=True, eq=False)
 class BumpOptimum:
     """An optimised crawler.
@@ -79,11 +96,14 @@ class BumpOptimum:
         """Efficiency on the optimisation's own mesh; `replay` is the one to quote."""
         return 1.0 / (self.friction.smallest * (1.0 + 2 * self.body.epsilon * self.losses[-1]))
 
-    def replay(self, **settings: Any) -> Period:
-        """Distance, work and efficiency by the general smooth-body solver on finer panels and time nodes."""
+    def replay(self, delta: float | None = None, **settings: Any) -> Period:
+        """Distance, work and efficiency by the general smooth-body solver on finer panels and time nodes.
+
+        The regularisation is that of the optimisation unless a smaller one is given.
+        """
         region = (0.5 - self.body.epsilon, 0.5 + self.body.epsilon)
         options: dict[str, Any] = {"intervals": 2, "nodes": 4, "panels": 8, "regions": (region,)} | settings
-        return measured_period(self.body.motion(self.vertices), self.friction, self.delta, **options)
+        return measured_period(self.body.motion(self.vertices), self.friction, delta or self.delta, **options)
 
 
 def optimise_bump(
@@ -125,7 +145,7 @@ def optimise_bump(
 
     def start(at: np.ndarray) -> tuple[np.ndarray, float]:
         x = feasible_bump(transcription, at, delta)
-        return x, (x[layout.work[0, -1]] / (friction.smallest * x[layout.distance[0, -1]]) - 1) / (2 * body.epsilon)
+        return x, _loss(transcription, x)
 
     x, loss = start(vertices)
     losses, results = [loss], []
