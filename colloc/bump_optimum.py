@@ -9,9 +9,10 @@ import numpy as np
 
 from colloc.bump_balance import balance_and_power, bump_instant, solve_bump
 from colloc.bump_body import BumpBody
-from colloc.bump_transcription import POSITION_SCALE, BumpTranscription, piece_lengths, transcribe_bump
+from colloc.bump_transcription import POSITION_SCALE, BumpTranscription, bump_mesh, piece_lengths, transcribe_bump
 from colloc.friction import Friction
 from colloc.layout import RADIANS
+from colloc.mesh import Mesh
 from colloc.nlp import NlpResult, Solver
 from colloc.smooth_period import Period, measured_period
 
@@ -29,12 +30,10 @@ def prescribed_vertices(body: BumpBody, amplitude: float, n: int) -> np.ndarray:
     return np.stack([np.interp(place, along, row) for row in corners])
 
 
-def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta: float) -> np.ndarray:
-    """Variables that satisfy the equations for given coordinates ``(body.n, n + 1)`` at `delta` (per period)."""
-    body, friction, mesh, layout = (getattr(transcription, k) for k in ("body", "friction", "mesh", "layout"))
-    x = np.zeros(layout.n)
-    x[layout.q] = vertices
-    x[layout.piece] = np.mean(piece_lengths(vertices))
+def _half_period(
+    body: BumpBody, friction: Friction, mesh: Mesh, vertices: np.ndarray, delta: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Orientation at the sites, distance and work at the edges (in bump widths) of given coordinates at the nodes."""
     interval, tau = np.repeat(np.arange(mesh.n), mesh.scheme.s), np.tile(mesh.scheme.c, mesh.n)
     q = (1 - tau) * vertices[:, interval] + tau * vertices[:, interval + 1]
     rates = (vertices[:, interval + 1] - vertices[:, interval]) / mesh.h[interval]
@@ -45,27 +44,35 @@ def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta:
     theta = np.zeros(mesh.n_site)
     theta[1:] = np.linalg.solve(state[:, 1:].toarray(), body.width * (rate @ z[2]))
     theta -= 0.5 * theta[-1]
-    x[layout.theta[0]] = theta
     _, quadrature = mesh.quadrature()
     there = theta[mesh.sites.ravel()]
-    x[layout.distance[0, 1:]] = np.cumsum(quadrature @ (np.cos(there) * z[0] - np.sin(there) * z[1]))
-    x[layout.work[0, 1:]] = np.cumsum(quadrature @ power[0])
+    advance = np.cumsum(quadrature @ (np.cos(there) * z[0] - np.sin(there) * z[1]))
+    return theta, np.append(0.0, advance), np.append(0.0, np.cumsum(quadrature @ power[0]))
+
+
+def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta: float) -> np.ndarray:
+    """Variables that satisfy the equations for given coordinates ``(body.n, n + 1)`` at `delta` (per period)."""
+    layout = transcription.layout
+    x = np.zeros(layout.n)
+    x[layout.q] = vertices
+    x[layout.piece] = np.mean(piece_lengths(vertices))
+    x[layout.theta[0]], x[layout.distance[0]], x[layout.work[0]] = _half_period(
+        transcription.body, transcription.friction, transcription.mesh, vertices, delta
+    )
     return x
 
 
-def _loss(transcription: BumpTranscription, x: np.ndarray) -> float:
-    """Relative loss per region length, ``(W / (smallest coefficient d) - 1) / (2 epsilon)``."""
-    d, W = x[transcription.layout.distance[0, -1]], x[transcription.layout.work[0, -1]]
-    return float((W / (transcription.friction.smallest * d) - 1) / (2 * transcription.body.epsilon))
+def _loss(body: BumpBody, friction: Friction, d: float, W: float) -> float:
+    """Relative loss per region length, ``(W / (smallest coefficient d) - 1) / (2 epsilon)``; infinite if d <= 0."""
+    return float((W / (friction.smallest * d) - 1) / (2 * body.epsilon)) if d > 0 else np.inf
 
 
 def best_start(body: BumpBody, friction: Friction, candidates: list[np.ndarray], delta: float) -> np.ndarray:
-    """The candidate coordinates at the nodes, each ``(body.n, n + 1)``, with the smallest loss that moves forwards."""
+    """The candidate coordinates at the nodes, each ``(body.n, n + 1)``, with the smallest loss."""
 
     def loss(vertices: np.ndarray) -> float:
-        transcription = transcribe_bump(body, friction, vertices)
-        x = feasible_bump(transcription, vertices, delta)
-        return _loss(transcription, x) if x[transcription.layout.distance[0, -1]] > 0 else np.inf
+        _, d, W = _half_period(body, friction, bump_mesh(vertices.shape[1] - 1), vertices, delta)
+        return _loss(body, friction, d[-1], W[-1])
 
     return min(candidates, key=loss)
 
@@ -145,7 +152,7 @@ def optimise_bump(
 
     def start(at: np.ndarray) -> tuple[np.ndarray, float]:
         x = feasible_bump(transcription, at, delta)
-        return x, _loss(transcription, x)
+        return x, _loss(body, friction, x[layout.distance[0, -1]], x[layout.work[0, -1]])
 
     x, loss = start(vertices)
     losses, results = [loss], []

@@ -93,6 +93,11 @@ def _piece_length(n: int) -> LocalFunction:
     )
 
 
+def bump_mesh(n: int, nodes: int = 2) -> Mesh:
+    """`n` intervals with `nodes` Gauss points each on half a period, in radians of phase."""
+    return uniform_mesh(scheme(f"gauss-{nodes}"), n, np.pi)
+
+
 def piece_lengths(vertices: np.ndarray) -> np.ndarray:
     """Lengths of the pieces of a polygon in q, ``(n,)``."""
     steps = np.diff(vertices)
@@ -154,7 +159,7 @@ def transcribe_bump(
     smallest_piece : float
         Lower bound on the length of a piece, which keeps speeds away from delta.
     """
-    mesh = uniform_mesh(scheme(f"gauss-{nodes}"), guess.shape[1] - 1, np.pi)
+    mesh = bump_mesh(guess.shape[1] - 1, nodes)
     ratios = piece_lengths(guess) / np.mean(piece_lengths(guess))
     layout = _layout(body, mesh)
     n = layout.n

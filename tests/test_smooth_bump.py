@@ -29,20 +29,21 @@ def test_modes_and_slopes():
 @pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1.0, 1.3)])
 def test_balance_and_power_agree_with_the_general_solver(friction):
     """The same motion by links plus one bump, and by adaptive panels along the whole body."""
-    vertices = np.zeros((BODY.n, 2))
+    body, delta = BumpBody(0.05, modes=4, panels=8), 1e-2
+    vertices = np.zeros((body.n, 2))
     vertices[:, 0], vertices[:, 1] = (0.1, 0.2, 0.7, -0.1, 0.05), (0.2, 0.1, 1.0, 0.1, -0.05)
     t = np.array([0.1, 0.3])
-    general = solve_smooth(BODY.motion(vertices), friction, t, DELTA).require()
+    general = solve_smooth(body.motion(vertices), friction, t, delta).require()
     q = vertices[:, :1] + 2 * t * (vertices[:, 1:] - vertices[:, :1])
     rates = 2 * (vertices[:, 1:] - vertices[:, :1]) * np.ones((1, 2))
-    state = solve_bump(BODY, friction, q, rates, DELTA)
+    state = solve_bump(body, friction, q, rates, delta)
     assert state.residual.max() < 1e-9
-    u, v, omega = state.velocity * BODY.width
-    rear = BODY.link_lengths(q)[0]
+    u, v, omega = state.velocity * body.width
+    rear = body.link_lengths(q)[0]
     np.testing.assert_allclose(np.stack([u, v - rear * omega, omega]), general.z, atol=1e-8)
-    slow = DELTA / BODY.width
-    _, power = balance_and_power(BODY, friction, bump_instant(BODY, friction, q, rates, state.velocity, slow), slow)
-    np.testing.assert_allclose(power[0] * BODY.width, general.power, atol=1e-8)
+    slow = delta / body.width
+    _, power = balance_and_power(body, friction, bump_instant(body, friction, q, rates, state.velocity, slow), slow)
+    np.testing.assert_allclose(power[0] * body.width, general.power, atol=1e-8)
 
 
 def test_the_prescribed_crawler_is_a_member_of_the_class():
