@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -157,13 +157,9 @@ def optimise_bump(
     x, loss = start(vertices)
     losses, results = [loss], []
     for _ in range(rounds):
-        lower, upper = transcription.lower.copy(), transcription.upper.copy()
-        lower[layout.q] = np.maximum(lower[layout.q], x[layout.q] - radius)
-        upper[layout.q] = np.minimum(upper[layout.q], x[layout.q] + radius)
-        solver.transcription = cast(Any, replace(transcription, lower=lower, upper=upper))
-        result = solver.solve(x, delta)
+        result = solver.solve(x, delta, radius=radius)
         results.append(result)
-        trial = np.clip(result.x[layout.q], lower[layout.q], upper[layout.q])
+        trial = np.clip(result.x[layout.q], transcription.lower[layout.q], transcription.upper[layout.q])
         new_x, new_loss = start(trial)
         slack = np.abs(body.angles(trial[1:])).max() - largest_angle
         if np.isfinite(new_loss) and new_x[layout.distance[0, -1]] > 0 and new_loss < losses[-1] and slack < 1e-6:

@@ -13,6 +13,7 @@ Minimised is ``(W / (smallest coefficient x) - 1) / (2 epsilon)``, the relative 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -24,6 +25,7 @@ from colloc.bump_body import BumpBody
 from colloc.bump_callback import BumpVelocity
 from colloc.friction import Friction
 from colloc.mesh import Mesh, uniform_mesh
+from colloc.problem import MAP
 from colloc.schemes import scheme
 
 POSITION_SCALE = 1.3
@@ -32,7 +34,7 @@ POSITION_SCALE = 1.3
 
 @dataclass(frozen=True, eq=False)
 class BumpLayout:
-    """Index arrays of the variables, ``(n_component, n_position)``."""
+    """Index arrays of the variables, ``(n_component, n_position)``; `parameters` are those a trust region bounds: all q."""
 
     parameters: np.ndarray
     q: np.ndarray
@@ -45,7 +47,6 @@ class BumpLayout:
 
 def _layout(body: BumpBody, mesh: Mesh) -> BumpLayout:
     sizes = {
-        "parameters": (0, 1),
         "q": (body.n, mesh.n + 1),
         "piece": (1, 1),
         "theta": (1, mesh.n_site),
@@ -56,7 +57,7 @@ def _layout(body: BumpBody, mesh: Mesh) -> BumpLayout:
     for name, (rows, columns) in sizes.items():
         indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
         start += rows * columns
-    return BumpLayout(n=start, **indices)
+    return BumpLayout(parameters=indices["q"].reshape(-1, 1), n=start, **indices)
 
 
 def bump_point(body: BumpBody, friction: Friction, h: float) -> LocalFunction:
@@ -125,6 +126,11 @@ class BumpTranscription:
     constraint_upper: np.ndarray
     groups: dict[str, slice]
     velocity: BumpVelocity
+
+    @property
+    def problem(self) -> SimpleNamespace:
+        """What the solver asks of a problem: how the balance enters."""
+        return SimpleNamespace(formulation=MAP)
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks, objective first; they do not change."""
