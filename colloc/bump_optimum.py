@@ -163,11 +163,8 @@ def optimise_bump(
         new_x, new_loss = start(trial)
         slack = np.abs(body.angles(trial[1:])).max() - largest_angle
         if np.isfinite(new_loss) and new_x[layout.distance[0, -1]] > 0 and new_loss < losses[-1] and slack < 1e-6:
-            small = losses[-1] - new_loss < 1e-4 * abs(new_loss)
             x, radius = new_x, 1.5 * radius
             losses.append(new_loss)
-            if small:
-                break
         else:
             radius *= 0.3
             if radius < 1e-4:

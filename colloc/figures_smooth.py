@@ -64,7 +64,8 @@ def crawler_comparison(
     folder : Path
     """
     with plt.rc_context(_STYLE):
-        figure, axes = plt.subplots(1, 3, figsize=(9.5, 3.6), width_ratios=(1, 1, 1.3))
+        figure, axes = plt.subplots(1, 3, figsize=(9.5, 3.6), width_ratios=(1, 1, 1.5))
+        figure.suptitle("The bump region at phases from 0 to 1/2", x=0.02, ha="left", fontsize=9)
         times = np.linspace(0.0, 0.4999, 9)
         colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, times.size))
         for ax, vertices, title in zip(axes, (prescribed, optimised), ("A  prescribed", "B  optimised"), strict=False):
@@ -72,7 +73,7 @@ def crawler_comparison(
             for k, colour in enumerate(colours):
                 ax.plot(curves[:, k].real, curves[:, k].imag - 0.75 * k, color=colour, lw=1.6)
                 ax.text(-0.12, -0.75 * k, f"{times[k]:.2f}", ha="right", va="center", fontsize=7)
-            ax.set_title(f"{title}: bump region, half a period", loc="left")
+            ax.set_title(title, loc="left")
             ax.set_aspect("equal")
             ax.set_axis_off()
         for (name, values), colour, marker in zip(efficiencies.items(), (_BLUE, _VERMILION), "os", strict=True):
