@@ -17,3 +17,64 @@ period, ``W`` work per period against friction, ``efficiency`` = d/W (lambda in 
 
 The paper: S. Alben, "Efficient sliding locomotion with isotropic friction" (2019).
 """
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from colloc.body import Chain
+    from colloc.errors import CollocError, NotConvergedError, ProblemError, StoreError
+    from colloc.fixed_point import solve_balance
+    from colloc.friction import Friction
+    from colloc.gait import Fourier, Harmonic, ellipse
+    from colloc.optimise import maximise_efficiency
+    from colloc.problem import Problem, Reference
+    from colloc.replay import replay
+    from colloc.solution import Solution
+    from colloc.store import load, save
+    from colloc.verify import certify
+
+__all__ = [
+    "Chain",
+    "CollocError",
+    "Fourier",
+    "Friction",
+    "Harmonic",
+    "NotConvergedError",
+    "Problem",
+    "ProblemError",
+    "Reference",
+    "Solution",
+    "StoreError",
+    "certify",
+    "ellipse",
+    "load",
+    "maximise_efficiency",
+    "replay",
+    "save",
+    "solve_balance",
+]
+
+_HOME = {
+    "body": ("Chain",),
+    "errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
+    "fixed_point": ("solve_balance",),
+    "friction": ("Friction",),
+    "gait": ("Fourier", "Harmonic", "ellipse"),
+    "optimise": ("maximise_efficiency",),
+    "problem": ("Problem", "Reference"),
+    "replay": ("replay",),
+    "solution": ("Solution",),
+    "store": ("load", "save"),
+    "verify": ("certify",),
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first used, so that the NumPy part never loads CasADi."""
+    for module, names in _HOME.items():
+        if name in names:
+            return getattr(importlib.import_module(f"colloc.{module}"), name)
+    raise AttributeError(f"module 'colloc' has no attribute {name!r}")

@@ -1,62 +1,103 @@
 """Continuation in delta: from strongly regularised friction, which converges from poor guesses, to nearly dry friction.
 
 Every level starts from the last converged gait, projected back onto the balance at the new delta by the fixed-point
-solver, with the last multipliers. A level that fails is tried again closer to the one that converged.
+solver, with the last multipliers. A level that fails is tried again closer to the one that converged. At the final delta
+the mesh is refined where the gait needs it.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
 from colloc.problem import Problem
+from colloc.refinement import refined_edges
 from colloc.solution import Level, Solution
 from colloc.transcription import transcribe
 from colloc.warm_start import feasible_point
 
 FIRST_FACTOR = 0.1
+FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.1
+"""Trust region of the gait parameters [rad] at the first level, at later ones, and on a refined mesh: how far an optimum is
+expected to move. A region that turns out too small is moved, so it costs steps, not optima."""
 _SMALLEST_STEP = 0.8
 _EXCHANGES = 4
+_REFINEMENTS = 4
 _ADMISSIBLE = 1e-8
 
 Report = Callable[[Level], None]
 
 
-@dataclass
-class _Guess:
-    """Where the next level starts: gait parameters and multipliers."""
+class _Run:
+    """A continuation under way: the solver of the current mesh, the last converged result, and all levels so far."""
 
-    parameters: np.ndarray
-    multipliers: tuple[np.ndarray, np.ndarray] | None = None
+    def __init__(self, problem: Problem, solver: Solver, on_level: Report | None) -> None:
+        self.problem, self.solver, self.on_level = problem, solver, on_level
+        self.levels: list[Level] = []
+        self.parameters = problem.gait.parameters(problem.guess)
+        self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
+        self.radius = FIRST_RADIUS
 
+    @property
+    def gait(self) -> Fourier:
+        return self.problem.gait.fourier(self.parameters, self.problem.body.n_joint)
 
-def _level(problem: Problem, delta: float, result: NlpResult, distance: float, work: float) -> Level:
-    periods = 1.0 / problem.gait.fraction
-    return Level(
-        delta,
-        result.x,
-        result.lam_x,
-        result.lam_g,
-        -result.objective,
-        periods * distance,
-        periods * work,
-        result.kkt_error,
-        result.violation,
-        result.complementarity,
-        result.status,
-        result.optimal,
-        result.iterations,
-        result.seconds,
-        result.evaluation_seconds,
-    )
+    def attempt(self, delta: float) -> NlpResult:
+        """Solve at delta from the last converged gait; take the result over if it is optimal."""
+        x = feasible_point(self.solver.transcription, self.parameters, delta)
+        result = self.solver.solve(x, delta, self.multipliers, self.radius)
+        if delta == self.problem.delta:
+            # move the checks between nodes to the new gait's worst instants until none is exceeded
+            for _ in range(_EXCHANGES):
+                if not result.optimal or self.solver.check_excess(result.x) <= _ADMISSIBLE:
+                    break
+                again = self.solver.solve(result.x, delta, (result.lam_x, result.lam_g), self.radius)
+                result = again.accumulated(result)
+        self._record(delta, result)
+        if result.optimal:
+            self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
+            self.multipliers = (result.lam_x, result.lam_g)
+            self.radius = NEXT_RADIUS
+        return result
+
+    def remesh(self, edges: np.ndarray) -> None:
+        """Go on with another mesh; multipliers do not carry over."""
+        self.solver = Solver(transcribe(self.problem, edges))
+        self.multipliers = None
+        self.radius = REMESH_RADIUS
+
+    def _record(self, delta: float, result: NlpResult) -> None:
+        transcription = self.solver.transcription
+        layout, periods = transcription.layout, 1.0 / self.problem.gait.fraction
+        level = Level(
+            delta,
+            transcription.mesh.edges,
+            result.x,
+            result.lam_x,
+            result.lam_g,
+            -result.objective,
+            periods * float(result.x[layout.distance[0, -1]]),
+            periods * float(result.x[layout.work[0, -1]]),
+            result.kkt_error,
+            result.violation,
+            result.complementarity,
+            result.status,
+            result.optimal,
+            result.iterations,
+            result.seconds,
+            result.evaluation_seconds,
+        )
+        self.levels.append(level)
+        if self.on_level is not None:
+            self.on_level(level)
 
 
 def continue_delta(problem: Problem, on_level: Report | None = None, solver: Solver | None = None) -> Solution:
-    """Solve a problem through falling delta, from ``delta_start`` to ``delta``.
+    """Solve a problem through falling delta, from ``delta_start`` to ``delta``, then refine its mesh.
 
     Parameters
     ----------
@@ -69,51 +110,56 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     Returns
     -------
     Solution
-        Without a certificate; the last level is the one at ``problem.delta`` only if all went well.
+        Without a certificate; the last level is one at ``problem.delta`` only if all went well.
     """
     begin = time.perf_counter()
-    solver = solver or Solver(transcribe(problem))
-    layout = solver.transcription.layout
-    start = problem.gait.parameters(problem.guess)
-    guess = _Guess(start)
-    levels: list[Level] = []
+    run = _Run(problem, solver or Solver(transcribe(problem)), on_level)
+    result = _descend(run)
+    if result.optimal and problem.mesh_tolerance > 0:
+        result = _refine(run, result)
+    solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin)
+    if not result.optimal:
+        solution.message = _explained(result, run.levels[-1].delta)
+    return solution
 
-    def attempt(delta: float, guess: _Guess) -> NlpResult:
-        x = feasible_point(solver.transcription, guess.parameters, delta)
-        result = solver.solve(x, delta, guess.multipliers)
-        if delta == problem.delta:
-            # move the checks between nodes to the new gait's worst instants until none is exceeded
-            for _ in range(_EXCHANGES):
-                if not result.optimal or solver.check_excess(result.x) <= _ADMISSIBLE:
-                    break
-                again = solver.solve(result.x, delta, (result.lam_x, result.lam_g))
-                result = again.accumulated(result)
-        level = _level(problem, delta, result, result.x[layout.distance[0, -1]], result.x[layout.work[0, -1]])
-        levels.append(level)
-        if on_level is not None:
-            on_level(level)
-        return result
 
-    delta, factor, reached = problem.delta_start, FIRST_FACTOR, None
+def _descend(run: _Run) -> NlpResult:
+    """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
+    target = run.problem.delta
+    delta, factor, reached = run.problem.delta_start, FIRST_FACTOR, None
     while True:
-        result = attempt(delta, guess)
+        result = run.attempt(delta)
         if result.optimal:
-            guess = _Guess(result.x[layout.parameters[:, 0]], (result.lam_x, result.lam_g))
             reached = delta
-            if delta <= problem.delta:
-                break
+            if delta <= target:
+                return result
             factor = max(FIRST_FACTOR, factor**2)
         else:
             if reached is None or factor > _SMALLEST_STEP:
-                break
+                return result
             factor = factor**0.5
-        delta = max(problem.delta, reached * factor) if reached * factor > 1.2 * problem.delta else problem.delta
-    solution = Solution(problem, levels, seconds=time.perf_counter() - begin)
-    if not (result.optimal and delta <= problem.delta):
-        group, size = max(result.group_violation.items(), key=lambda item: item[1])
-        where = f"largest violation {size:.1e} in '{group}'" if size > _ADMISSIBLE else f"KKT error {result.kkt_error:.1e}"
-        solution.message = (
-            f"no optimum at delta = {delta:.1e} ({result.status}; {where}). "
-            "Try another guess, a smaller delta_start, or more intervals."
-        )
-    return solution
+        delta = reached * factor if reached * factor > 1.2 * target else target
+
+
+def _refine(run: _Run, result: NlpResult) -> NlpResult:
+    """Solve again on refined meshes until the gait found needs no further refinement."""
+    problem = run.problem
+    for _ in range(_REFINEMENTS):
+        mesh = run.solver.transcription.mesh
+        edges = refined_edges(problem, mesh, run.gait, problem.delta, problem.mesh_tolerance)
+        if edges is None:
+            break
+        run.remesh(edges)
+        result = run.attempt(problem.delta)
+        if not result.optimal:
+            break
+    return result
+
+
+def _explained(result: NlpResult, delta: float) -> str:
+    group, size = max(result.group_violation.items(), key=lambda item: item[1])
+    where = f"largest violation {size:.1e} in '{group}'" if size > _ADMISSIBLE else f"KKT error {result.kkt_error:.1e}"
+    return (
+        f"no optimum at delta = {delta:.1e} ({result.status}; {where}). "
+        "Try another guess, a smaller delta_start, or more intervals."
+    )

@@ -10,6 +10,7 @@ that keeps its shape moves with relative precision, however slow it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,22 @@ from scipy import sparse
 
 from colloc.arrays import Array, namespace
 from colloc.schemes import Scheme, scheme
+
+
+@cache
+def _gauss(order: int) -> Scheme:
+    return scheme(f"gauss-{order}")
+
+
+@lru_cache(maxsize=1024)
+def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, sparse.csc_matrix, sparse.csc_matrix]:
+    """Nodes to whole panels, panels to their nodes, and the integrals from a panel's left end to its nodes."""
+    each, unit = sparse.identity(n, format="csc"), _gauss(order)
+    return (
+        sparse.kron(each, unit.b, "csc"),
+        sparse.kron(each, np.ones((order, 1)), "csc"),
+        sparse.kron(each, unit.A, "csc"),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +57,7 @@ class Panels:
 
     @property
     def gauss(self) -> Scheme:
-        return scheme(f"gauss-{self.order}")
+        return _gauss(self.order)
 
     @property
     def widths(self) -> np.ndarray:
@@ -59,13 +76,12 @@ class Panels:
 
     def integrate(self, integrand: Array, reference: int) -> Array:
         """Integrals from edge `reference` to the nodes; the integrand ``(n_node, n_time)`` is times the panel widths."""
-        xp, unit = namespace(integrand), self.gauss
+        xp = namespace(integrand)
+        whole, spread, own = _panel_matrices(self.n, self.order)
         ahead = np.arange(self.n) >= reference
         panel_by_panel = np.tril(np.ones((self.n, self.n)), -1) * ahead - np.triu(np.ones((self.n, self.n))) * ~ahead
-        each = sparse.identity(self.n, format="csc")
-        start = xp.matmul(panel_by_panel, xp.matmul(sparse.kron(each, unit.b, "csc"), integrand))
-        spread = sparse.kron(each, np.ones((self.order, 1)), "csc")
-        return xp.matmul(spread, start) + xp.matmul(sparse.kron(each, unit.A, "csc"), integrand)
+        start = xp.matmul(panel_by_panel, xp.matmul(whole, integrand))
+        return xp.matmul(spread, start) + xp.matmul(own, integrand)
 
     def edge_path(self, reference: int) -> np.ndarray:
         """``(n_panel + 1, n_node)``: the same integrals up to the edges."""

@@ -97,13 +97,17 @@ class _Batch:
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
-        now = self.at(np.arange(z.shape[1]), z, delta)
+        velocity = self.at(np.arange(z.shape[1]), z, delta).velocity
         half = 0.5 * self.body.length_column()
-        speed = np.abs(now.velocity.vs) + np.abs(now.velocity.vn) + half * np.abs(now.velocity.w)
-        anchor = np.argmin(speed, axis=0)
+        anchor = np.argmin(np.abs(velocity.vs) + np.abs(velocity.vn) + half * np.abs(velocity.w), axis=0)
+        return anchor, self.rereferenced(z, delta, anchor)
+
+    def rereferenced(self, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
+        """Velocity ``(3, n)`` of the midpoints of the links `anchor`, for z in the batch's own reference."""
+        now = self.at(np.arange(z.shape[1]), z, delta)
         vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
         c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
-        return anchor, np.stack([vs * c - vn * s, vs * s + vn * c, w])
+        return np.stack([vs * c - vn * s, vs * s + vn * c, w])
 
 
 def solve_balance(
@@ -171,10 +175,9 @@ def solve_balance(
     speed[speed == 0] = 1.0
     scaled_rates, scaled_delta = rates / speed, (delta / speed)[None]
     tail = _Batch(body, friction, angles, scaled_rates, TAIL)
-    if start is None:
-        state = starting_state(np.full(n_time, body.n_link // 2), np.zeros((3, n_time)))
-    else:
-        state = starting_state(*tail.slowest(z / speed, scaled_delta))
+    anchor = np.full(n_time, body.n_link // 2)
+    velocity = np.zeros((3, n_time)) if start is None else tail.rereferenced(z / speed, scaled_delta, anchor)
+    state = starting_state(anchor, velocity)
 
     def batch(members: np.ndarray, link: int) -> _Batch:
         return _Batch(body, friction, angles[:, members], scaled_rates[:, members], link)

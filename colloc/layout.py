@@ -29,8 +29,10 @@ class Layout:
     n: int
 
 
-def problem_mesh(problem: Problem) -> Mesh:
-    """The uniform mesh of a problem, on the part of the period that is solved."""
+def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
+    """The mesh of a problem on the part of the period that is solved: uniform, or with the given edges."""
+    if edges is not None:
+        return Mesh(scheme(problem.scheme), edges)
     return uniform_mesh(scheme(problem.scheme), problem.intervals, problem.gait.fraction)
 
 

@@ -7,9 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 from colloc.blocks import Oracles, oracles
 from colloc.layout import RADIANS
+from colloc.problem import LIFTED
 from colloc.transcription import Transcription, worst_instants
 
 IPOPT_OPTIONS: dict[str, object] = {
@@ -23,7 +26,6 @@ IPOPT_OPTIONS: dict[str, object] = {
     "mu_init": 1e-4,
     "bound_push": 1e-5,
     "bound_frac": 1e-5,
-    "theta_max_fact": 0.1,
     "warm_start_init_point": "yes",
     "warm_start_bound_push": 1e-5,
     "warm_start_bound_frac": 1e-5,
@@ -32,8 +34,9 @@ IPOPT_OPTIONS: dict[str, object] = {
     "warm_start_mult_bound_push": 1e-5,
     "max_iter": 300,
 }
-"""theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along negative curvature
-would otherwise carry them away for good."""
+LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1}
+"""With lifted forces this decides: it keeps the iterates near the balance manifold, from which a step along negative
+curvature would otherwise carry them away for good. The velocity map needs no such leash, and is slowed by it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,7 @@ class NlpResult:
 
 
 OPTIMAL_TOLERANCE = 1e-6
+_REGIONS = 20
 
 
 class Solver:
@@ -96,7 +100,8 @@ class Solver:
     def __init__(self, transcription: Transcription, options: dict[str, object] | None = None) -> None:
         self.transcription = transcription
         self.oracles: Oracles = oracles(transcription.assembly)
-        settings: dict[str, object] = {f"ipopt.{k}": v for k, v in {**IPOPT_OPTIONS, **(options or {})}.items()}
+        chosen = {**IPOPT_OPTIONS, **(LIFTED_OPTIONS if transcription.problem.formulation == LIFTED else {}), **(options or {})}
+        settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True, **self.oracles.options}
         self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
@@ -106,18 +111,58 @@ class Solver:
         x: np.ndarray,
         delta: float,
         multipliers: tuple[np.ndarray, np.ndarray] | None = None,
+        radius: float = np.inf,
     ) -> NlpResult:
-        """Maximise efficiency from x at regularisation `delta` (per period); multipliers are (lam_x, lam_g)."""
+        """Maximise efficiency from x.
+
+        Parameters
+        ----------
+        x : (n,)
+        delta : float
+            Regularisation speed, per period.
+        multipliers : (lam_x, lam_g), optional
+            By default those of the equations that come closest to stationarity at x.
+        radius : float
+            Trust region: how far each gait parameter may move [rad]. A result on its edge is solved again from there.
+        """
+        result = self._solve_within(x, delta, multipliers, radius)
+        own = self.transcription.layout.parameters[:, 0]
+        for _ in range(_REGIONS):
+            if not result.optimal or np.abs(result.x[own] - x[own]).max() < radius * (1 - 1e-6):
+                return result
+            x = result.x
+            result = self._solve_within(x, delta, None, radius).accumulated(result)
+        return replace(result, complementarity=np.inf, status="still moving")
+
+    def _solve_within(
+        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None, radius: float
+    ) -> NlpResult:
         t = self.transcription
-        parameters = self.oracles.parameter_vector(delta / RADIANS, t.block_parameters(x[t.layout.parameters[:, 0]]))
-        bounds = {"lbx": t.lower, "ubx": t.upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
-        duals = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
+        own = t.layout.parameters[:, 0]
+        parameters = self.oracles.parameter_vector(delta / RADIANS, t.block_parameters(x[own]))
+        lower, upper = t.lower.copy(), t.upper.copy()
+        lower[own], upper[own] = np.maximum(lower[own], x[own] - radius), np.minimum(upper[own], x[own] + radius)
+        bounds = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
+        lam_x, lam_g = multipliers or (np.zeros_like(x), self._estimated_multipliers(x, parameters))
+        duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
         solution = self._solver(x0=x, p=parameters, **bounds, **duals)
         seconds = time.perf_counter() - start
         stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
-        return self._measured(x, lam_x, lam_g, parameters, stats, seconds)
+        return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
+
+    def _estimated_multipliers(self, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """Multipliers of the equality rows that minimise the Lagrangian's gradient at x; zero for inequalities."""
+        t = self.transcription
+        equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
+        jacobian = _scipy(self.oracles.options["jac_g"](x, parameters)[1])[equality][:, t.lower < t.upper]
+        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel()[t.lower < t.upper]
+        m, n = jacobian.shape
+        system = sparse.bmat([[sparse.eye(n), jacobian.T], [jacobian, -1e-12 * sparse.eye(m)]], format="csc")
+        multipliers = np.zeros(t.assembly.m)
+        multipliers[equality] = spsolve(system, np.concatenate([-gradient, np.zeros(m)]))[n:]
+        return multipliers
 
     def check_excess(self, x: np.ndarray) -> float:
         """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
@@ -133,17 +178,27 @@ class Solver:
             excess = max(excess, float(np.max(t.constraint_lower[rows] - values)))
         return excess
 
-    def _measured(self, x, lam_x, lam_g, parameters, stats, seconds) -> NlpResult:
+    def _measured(
+        self,
+        x: np.ndarray,
+        lam_x: np.ndarray,
+        lam_g: np.ndarray,
+        parameters: np.ndarray,
+        bounds: tuple[np.ndarray, np.ndarray],
+        stats: dict,
+        seconds: float,
+    ) -> NlpResult:
         t = self.transcription
+        lower, upper = bounds
         f, gradient = self.oracles.options["grad_f"](x, parameters)
         g, jacobian = self.oracles.options["jac_g"](x, parameters)
         g = np.array(g).ravel()
         free = t.lower < t.upper
         stationarity = np.array(gradient).ravel() + np.array(jacobian.T @ lam_g).ravel() + lam_x
         outside = np.maximum(np.maximum(t.constraint_lower - g, g - t.constraint_upper), 0.0)
-        bounds_outside = np.maximum(np.maximum(t.lower - x, x - t.upper), 0.0)
+        bounds_outside = np.maximum(np.maximum(lower - x, x - upper), 0.0)
         products = [
-            _complementarity(lam_x[free], x[free], t.lower[free], t.upper[free]),
+            _complementarity(lam_x[free], x[free], lower[free], upper[free]),
             _complementarity(lam_g, g, t.constraint_lower, t.constraint_upper),
         ]
         evaluation = sum(v for k, v in stats.items() if k.startswith("t_wall_nlp_"))
@@ -161,6 +216,10 @@ class Solver:
             float(evaluation),
             {name: float(outside[rows].max()) for name, rows in t.groups.items() if rows.stop > rows.start},
         )
+
+
+def _scipy(matrix: ca.DM) -> sparse.csr_matrix:
+    return sparse.csc_matrix((matrix.nonzeros(), matrix.row(), matrix.colind()), shape=matrix.shape).tocsr()
 
 
 def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:

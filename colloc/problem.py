@@ -68,6 +68,8 @@ class Problem:
         Collocation scheme, see `colloc.schemes.scheme`.
     formulation : {"map", "lifted"}
         How the balance becomes constraints, see `colloc.kernels`.
+    mesh_tolerance : float
+        Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Problem:
     intervals: int = 30
     scheme: str = "gauss-3"
     formulation: str = MAP
+    mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
         self._check_types()
@@ -97,7 +100,7 @@ class Problem:
                 raise ProblemError(f"{field} must be a {kind.__name__}, not {type(getattr(self, field)).__name__}.")
 
     def _check_numbers(self) -> None:
-        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed"):
+        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
@@ -107,6 +110,8 @@ class Problem:
             object.__setattr__(self, "delta_start", self.delta)
         if not 0 < self.joint_limit <= np.pi + 1e-12:
             raise ProblemError(f"joint_limit must lie in (0, pi], not {self.joint_limit:g}.")
+        if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
+            raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
         if self.formulation not in (MAP, LIFTED):

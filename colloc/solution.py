@@ -26,6 +26,8 @@ class Level:
     ----------
     delta : float
         Regularisation speed, per period.
+    edges : (n_interval + 1,)
+        The mesh.
     x, lam_x : (n,)
         Variables (see `colloc.layout`) and multipliers of their bounds.
     lam_g : (m,)
@@ -43,6 +45,7 @@ class Level:
     """
 
     delta: float
+    edges: np.ndarray
     x: np.ndarray
     lam_x: np.ndarray
     lam_g: np.ndarray
@@ -188,7 +191,8 @@ class Solution:
 
     @property
     def mesh(self) -> Mesh:
-        return problem_mesh(self.problem)
+        """The mesh of the last level."""
+        return problem_mesh(self.problem, self.last.edges)
 
     @property
     def layout(self) -> Layout:
@@ -223,7 +227,7 @@ class Solution:
         ]
         z, theta, centre, end = self._interpolated(reduced)
         angles, rates = self.gait.angles(phase), self.gait.rates(phase)
-        if symmetry == "bilateral" and second.any():
+        if symmetry == "bilateral":
             # seen from the head the body repeats itself with reversed rates
             here = instant(
                 body, self.problem.friction, self.gait.angles(reduced), self.gait.rates(reduced), z, self.last.delta

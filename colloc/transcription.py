@@ -132,9 +132,9 @@ def _check_parameters(problem: Problem, times: np.ndarray) -> np.ndarray:
     return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
 
 
-def transcribe(problem: Problem) -> Transcription:
-    """The nonlinear program of a problem on its uniform mesh."""
-    mesh = problem_mesh(problem)
+def transcribe(problem: Problem, edges: np.ndarray | None = None) -> Transcription:
+    """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges."""
+    mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body)
     point = point_function(problem.formulation, problem.body, problem.friction)
@@ -174,7 +174,8 @@ def transcribe(problem: Problem) -> Transcription:
     velocity = VelocityMap(problem.body, problem.friction, mesh.n_point)
 
     def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
-        return velocity(local[1 : 1 + n_joint, :], local[1 + n_joint : 1 + 2 * n_joint, :], delta)
+        _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
+        return velocity(angles, rates, z, delta)
 
     objective = Block(
         minus_efficiency(),

@@ -13,9 +13,9 @@ _TOLERANCE = 1e-12
 
 
 class VelocityMap(ca.Callback):
-    """(angles, rates, delta) to balanced tail velocities ``(3, n_time)``; not differentiable by CasADi.
+    """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``; not differentiable by CasADi.
 
-    Every call starts from the last solution, and the same arguments are not solved twice. An instant that does not
+    The start only saves steps. The same arguments are not solved twice. An instant that does not
     converge gives NaN, which an optimiser takes as a step too far.
     """
 
@@ -28,28 +28,32 @@ class VelocityMap(ca.Callback):
         self.construct("velocity_map", {"enable_fd": False})
 
     def get_n_in(self) -> int:
-        return 3
+        return 4
 
     def get_n_out(self) -> int:
         return 1
 
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(1, 1) if index == 2 else ca.Sparsity.dense(self._body.n_joint, self._n_time)
+        return ca.Sparsity.dense(
+            *((self._body.n_joint, self._n_time), (self._body.n_joint, self._n_time), (3, self._n_time), (1, 1))[index]
+        )
 
     def get_sparsity_out(self, index: int) -> ca.Sparsity:
         return ca.Sparsity.dense(3, self._n_time)
 
     def eval(self, arguments: list[ca.DM]) -> list[ca.DM]:
-        angles, rates, delta = arguments[0].full(), arguments[1].full(), float(arguments[2])
+        angles, rates, start, delta = *(a.full() for a in arguments[:3]), float(arguments[3])
         if self._last is not None and self._z is not None:
             same = self._last[2] == delta and np.array_equal(self._last[0], angles) and np.array_equal(self._last[1], rates)
             if same:
                 return [ca.DM(self._z)]
         if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
             return [ca.DM(np.full((3, self._n_time), np.nan))]
-        solved = solve_balance(self._body, self._friction, angles, rates, delta, start=self._z, tolerance=_TOLERANCE)
+        solved = solve_balance(
+            self._body, self._friction, angles, rates, delta, start=np.nan_to_num(start), tolerance=_TOLERANCE
+        )
         self.solves += 1
         z = np.where(solved.residual < 1e3 * _TOLERANCE, solved.z, np.nan)
         self._last = (angles, rates, delta)
-        self._z = np.where(np.isfinite(z), z, 0.0)
+        self._z = z
         return [ca.DM(z)]

@@ -1,0 +1,1 @@
+"""Studies made with colloc; nothing reusable lives here."""

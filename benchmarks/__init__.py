@@ -1,0 +1,1 @@
+"""Measurements of colloc; each module prints a table and says how to run it."""

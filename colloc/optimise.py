@@ -1,0 +1,40 @@
+"""From a problem to a certified solution: continuation, then the certificate."""
+
+from __future__ import annotations
+
+import time
+
+from colloc.continuation import Report, continue_delta
+from colloc.errors import NotConvergedError
+from colloc.problem import Problem
+from colloc.solution import Solution
+from colloc.verify import certify
+
+
+def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Solution:
+    """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
+
+    Parameters
+    ----------
+    problem : Problem
+    on_level : callable, optional
+        Called with every `colloc.solution.Level` as it ends.
+
+    Returns
+    -------
+    Solution
+        With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
+    """
+    begin = time.perf_counter()
+    solution = continue_delta(problem, on_level)
+    if solution.levels[-1].optimal:
+        try:
+            solution.certificate = certify(solution)
+        except NotConvergedError as error:
+            solution.message = f"the replay failed: {error}"
+        else:
+            failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in solution.certificate.failures)
+            if failures:
+                solution.message = f"the certificate failed: {failures}. Try more intervals or a smaller mesh_tolerance."
+    solution.seconds = time.perf_counter() - begin
+    return solution

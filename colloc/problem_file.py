@@ -1,0 +1,63 @@
+"""Problem files: plain Python that states ``PROBLEM`` (and usually ``REFERENCE``). They are code, and are executed."""
+
+from __future__ import annotations
+
+import os
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+
+from colloc.errors import ProblemError
+from colloc.problem import Problem, Reference
+
+
+@dataclass(frozen=True)
+class ProblemFile:
+    """What a problem file states.
+
+    Attributes
+    ----------
+    problem : Problem
+    reference : Reference or None
+    source : str
+        Its text.
+    """
+
+    problem: Problem
+    reference: Reference | None
+    source: str
+
+
+def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
+    """Execute a problem file.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such file, it cannot be read, it fails (with the line), or states no ``PROBLEM``.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ProblemError(f"there is no problem file {path}.")
+    try:
+        source = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProblemError(f"cannot read {path} as Python text: {error}.") from None
+    names: dict[str, object] = {"__name__": "colloc_problem", "__file__": str(path)}
+    try:
+        exec(compile(source, str(path), "exec"), names)
+    except SyntaxError as error:
+        raise ProblemError(f"{path}, line {error.lineno}: {error.msg}.") from None
+    except Exception as error:
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+        where = f", line {lines[-1]}" if lines else ""
+        what = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
+        raise ProblemError(f"{path}{where}: {what}") from None
+    problem, reference = names.get("PROBLEM"), names.get("REFERENCE")
+    if problem is None:
+        raise ProblemError(f"{path} states no PROBLEM; end it with PROBLEM = Problem(...).")
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}.")
+    if reference is not None and not isinstance(reference, Reference):
+        raise ProblemError(f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}.")
+    return ProblemFile(problem, reference, source)

@@ -1,0 +1,184 @@
+"""Solutions as HDF5 files: self-describing, readable with plain h5py, replaced atomically, and nothing but data.
+
+Layout of a file (every dataset carries ``units`` and ``dims``)::
+
+    /problem            JSON text of all fields          /source     text of the problem file
+    /gait/{mean,cos,sin}                                 /versions   JSON text
+    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
+    /levels/000/{edges,x,lam_x,lam_g}, attributes delta, efficiency, distance, work, kkt_error, iterations, ...
+    /certificate/{name,value,threshold,passed,meaning}, attributes efficiency, efficiency_error, ...
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import tempfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from colloc.errors import CollocError, StoreError
+from colloc.problem import Problem
+from colloc.solution import Certificate, Check, Level, Solution
+
+FORMAT, FORMAT_VERSION = "colloc solution", 1
+_LARGEST_FILE = 2**31
+_MOTION_SAMPLES = 401
+_LEVEL_ARRAYS = {"edges": "period", "x": "see colloc.layout", "lam_x": "see colloc.layout", "lam_g": "see colloc.layout"}
+
+
+def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
+    """Write a solution; an existing file is replaced only once the new one is complete.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be made or written.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+        os.close(handle)
+    except OSError as error:
+        raise StoreError(f"cannot write to {path.parent}: {error.strerror or error}.") from None
+    try:
+        with h5py.File(temporary, "w") as file:
+            _write(file, solution)
+        with open(temporary, "rb") as written:
+            os.fsync(written.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise StoreError(f"cannot write {path}: {error.strerror or error}.") from None
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(temporary)
+    return path
+
+
+def load(path: str | os.PathLike[str]) -> Solution:
+    """The solution in a file that `save` wrote.
+
+    Raises
+    ------
+    StoreError
+        If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise StoreError(f"there is no file {path}.")
+    if path.stat().st_size > _LARGEST_FILE:
+        raise StoreError(f"{path} is too large for a colloc solution.")
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise StoreError(f"{path} is an HDF5 file, but not a colloc solution.")
+            if int(file.attrs["format_version"]) > FORMAT_VERSION:
+                raise StoreError(f"{path} was written by a newer colloc; update colloc to read it.")
+            return _read(file)
+    except StoreError:
+        raise
+    except CollocError as error:
+        raise StoreError(f"{path} is damaged: {error}") from None
+    except Exception as error:
+        # h5py raises many kinds for a damaged file
+        raise StoreError(f"{path} is not a readable colloc solution ({type(error).__name__}: {error}).") from None
+
+
+def _dataset(group: h5py.Group, name: str, value: np.ndarray, units: str, dims: str) -> None:
+    dataset = group.create_dataset(name, data=value)
+    dataset.attrs["units"], dataset.attrs["dims"] = units, dims
+
+
+def _write(file: h5py.File, solution: Solution) -> None:
+    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    file.attrs["name"], file.attrs["problem_hash"] = solution.problem.name, solution.problem.hash
+    file.attrs["status"], file.attrs["message"], file.attrs["seconds"] = solution.status, solution.message, solution.seconds
+    file["problem"] = json.dumps(solution.problem.to_dict())
+    file["source"] = solution.source
+    file["versions"] = json.dumps(solution.versions)
+    for index, level in enumerate(solution.levels):
+        group = file.create_group(f"levels/{index:03d}")
+        for name, units in _LEVEL_ARRAYS.items():
+            _dataset(group, name, getattr(level, name), units, "vector")
+        for field in dataclasses.fields(level):
+            if field.name not in _LEVEL_ARRAYS:
+                group.attrs[field.name] = getattr(level, field.name)
+    if solution.levels:
+        _write_motion(file, solution)
+    if solution.certificate is not None:
+        _write_certificate(file.create_group("certificate"), solution.certificate)
+
+
+def _write_motion(file: h5py.File, solution: Solution) -> None:
+    gait = file.create_group("gait")
+    for name, dims in (("mean", "joint"), ("cos", "joint, harmonic"), ("sin", "joint, harmonic")):
+        _dataset(gait, name, getattr(solution.gait, name), "rad", dims)
+    motion = solution.sample(np.linspace(0.0, 1.0, _MOTION_SAMPLES))
+    group = file.create_group("motion")
+    _dataset(group, "t", motion.t, "period", "time")
+    _dataset(group, "joint_angles", motion.angles, "rad", "joint, time")
+    _dataset(group, "joint_rates", motion.rates, "rad/period", "joint, time")
+    _dataset(group, "tail_velocity", motion.z, "length/period, length/period, rad/period", "(u, v, omega), time")
+    _dataset(group, "theta", motion.theta, "rad", "time")
+    _dataset(group, "centre", motion.centre, "length", "(x, y), time")
+    _dataset(group, "tail", motion.tail, "length", "(x, y), time")
+    _dataset(group, "power", solution.power(motion), "weight length/period", "time")
+
+
+def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
+    for field in dataclasses.fields(certificate):
+        if field.name != "checks":
+            group.attrs[field.name] = getattr(certificate, field.name)
+    text = h5py.string_dtype()
+    checks = certificate.checks
+    group.create_dataset("name", data=[check.name for check in checks], dtype=text)
+    group.create_dataset("meaning", data=[check.meaning for check in checks], dtype=text)
+    group["value"] = [check.value for check in checks]
+    group["threshold"] = [check.threshold for check in checks]
+    group["passed"] = [check.passed for check in checks]
+
+
+def _text(dataset: h5py.Dataset) -> str:
+    return dataset.asstr()[()]
+
+
+def _read(file: h5py.File) -> Solution:
+    problem = Problem.from_dict(json.loads(_text(file["problem"])))
+    if problem.hash != file.attrs["problem_hash"]:
+        raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
+    levels = []
+    for name in sorted(file["levels"]) if "levels" in file else []:
+        group = file["levels"][name]
+        arrays = {key: group[key][()] for key in _LEVEL_ARRAYS}
+        rest = {f.name: group.attrs[f.name] for f in dataclasses.fields(Level) if f.name not in _LEVEL_ARRAYS}
+        level = Level(**arrays, **{key: _plain(value) for key, value in rest.items()})
+        levels.append(level)
+    certificate = None
+    if "certificate" in file:
+        group = file["certificate"]
+        columns = (group["name"].asstr()[()], group["value"][()], group["threshold"][()], group["meaning"].asstr()[()])
+        checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
+        rest = {f.name: _plain(group.attrs[f.name]) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+        certificate = Certificate(checks, **rest)
+    solution = Solution(
+        problem,
+        levels,
+        certificate,
+        float(file.attrs["seconds"]),
+        _text(file["source"]),
+        str(file.attrs["message"]),
+        json.loads(_text(file["versions"])),
+    )
+    if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
+        raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
+    return solution
+
+
+def _plain(value):
+    return value.item() if isinstance(value, np.generic) else value

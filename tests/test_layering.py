@@ -1,0 +1,90 @@
+"""Data flows one way: imports point down, heavy libraries are named in one place, modules stay short."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LEVELS = {
+    0: ["arrays", "errors", "schemes"],
+    1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
+    2: ["balance", "problem", "damped_newton", "bump_body"],
+    3: [
+        "fixed_point",
+        "layout",
+        "blocks",
+        "kernels",
+        "velocity_callback",
+        "replay",
+        "warm_start",
+        "transcription",
+        "smooth_balance",
+        "bump_balance",
+        "bump_callback",
+        "bump_transcription",
+    ],
+    4: ["nlp", "solution", "problem_file", "store", "refinement", "smooth_period"],
+    5: ["verify", "continuation", "concertina", "epsilon_study", "chain_study", "bump_optimum", "wave_optimum"],
+    6: ["optimise", "figures", "figures_smooth", "solve"],
+}
+LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
+ONLY = {"matplotlib": "figures", "h5py": "store"}
+
+
+def modules():
+    return {path.stem: path for path in (ROOT / "colloc").glob("*.py") if path.stem not in ("__init__", "__main__")}
+
+
+def imported(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def test_every_module_has_a_level():
+    assert set(modules()) == set(LEVEL)
+
+
+def test_imports_point_down_or_within_a_level_without_cycles():
+    graph = {}
+    for name, path in modules().items():
+        own = {m.split(".")[1] for m in imported(path) if m.startswith("colloc.")}
+        graph[name] = own
+        for other in own:
+            assert LEVEL[other] <= LEVEL[name], f"{name} imports {other} from above"
+    while graph:
+        free = {name for name, needs in graph.items() if not needs & set(graph)}
+        assert free, f"import cycle among {sorted(graph)}"
+        graph = {name: needs for name, needs in graph.items() if name not in free}
+
+
+def test_heavy_libraries_are_named_in_one_kind_of_module():
+    for name, path in modules().items():
+        for module in imported(path):
+            library = module.split(".")[0]
+            if library in ONLY:
+                assert ONLY[library] in name, f"{name} names {library}"
+
+
+def test_the_numpy_side_never_loads_casadi():
+    numpy_side = [m for m in LEVEL if "casadi" in {i.split(".")[0] for i in imported(modules()[m])}]
+    assert set(numpy_side) <= {
+        "arrays",
+        "blocks",
+        "kernels",
+        "velocity_callback",
+        "transcription",
+        "nlp",
+        "bump_callback",
+        "bump_transcription",
+    }
+
+
+def test_only_one_module_names_ipopt():
+    assert [n for n, p in modules().items() if '"ipopt"' in p.read_text(encoding="utf-8")] == ["nlp"]
+
+
+def test_modules_are_short():
+    for name, path in modules().items():
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= 350, name
