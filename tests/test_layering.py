@@ -5,9 +5,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes"],
+    0: ["arrays", "errors", "schemes", "parallel"],
     1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
-    2: ["balance", "problem", "damped_newton", "bump_body"],
+    2: ["balance", "problem", "damped_newton", "bump_body", "ellipses"],
     3: [
         "fixed_point",
         "layout",
@@ -22,9 +22,43 @@ LEVELS = {
         "bump_callback",
         "bump_transcription",
     ],
-    4: ["nlp", "solution", "problem_file", "store", "refinement", "smooth_period"],
-    5: ["verify", "continuation", "concertina", "epsilon_study", "chain_study", "bump_optimum", "wave_optimum"],
-    6: ["optimise", "figures", "figures_smooth", "solve"],
+    4: [
+        "nlp",
+        "solution",
+        "problem_file",
+        "store",
+        "refinement",
+        "smooth_period",
+        "array_store",
+        "velocity_map",
+        "static_friction",
+        "motion_record",
+        "smooth_record",
+    ],
+    5: [
+        "verify",
+        "continuation",
+        "concertina",
+        "epsilon_study",
+        "chain_study",
+        "bump_optimum",
+        "wave_optimum",
+        "map_store",
+        "sweep",
+        "flap",
+        "study",
+    ],
+    6: [
+        "optimise",
+        "figures",
+        "figures_smooth",
+        "solve",
+        "figures_style",
+        "figures_bodies",
+        "figures_maps",
+        "figures_crawlers",
+        "figures_paper",
+    ],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
 ONLY = {"matplotlib": "figures", "h5py": "store"}
