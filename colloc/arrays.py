@@ -7,6 +7,7 @@ CasADi a kernel is built for one instant, ``(n_body, 1)``, and mapped over the m
 
 from __future__ import annotations
 
+import operator
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -25,7 +26,7 @@ def _numpy_namespace() -> SimpleNamespace:
         where=np.where,
         abs=np.abs,
         arctan2=np.arctan2,
-        matmul=np.matmul,
+        matmul=operator.matmul,
         sum_rows=lambda a: np.sum(a, axis=0, keepdims=True),
         stack=lambda rows: np.concatenate(rows, axis=0),
     )
@@ -53,8 +54,8 @@ _CASADI: list[SimpleNamespace] = []
 def namespace(*arrays: Array) -> SimpleNamespace:
     """The functions to apply to `arrays`: CasADi's if any of them is a CasADi matrix, else NumPy's.
 
-    ``matmul(a, b)`` takes a constant NumPy matrix on the left; ``where(condition, a, b)`` evaluates both sides, so the
-    side that is not taken must still be finite, with finite derivatives.
+    ``matmul(a, b)`` takes a constant NumPy or SciPy sparse matrix on the left; ``where(condition, a, b)`` evaluates both
+    sides, so the side that is not taken must still be finite, with finite derivatives.
     """
     if not any(type(a).__module__.startswith("casadi") for a in arrays):
         return _NUMPY

@@ -18,16 +18,9 @@ import numpy as np
 
 from colloc.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
 from colloc.body import TAIL, Chain, LinkVelocity, Posture
+from colloc.damped_newton import METHODS, solve, solve3, starting_state
 from colloc.errors import NotConvergedError, ProblemError
 from colloc.friction import Friction, link_dissipation
-
-_ARMIJO = 1e-4
-_BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
-_ROUNDING = 8e-16
-_FIXED_POINT_STEPS_AFTER_FAILURE = 3
-_DIRECT_ITERATIONS = 60
-_TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
-METHODS = ("auto", "newton", "fixed_point")
 
 
 @dataclass(frozen=True)
@@ -99,86 +92,22 @@ class _Batch:
             if chosen.any():
                 posture, velocity = Posture(*links[:4, :, chosen]), LinkVelocity(*links[4:, :, chosen])
                 left = matrix(self.body, self.friction, posture, velocity, delta[:, chosen])
-                step[:, chosen] = _solve3(left, force[:, chosen])
+                step[:, chosen] = solve3(left, force[:, chosen])
         return step
 
+    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
+        velocity = self.at(np.arange(z.shape[1]), z, delta).velocity
+        half = 0.5 * self.body.length_column()
+        anchor = np.argmin(np.abs(velocity.vs) + np.abs(velocity.vn) + half * np.abs(velocity.w), axis=0)
+        return anchor, self.rereferenced(z, delta, anchor)
 
-def _iterate(
-    batch: _Batch, z: np.ndarray, delta: np.ndarray, tolerance: float, max_iterations: int, method: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Damped Newton from z ``(3, n)``, with fixed-point steps where a Newton step fails; returns z, residual, iterations."""
-    n_time = z.shape[1]
-    z = z.copy()
-    residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
-    fixed_point_steps_due = np.full(n_time, np.iinfo(int).max if method == "fixed_point" else 0)
-    active = np.arange(n_time)
-    links, force, merit = batch.evaluate(active, z, delta)
-    while True:
-        residual[active] = np.abs(force).max(axis=0) / batch.friction.largest
-        keep = (residual[active] > tolerance) & (iterations[active] < max_iterations)
-        if not keep.any():
-            return z, residual, iterations
-        active, links, force, merit = active[keep], links[:, :, keep], force[:, keep], merit[keep]
-        d, newton = delta[:, active], fixed_point_steps_due[active] == 0
-        step = batch.step(links, force, d, newton)
-        if batch.friction.isotropic:
-            slope, slack = -np.sum(force * step, axis=0), _ROUNDING * merit
-        else:
-            slope, slack = -2.0 * merit, np.zeros_like(merit)
-        alpha = np.ones(active.size)
-        trial = z[:, active] + step
-        new_links, new_force, new_merit = batch.evaluate(active, trial, d)
-        failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
-        for shrink in _BACKTRACKING:
-            retry = np.flatnonzero(failed)
-            if not retry.size:
-                break
-            alpha[retry] *= shrink
-            trial[:, retry] = z[:, active[retry]] + alpha[retry] * step[:, retry]
-            evaluated = batch.evaluate(active[retry], trial[:, retry], d[:, retry])
-            new_links[:, :, retry], new_force[:, retry], new_merit[retry] = evaluated
-            failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
-        trial[:, failed], new_links[:, :, failed] = z[:, active[failed]], links[:, :, failed]
-        new_force[:, failed], new_merit[failed] = force[:, failed], merit[failed]
-        z[:, active], links, force, merit = trial, new_links, new_force, new_merit
-        iterations[active] += 1
-        fixed_point_steps_due[active[~newton]] -= 1
-        fixed_point_steps_due[active[failed]] = _FIXED_POINT_STEPS_AFTER_FAILURE
-        if method == "newton":
-            iterations[active[failed]] = max_iterations
-
-
-def _solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve ``matrix[t] x[:, t] = right[:, t]`` after symmetric scaling; where that is singular, the step is zero."""
-    diagonal = np.sqrt(np.clip(np.abs(np.einsum("tii->ti", matrix)), _TINY, _HUGE))
-    with np.errstate(over="ignore", invalid="ignore"):
-        scaled = matrix / diagonal[:, :, None] / diagonal[:, None, :]
-        singular = ~(np.abs(np.linalg.det(scaled)) > _TINY)
-        scaled[singular] = np.eye(3)
-        x = (np.linalg.solve(scaled, (right.T / diagonal)[:, :, None])[:, :, 0] / diagonal).T
-    x[:, singular | ~np.isfinite(x).all(axis=0)] = 0.0
-    return x
-
-
-def _ladder(delta: float) -> np.ndarray:
-    """Regularisations from 1 down to delta, for instants that do not converge directly."""
-    count = max(2, int(np.ceil(-np.log10(delta) / 0.5)) + 1)
-    return np.geomspace(1.0, delta, count)
-
-
-def _slowest_link(batch: _Batch, z: np.ndarray, delta: np.ndarray) -> np.ndarray:
-    """The slowest link of every instant, ``(n,)``, for z in the batch's own reference."""
-    velocity = batch.at(np.arange(z.shape[1]), z, delta).velocity
-    half = 0.5 * batch.body.length_column()
-    return np.argmin(np.abs(velocity.vs) + np.abs(velocity.vn) + half * np.abs(velocity.w), axis=0)
-
-
-def _rereferenced(batch: _Batch, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
-    """Velocity ``(3, n)`` of the midpoints of the links `anchor`, for z in the batch's own reference."""
-    now = batch.at(np.arange(z.shape[1]), z, delta)
-    vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
-    c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
-    return np.stack([vs * c - vn * s, vs * s + vn * c, w])
+    def rereferenced(self, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
+        """Velocity ``(3, n)`` of the midpoints of the links `anchor`, for z in the batch's own reference."""
+        now = self.at(np.arange(z.shape[1]), z, delta)
+        vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
+        c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
+        return np.stack([vs * c - vn * s, vs * s + vn * c, w])
 
 
 def solve_balance(
@@ -245,81 +174,26 @@ def solve_balance(
     speed = np.abs(rates).max(axis=0)
     speed[speed == 0] = 1.0
     scaled_rates, scaled_delta = rates / speed, (delta / speed)[None]
-    everything = np.arange(n_time)
     tail = _Batch(body, friction, angles, scaled_rates, TAIL)
     anchor = np.full(n_time, body.n_link // 2)
-    velocity = np.zeros((3, n_time)) if start is None else _rereferenced(tail, z / speed, scaled_delta, anchor)
+    velocity = np.zeros((3, n_time)) if start is None else tail.rereferenced(z / speed, scaled_delta, anchor)
+    state = starting_state(anchor, velocity)
 
-    solution = _State(anchor, velocity, np.full(n_time, np.inf), np.zeros(n_time, dtype=int))
-    problem = (body, friction, angles, scaled_rates)
-    budget = max_iterations if method != "auto" else min(max_iterations, _DIRECT_ITERATIONS)
-    _advance(solution, problem, everything, scaled_delta, tolerance, budget, method)
-    if method == "auto":
-        bad = np.flatnonzero(solution.residual > tolerance)
-        if bad.size:
-            solution.velocity[:, bad] = 0.0
-            for level in _ladder(float(scaled_delta[0, bad].min())):
-                now = np.maximum(scaled_delta, level)
-                _advance(solution, problem, bad, now, tolerance, min(max_iterations, 4 * _DIRECT_ITERATIONS), method)
-            bad = np.flatnonzero(solution.residual > tolerance)
-            if bad.size:
-                _advance(solution, problem, bad, scaled_delta, tolerance, max_iterations, "fixed_point")
+    def batch(members: np.ndarray, link: int) -> _Batch:
+        return _Batch(body, friction, angles[:, members], scaled_rates[:, members], link)
+
+    solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
 
     tail_z = np.empty((3, n_time))
-    for link in np.unique(solution.anchor):
-        chosen = np.flatnonzero(solution.anchor == link)
+    for link in np.unique(state.anchor):
+        chosen = np.flatnonzero(state.anchor == link)
         posture = body.posture(angles[:, chosen], int(link))
-        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], solution.velocity[:, chosen], int(link))
+        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], int(link))
     return BalanceSolution(
         tail_z * speed,
-        solution.residual,
-        solution.iterations,
-        solution.residual <= tolerance,
-        solution.anchor,
-        solution.velocity * speed,
+        state.residual,
+        state.iterations,
+        state.residual <= tolerance,
+        state.anchor,
+        state.velocity * speed,
     )
-
-
-@dataclass
-class _State:
-    """Current anchors, anchor velocities, residuals and step counts of all instants; updated in place."""
-
-    anchor: np.ndarray
-    velocity: np.ndarray
-    residual: np.ndarray
-    iterations: np.ndarray
-
-
-def _advance(
-    state: _State,
-    problem: tuple[Chain, Friction, np.ndarray, np.ndarray],
-    chosen: np.ndarray,
-    delta: np.ndarray,
-    tolerance: float,
-    max_iterations: int,
-    method: str,
-) -> None:
-    """Iterate the chosen instants, moving the anchor to the slowest link as long as that still helps."""
-    body, friction, angles, rates = problem
-    todo = chosen
-    for _ in range(body.n_link):
-        moved = []
-        for link in np.unique(state.anchor[todo]):
-            members = todo[state.anchor[todo] == link]
-            batch = _Batch(body, friction, angles[:, members], rates[:, members], int(link))
-            z, residual, iterations = _iterate(
-                batch, state.velocity[:, members], delta[:, members], tolerance, max_iterations, method
-            )
-            state.iterations[members] += iterations
-            state.residual[members] = residual
-            state.velocity[:, members] = z
-            failed = residual > tolerance
-            if failed.any():
-                anchor = _slowest_link(batch, z, delta[:, members])
-                change = failed & (anchor != link)
-                state.anchor[members[change]] = anchor[change]
-                state.velocity[:, members[change]] = _rereferenced(batch, z, delta[:, members], anchor)[:, change]
-                moved.append(members[change])
-        todo = np.concatenate(moved) if moved else np.array([], dtype=int)
-        if not todo.size:
-            return

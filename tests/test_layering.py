@@ -5,13 +5,61 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes"],
-    1: ["friction", "body", "gait", "contact", "mesh"],
-    2: ["balance", "problem"],
-    3: ["fixed_point", "layout", "blocks", "kernels", "velocity_callback", "replay", "warm_start", "transcription"],
-    4: ["nlp", "solution", "problem_file", "store", "refinement"],
-    5: ["verify", "diagnosis", "continuation"],
-    6: ["optimise", "figures", "solve"],
+    0: ["arrays", "errors", "schemes", "parallel"],
+    1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
+    2: ["balance", "problem", "damped_newton", "bump_body", "ellipses"],
+    3: [
+        "fixed_point",
+        "layout",
+        "blocks",
+        "kernels",
+        "velocity_callback",
+        "replay",
+        "warm_start",
+        "transcription",
+        "smooth_balance",
+        "bump_balance",
+        "bump_callback",
+        "bump_transcription",
+    ],
+    4: [
+        "nlp",
+        "solution",
+        "problem_file",
+        "store",
+        "refinement",
+        "smooth_period",
+        "array_store",
+        "velocity_map",
+        "static_friction",
+        "motion_record",
+        "smooth_record",
+    ],
+    5: [
+        "verify",
+        "diagnosis",
+        "continuation",
+        "concertina",
+        "epsilon_study",
+        "chain_study",
+        "bump_optimum",
+        "wave_optimum",
+        "map_store",
+        "sweep",
+        "flap",
+        "study",
+    ],
+    6: [
+        "optimise",
+        "figures",
+        "figures_smooth",
+        "solve",
+        "figures_style",
+        "figures_bodies",
+        "figures_maps",
+        "figures_crawlers",
+        "figures_paper",
+    ],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
 ONLY = {"matplotlib": "figures", "h5py": "store"}
@@ -56,7 +104,16 @@ def test_heavy_libraries_are_named_in_one_kind_of_module():
 
 def test_the_numpy_side_never_loads_casadi():
     numpy_side = [m for m in LEVEL if "casadi" in {i.split(".")[0] for i in imported(modules()[m])}]
-    assert set(numpy_side) <= {"arrays", "blocks", "kernels", "velocity_callback", "transcription", "nlp"}
+    assert set(numpy_side) <= {
+        "arrays",
+        "blocks",
+        "kernels",
+        "velocity_callback",
+        "transcription",
+        "nlp",
+        "bump_callback",
+        "bump_transcription",
+    }
 
 
 def test_only_one_module_names_ipopt():
