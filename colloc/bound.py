@@ -1,0 +1,312 @@
+"""An upper bound on the efficiency of every gait of a body: derivation in docs/bound.md.
+
+The bound is the value of a convex problem: choose a potential over shape and heading (`colloc.potential`) so that the
+largest (gain / power) over all shapes, headings and rate directions is smallest. It is solved on samples, refined where
+the bound is nearly attained: Newton on a soft maximum finds the neighbourhood, a linear program with constraint
+generation (HiGHS) the optimum. What comes out is a *sampled* bound; `colloc.bound_margin` guarantees one for isotropic friction.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse.linalg
+from scipy import sparse
+from scipy.optimize import linprog
+
+from colloc.body import Chain
+from colloc.bound_sampling import Domain
+from colloc.errors import NotConvergedError, ProblemError
+from colloc.friction import Friction
+from colloc.motion import swaps_ends
+from colloc.potential import PotentialSpace, Samples
+from colloc.soft_maximum import minimise_soft_maximum
+from colloc.spline import TensorSpline
+
+VERSION = 1
+"""Part of the cache key: raise it when the computation changes its result."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much work a bound is worth.
+
+    Parameters
+    ----------
+    intervals : tuple of int
+        Knot intervals of the splines, coarse to fine; each must divide the next.
+    harmonics : tuple of int, optional
+        Harmonics in the heading; by default (1,), or (0, 1) where mu_b differs from mu_f.
+    shapes, directions : int
+        The first lattice: steps of every joint angle, and rate directions.
+    refinements : int
+        How often the lattice is halved where the bound is nearly attained.
+    linear_rounds : int
+        Rounds of constraint generation at the end.
+    """
+
+    intervals: tuple[int, ...] = (8,)
+    harmonics: tuple[int, ...] | None = None
+    shapes: int = 40
+    directions: int = 32
+    refinements: int = 4
+    linear_rounds: int = 8
+
+
+QUICK = Budget()
+THOROUGH = Budget(intervals=(8, 16), refinements=5, linear_rounds=12)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """An upper bound on the efficiency of every gait, and how well it is known.
+
+    Attributes
+    ----------
+    sampled : float
+        Largest ratio met on any sample; what lies between samples may exceed it.
+    floor : float
+        No potential of this spline space gets below this on these samples (value of the linear program).
+    guaranteed : float or None
+        Value certified between samples too (`colloc.bound_margin`), if asked for and possible.
+    missing : str
+        What keeps the sampled value from being a theorem; empty if `guaranteed` is set.
+    angles, rates : tuple of float
+        Shape and rate direction where the sampled value is taken.
+    joint_limit : float
+    intervals : int
+    harmonics : tuple of int
+    coefficients : tuple of float
+        Free coefficients of the potential (see `potential_space`).
+    samples : int
+    seconds : float
+    """
+
+    sampled: float
+    floor: float
+    guaranteed: float | None
+    missing: str
+    angles: tuple[float, ...]
+    rates: tuple[float, ...]
+    joint_limit: float
+    intervals: int
+    harmonics: tuple[int, ...]
+    coefficients: tuple[float, ...]
+    samples: int
+    seconds: float
+
+    def potential_space(self, body: Chain) -> PotentialSpace:
+        """The space `coefficients` belong to."""
+        spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals)
+        return PotentialSpace(spline, self.harmonics, swaps_ends(body))
+
+    def gap(self, efficiency: float) -> float:
+        """How far an efficiency is from the bound."""
+        return self.sampled - efficiency
+
+
+MISSING_MARGIN = "sampled at {samples} motions: not certified between them"
+MISSING_LAW = (
+    "sampled at {samples} motions: for unequal coefficients the balance has no convex potential, so neither uniqueness of the "
+    "motion nor a margin between samples is known"
+)
+
+
+def lifted(coarse: PotentialSpace, free: np.ndarray, fine: PotentialSpace) -> np.ndarray:
+    """The same potential in a space with finer knots (exact when the knots are nested)."""
+    per_joint = 2 * fine.spline.per_joint + 1
+    axis = np.linspace(-fine.spline.limit, fine.spline.limit, per_joint)
+    angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * fine.spline.n_joint, indexing="ij")])
+    old, new = coarse.spline.matrix(angles), fine.spline.matrix(angles)
+    full = coarse.coefficients(free)
+    result = np.zeros(fine.size)
+    for k, part, where in fine.layout:
+        wanted = old @ (full[k].real, full[k].imag)[part]
+        left = new @ fine.bases[part]
+        result[where] = sparse.linalg.spsolve((left.T @ left).tocsc(), left.T @ wanted)
+    return result
+
+
+def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: float = 2e-5) -> tuple[np.ndarray, float]:
+    """Constraint generation from a good start: coefficients, and the value of the last linear program.
+
+    The programs are confined to a box around the best point so far; it grows while steps succeed. The value returned is a
+    lower bound for the samples only if the box does not bind at the end; otherwise it is 0.
+    """
+    ratio, heading = samples.ratio(free)
+    best, value = free, ratio.max()
+    radius, floor = 0.02, 0.0
+    rows, constants = [], []
+
+    def cut(ratio: np.ndarray, heading: np.ndarray, window: float) -> None:
+        chosen = np.flatnonzero(ratio > ratio.max() - window)
+        if chosen.size > _LARGEST_CUT:
+            chosen = chosen[np.argsort(-ratio[chosen])[:: -(-chosen.size // _LARGEST_CUT)]]
+        matrix, constant = samples.rows(chosen, heading[chosen])
+        rows.append(matrix)
+        constants.append(constant)
+
+    cut(ratio, heading, 0.05)
+    for _ in range(rounds):
+        matrix, constant = sparse.vstack(rows, format="csr"), np.concatenate(constants)
+        cost = np.zeros(free.size + 1)
+        cost[-1] = 1.0
+        left = sparse.hstack([matrix, -np.ones((matrix.shape[0], 1))], format="csr")
+        box = [(c - radius, c + radius) for c in best] + [(0.0, None)]
+        program = linprog(cost, A_ub=left, b_ub=-constant, bounds=box, method="highs")
+        if program.status != 0:
+            raise NotConvergedError(f"the linear program of the bound failed: {program.message}")
+        trial, predicted = program.x[:-1], program.x[-1]
+        inside = np.abs(trial - best).max() < 0.999 * radius
+        ratio, heading = samples.ratio(trial)
+        cut(ratio, heading, 0.02)
+        if ratio.max() < value:
+            if value - ratio.max() > 0.5 * (value - predicted):
+                radius *= 2.0
+            best, value = trial, ratio.max()
+        else:
+            radius *= 0.4
+        if inside:
+            floor = max(floor, predicted)
+        if value - predicted < tolerance:
+            break
+    return best, floor
+
+
+_LARGEST_CUT = 2500
+
+
+def _optimised(domain: Domain, budget: Budget) -> tuple[PotentialSpace, Samples, np.ndarray, float]:
+    body = domain.body
+    harmonics = budget.harmonics or ((1,) if domain.friction.reversible else (0, 1))
+    spaces = [
+        PotentialSpace(TensorSpline(body.n_joint, domain.joint_limit, n), harmonics, swaps_ends(body)) for n in budget.intervals
+    ]
+    space = spaces[0]
+    samples = Samples(space, domain.lattice(budget.shapes, budget.directions))
+    free = np.zeros(space.size)
+    spacing, turn = 2 * domain.joint_limit / budget.shapes, np.pi / budget.directions
+    for sharpness in (10.0, 30.0, 100.0):
+        free = minimise_soft_maximum(samples, free, sharpness, 1e-4, 30)
+    for step in range(budget.refinements):
+        spacing, turn = 0.5 * spacing, 0.5 * turn
+        ratio = samples.ratio(free)[0]
+        near = np.flatnonzero(ratio > ratio.max() - max(0.04 * 0.5**step, 2e-3))
+        samples = samples.joined(domain.refined(samples.motion, near, spacing, turn))
+        finer = spaces[min(step, len(spaces) - 1)]
+        if finer is not space:
+            free = lifted(space, free, finer)
+            space, samples = finer, Samples(finer, samples.motion)
+        for sharpness in (100.0, 300.0, 1000.0)[: 2 + step // 2]:
+            free = minimise_soft_maximum(samples, free, sharpness, 1e-4, 12)
+    free, floor = linear_optimum(samples, free, budget.linear_rounds)
+    # look once more between the samples, and give the program what was found
+    for _ in range(2):
+        spacing, turn = 0.5 * spacing, 0.5 * turn
+        ratio = samples.ratio(free)[0]
+        near = np.flatnonzero(ratio > ratio.max() - 1e-3)
+        samples = samples.joined(domain.refined(samples.motion, near, spacing, turn))
+    free, floor = linear_optimum(samples, free, max(2, budget.linear_rounds // 2))
+    return space, samples, free, floor
+
+
+def compute_bound(domain: Domain, budget: Budget) -> Bound:
+    """The sampled bound, computed anew (see `efficiency_bound`)."""
+    begin = time.perf_counter()
+    space, samples, free, floor = _optimised(domain, budget)
+    check = Samples(space, domain.lattice(budget.shapes * 2 + 1, budget.directions * 2 + 1)) if budget.shapes <= 64 else samples
+    worst = samples.joined(check.motion) if check is not samples else samples
+    ratio = worst.ratio(free)[0]
+    top = int(np.argmax(ratio))
+    missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW
+    return Bound(
+        float(ratio[top]),
+        float(floor),
+        None,
+        missing.format(samples=ratio.size),
+        tuple(worst.motion.angles[:, top].tolist()),
+        tuple(worst.motion.rates[:, top].tolist()),
+        domain.joint_limit,
+        space.spline.intervals,
+        space.harmonics,
+        tuple(free.tolist()),
+        int(ratio.size),
+        time.perf_counter() - begin,
+    )
+
+
+def bound_key(domain: Domain, budget: Budget) -> str:
+    """SHA-256 of what a bound depends on."""
+    fields = {"version": VERSION, "domain": asdict(domain), "budget": asdict(budget)}
+    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()
+
+
+def load_bounds(cache: str | os.PathLike) -> dict[str, dict]:
+    """All entries of a cache file, {} if there is none."""
+    path = Path(cache)
+    if not path.exists():
+        return {}
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise ProblemError(f"the bound cache {path} cannot be read ({error}); delete it or name another.") from None
+
+
+def save_bound(cache: str | os.PathLike, key: str, bound: Bound) -> None:
+    """Add a bound to a cache file, which is replaced in one step."""
+    path = Path(cache)
+    entries = load_bounds(path)
+    entries[key] = asdict(bound)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary.write_text(json.dumps(entries))
+    temporary.replace(path)
+
+
+def efficiency_bound(
+    body: Chain,
+    friction: Friction,
+    joint_limit: float = float(np.pi),
+    *,
+    budget: Budget = QUICK,
+    cache: str | os.PathLike | None = None,
+) -> Bound:
+    """An upper bound on d/W over all gaits with |joint angles| <= joint_limit and links i, i + 2 not crossing.
+
+    Parameters
+    ----------
+    body : Chain
+        Two or three links; four are possible with a coarse budget.
+    friction : Friction
+        Coulomb friction, delta -> 0 (docs/bound.md states what finite delta changes).
+    joint_limit : float
+        At most pi.
+    budget : Budget
+    cache : path, optional
+        A JSON file where bounds are kept by the hash of all inputs.
+
+    Raises
+    ------
+    ProblemError
+        For a joint limit outside (0, pi], more than four links, or an unreadable cache.
+    """
+    if not 0 < joint_limit <= np.pi + 1e-12:
+        raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
+    if body.n_joint > 3:
+        raise ProblemError(f"bounds are computed for at most four links, not {body.n_link}: the samples fill all of shape space.")
+    domain = Domain(body, friction, float(joint_limit))
+    key = bound_key(domain, budget)
+    if cache is not None:
+        entry = load_bounds(cache).get(key)
+        if entry is not None:
+            return Bound(**{k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()})
+    bound = compute_bound(domain, budget)
+    if cache is not None:
+        save_bound(cache, key, bound)
+    return bound
