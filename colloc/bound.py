@@ -54,13 +54,13 @@ class Budget:
     intervals: tuple[int, ...] = (8,)
     harmonics: tuple[int, ...] | None = None
     shapes: int = 40
-    directions: int = 32
+    directions: int = 40
     refinements: int = 4
-    linear_rounds: int = 8
+    linear_rounds: int = 16
 
 
 QUICK = Budget()
-THOROUGH = Budget(intervals=(8, 16), refinements=5, linear_rounds=12)
+THOROUGH = Budget(intervals=(8, 16), refinements=5, linear_rounds=24)
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def lifted(coarse: PotentialSpace, free: np.ndarray, fine: PotentialSpace) -> np
     return result
 
 
-def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: float = 2e-5) -> tuple[np.ndarray, float]:
+def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: float = 3e-4) -> tuple[np.ndarray, float]:
     """Constraint generation from a good start: coefficients, and the value of the last linear program.
 
     The programs are confined to a box around the best point so far; it grows while steps succeed. The value returned is a
@@ -163,6 +163,9 @@ def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: f
         if program.status != 0:
             raise NotConvergedError(f"the linear program of the bound failed: {program.message}")
         trial, predicted = program.x[:-1], program.x[-1]
+        if matrix.shape[0] > 4 * _LARGEST_CUT:
+            tight = matrix @ trial + constant > predicted - 0.01
+            rows[:], constants[:] = [matrix[tight]], [constant[tight]]
         inside = np.abs(trial - best).max() < 0.999 * radius
         ratio, heading = samples.ratio(trial)
         cut(ratio, heading, 0.02)
@@ -171,7 +174,7 @@ def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: f
                 radius *= 2.0
             best, value = trial, ratio.max()
         else:
-            radius *= 0.4
+            radius = max(0.5 * radius, _SMALLEST_RADIUS)
         if inside:
             floor = max(floor, predicted)
         if value - predicted < tolerance:
@@ -179,7 +182,15 @@ def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: f
     return best, floor
 
 
-_LARGEST_CUT = 2500
+_LARGEST_CUT = 1000
+_LARGEST_REFINED = 1500
+_SMALLEST_RADIUS = 1e-3
+
+
+def _largest(values: np.ndarray, threshold: float, count: int) -> np.ndarray:
+    """Indices of values above the threshold, at most `count` of them, the largest."""
+    chosen = np.flatnonzero(values > threshold)
+    return chosen if chosen.size <= count else chosen[np.argpartition(-values[chosen], count)[:count]]
 
 
 def _optimised(domain: Domain, budget: Budget) -> tuple[PotentialSpace, Samples, np.ndarray, float]:
@@ -194,25 +205,26 @@ def _optimised(domain: Domain, budget: Budget) -> tuple[PotentialSpace, Samples,
     spacing, turn = 2 * domain.joint_limit / budget.shapes, np.pi / budget.directions
     for sharpness in (10.0, 30.0, 100.0):
         free = minimise_soft_maximum(samples, free, sharpness, 1e-4, 30)
+    floor = 0.0
     for step in range(budget.refinements):
         spacing, turn = 0.5 * spacing, 0.5 * turn
         ratio = samples.ratio(free)[0]
-        near = np.flatnonzero(ratio > ratio.max() - max(0.04 * 0.5**step, 2e-3))
+        near = _largest(ratio, ratio.max() - max(0.04 * 0.5**step, 4e-3), _LARGEST_REFINED)
         samples = samples.joined(domain.refined(samples.motion, near, spacing, turn))
         finer = spaces[min(step, len(spaces) - 1)]
         if finer is not space:
             free = lifted(space, free, finer)
             space, samples = finer, Samples(finer, samples.motion)
-        for sharpness in (100.0, 300.0, 1000.0)[: 2 + step // 2]:
-            free = minimise_soft_maximum(samples, free, sharpness, 1e-4, 12)
+        if step < 2 or len(budget.intervals) == 1:
+            for sharpness in (100.0, 300.0):
+                free = minimise_soft_maximum(samples, free, sharpness, 3e-4, 8)
+        free, floor = linear_optimum(samples, free, budget.linear_rounds)
+        if step >= 1:
+            # a lattice that shares no point with the first finds what refinement near the maximum cannot
+            check = domain.lattice(budget.shapes + 2 * step + 3, budget.directions + 2 * step + 3)
+            found = Samples(space, check).ratio(free)[0]
+            samples = samples.joined(check.take(_largest(found, samples.ratio(free)[0].max() - 4e-3, 10 * _LARGEST_REFINED)))
     free, floor = linear_optimum(samples, free, budget.linear_rounds)
-    # look once more between the samples, and give the program what was found
-    for _ in range(2):
-        spacing, turn = 0.5 * spacing, 0.5 * turn
-        ratio = samples.ratio(free)[0]
-        near = np.flatnonzero(ratio > ratio.max() - 1e-3)
-        samples = samples.joined(domain.refined(samples.motion, near, spacing, turn))
-    free, floor = linear_optimum(samples, free, max(2, budget.linear_rounds // 2))
     return space, samples, free, floor
 
 
@@ -220,8 +232,9 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     """The sampled bound, computed anew (see `efficiency_bound`)."""
     begin = time.perf_counter()
     space, samples, free, floor = _optimised(domain, budget)
-    check = Samples(space, domain.lattice(budget.shapes * 2 + 1, budget.directions * 2 + 1)) if budget.shapes <= 64 else samples
-    worst = samples.joined(check.motion) if check is not samples else samples
+    kept = samples.motion.take(np.flatnonzero(domain.keeps(samples.motion.angles, 0.0)))
+    check = domain.lattice(2 * budget.shapes + 1, 2 * budget.directions + 1, 0.0)
+    worst = Samples(space, kept.joined(check))
     ratio = worst.ratio(free)[0]
     top = int(np.argmax(ratio))
     missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW

@@ -11,7 +11,7 @@ from colloc.body import Chain
 from colloc.friction import Friction
 from colloc.motion import Motion, admissible, balanced_motion, fundamental, unit_directions
 
-OVERLAP = 0.05
+OVERLAP = 0.1
 """Samples reach this angle [rad] beyond shapes whose links touch, so that the edge of the admissible set is covered."""
 
 
@@ -31,20 +31,20 @@ class Domain:
     friction: Friction
     joint_limit: float
 
-    def keeps(self, angles: np.ndarray) -> np.ndarray:
+    def keeps(self, angles: np.ndarray, overlap: float = OVERLAP) -> np.ndarray:
         """Mask of shapes to sample: within the limits, links not crossing, one of each class of mirror images."""
         inside = (np.abs(angles) <= self.joint_limit + 1e-12).all(axis=0)
-        return inside & admissible(self.body, angles, OVERLAP) & fundamental(self.body, angles)
+        return inside & admissible(self.body, angles, overlap) & fundamental(self.body, angles)
 
     def motion(self, angles: np.ndarray, rates: np.ndarray) -> Motion:
         """Balanced motions; with directed friction the end swap reverses time, so both senses of every rate are sampled."""
         return balanced_motion(self.body, self.friction, angles, rates)
 
-    def lattice(self, shapes: int, directions: int) -> Motion:
+    def lattice(self, shapes: int, directions: int, overlap: float = OVERLAP) -> Motion:
         """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions."""
         axis = np.linspace(-self.joint_limit, self.joint_limit, shapes + 1)
         angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.body.n_joint, indexing="ij")])
-        angles = angles[:, self.keeps(angles)]
+        angles = angles[:, self.keeps(angles, overlap)]
         rates = unit_directions(self.body.n_joint, directions, self.friction.reversible)
         return self.motion(np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1]))
 
