@@ -17,6 +17,8 @@ from colloc.friction import Friction, link_dissipation
 _UNIT = Friction()
 _SHRINK = (0.5,) * 3 + (0.1,) * 5
 _TOLERANCE = 1e-10
+_STALLED = 1e-7
+_SOFTEST = 1e-2
 
 
 class Loaded(NamedTuple):
@@ -42,7 +44,25 @@ def _turn(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
 def loaded_balance(
     body: Chain, angles: np.ndarray, rates: np.ndarray, load: np.ndarray, start: np.ndarray, delta: float, steps: int = 40
 ) -> Loaded:
-    """Balance with unit isotropic friction under `load` ``(3, n)`` (force, torque on the middle link), from `start` ``(3, n)``."""
+    """Balance with unit isotropic friction under `load` ``(3, n)`` (force, torque on the middle link), from `start` ``(3, n)``.
+
+    Where Newton's method stalls on the creases of the potential, it is run again through falling delta.
+    """
+    state = _newton(body, angles, rates, load, start, delta, steps)
+    stalled = np.flatnonzero(state.residual.max(axis=0) > _STALLED)
+    if stalled.size:
+        again = state.velocity[:, stalled]
+        for softer in np.geomspace(_SOFTEST, delta, int(np.ceil(np.log10(_SOFTEST / delta))) + 1):
+            retried = _newton(body, angles[:, stalled], rates[:, stalled], load[:, stalled], again, softer, steps)
+            again = retried.velocity
+        for field, new in zip(state, retried, strict=True):
+            field[..., stalled] = new
+    return state
+
+
+def _newton(
+    body: Chain, angles: np.ndarray, rates: np.ndarray, load: np.ndarray, start: np.ndarray, delta: float, steps: int
+) -> Loaded:
     middle = body.n_link // 2
     lean = angles[:middle].sum(axis=0)
     length, n = body.length_column(), angles.shape[1]
