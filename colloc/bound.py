@@ -3,7 +3,8 @@
 The bound is the value of a convex problem: choose a potential over shape and heading (`colloc.potential`) so that the
 largest (gain / power) over all shapes, headings and rate directions is smallest. It is solved on samples, refined where
 the bound is nearly attained: Newton on a soft maximum finds the neighbourhood, a linear program with constraint
-generation (HiGHS) the optimum. What comes out is a *sampled* bound; `colloc.bound_margin` guarantees one for isotropic friction.
+generation (HiGHS) the optimum. What comes out is a *sampled* bound; `colloc.bound_margin`
+guarantees one for isotropic friction.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ import os
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import scipy.sparse.linalg
 from scipy import sparse
 from scipy.optimize import linprog
+from scipy.sparse.linalg import spsolve
 
 from colloc.body import Chain
 from colloc.bound_sampling import Domain
@@ -129,19 +131,19 @@ def lifted(coarse: PotentialSpace, free: np.ndarray, fine: PotentialSpace) -> np
     for k, part, where in fine.layout:
         wanted = old @ (full[k].real, full[k].imag)[part]
         left = new @ fine.bases[part]
-        result[where] = sparse.linalg.spsolve((left.T @ left).tocsc(), left.T @ wanted)
+        result[where] = spsolve((left.T @ left).tocsc(), left.T @ wanted)
     return result
 
 
 def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: float = 3e-4) -> tuple[np.ndarray, float]:
-    """Constraint generation from a good start: coefficients, and the value of the last linear program.
+    """Constraint generation from a good start: coefficients, and a lower bound for every potential of the space.
 
-    The programs are confined to a box around the best point so far; it grows while steps succeed. The value returned is a
-    lower bound for the samples only if the box does not bind at the end; otherwise it is 0.
+    The programs are confined to a box around the best point so far; it grows while steps succeed. A last program without
+    it gives the lower bound, on the samples used.
     """
     ratio, heading = samples.ratio(free)
     best, value = free, ratio.max()
-    radius, floor = 0.02, 0.0
+    radius = 0.02
     rows, constants = [], []
 
     def cut(ratio: np.ndarray, heading: np.ndarray, window: float) -> None:
@@ -152,21 +154,23 @@ def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: f
         rows.append(matrix)
         constants.append(constant)
 
-    cut(ratio, heading, 0.05)
-    for _ in range(rounds):
+    def program(radius: float) -> tuple[np.ndarray, float]:
         matrix, constant = sparse.vstack(rows, format="csr"), np.concatenate(constants)
         cost = np.zeros(free.size + 1)
         cost[-1] = 1.0
         left = sparse.hstack([matrix, -np.ones((matrix.shape[0], 1))], format="csr")
         box = [(c - radius, c + radius) for c in best] + [(0.0, None)]
-        program = linprog(cost, A_ub=left, b_ub=-constant, bounds=box, method="highs")
-        if program.status != 0:
-            raise NotConvergedError(f"the linear program of the bound failed: {program.message}")
-        trial, predicted = program.x[:-1], program.x[-1]
+        result = linprog(cost, A_ub=left, b_ub=-constant, bounds=box, method="highs")
+        if result.status != 0:
+            raise NotConvergedError(f"the linear program of the bound failed: {result.message}")
         if matrix.shape[0] > 4 * _LARGEST_CUT:
-            tight = matrix @ trial + constant > predicted - 0.01
+            tight = matrix @ result.x[:-1] + constant > result.x[-1] - 0.01
             rows[:], constants[:] = [matrix[tight]], [constant[tight]]
-        inside = np.abs(trial - best).max() < 0.999 * radius
+        return result.x[:-1], float(result.x[-1])
+
+    cut(ratio, heading, 0.05)
+    for _ in range(rounds):
+        trial, predicted = program(radius)
         ratio, heading = samples.ratio(trial)
         cut(ratio, heading, 0.02)
         if ratio.max() < value:
@@ -175,16 +179,15 @@ def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: f
             best, value = trial, ratio.max()
         else:
             radius = max(0.5 * radius, _SMALLEST_RADIUS)
-        if inside:
-            floor = max(floor, predicted)
         if value - predicted < tolerance:
             break
-    return best, floor
+    return best, program(_LARGEST_RADIUS)[1]
 
 
 _LARGEST_CUT = 1000
 _LARGEST_REFINED = 1500
-_SMALLEST_RADIUS = 1e-3
+_SURPRISE = 1e-3
+_SMALLEST_RADIUS, _LARGEST_RADIUS = 1e-3, 10.0
 
 
 def _largest(values: np.ndarray, threshold: float, count: int) -> np.ndarray:
@@ -232,10 +235,16 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     """The sampled bound, computed anew (see `efficiency_bound`)."""
     begin = time.perf_counter()
     space, samples, free, floor = _optimised(domain, budget)
-    kept = samples.motion.take(np.flatnonzero(domain.keeps(samples.motion.angles, 0.0)))
-    check = domain.lattice(2 * budget.shapes + 1, 2 * budget.directions + 1, 0.0)
-    worst = Samples(space, kept.joined(check))
-    ratio = worst.ratio(free)[0]
+    for repair in range(3):
+        inner = samples.motion.take(np.flatnonzero(domain.keeps(samples.motion.angles, 0.0)))
+        check = domain.lattice(2 * budget.shapes + 1 + 2 * repair, 2 * budget.directions + 1 + 2 * repair, 0.0)
+        worst = Samples(space, inner.joined(check))
+        ratio = worst.ratio(free)[0]
+        surprise = ratio.max() - samples.ratio(free)[0].max()
+        if surprise < _SURPRISE or repair == 2:
+            break
+        samples = samples.joined(worst.motion.take(_largest(ratio, ratio.max() - 2 * surprise, 10 * _LARGEST_REFINED)))
+        free, floor = linear_optimum(samples, free, budget.linear_rounds)
     top = int(np.argmax(ratio))
     missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW
     return Bound(
@@ -260,7 +269,7 @@ def bound_key(domain: Domain, budget: Budget) -> str:
     return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()
 
 
-def load_bounds(cache: str | os.PathLike) -> dict[str, dict]:
+def load_bounds(cache: str | os.PathLike) -> dict[str, dict[str, Any]]:
     """All entries of a cache file, {} if there is none."""
     path = Path(cache)
     if not path.exists():
@@ -312,13 +321,16 @@ def efficiency_bound(
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
     if body.n_joint > 3:
-        raise ProblemError(f"bounds are computed for at most four links, not {body.n_link}: the samples fill all of shape space.")
+        raise ProblemError(
+            f"bounds are computed for at most four links, not {body.n_link}: the samples fill all of shape space."
+        )
     domain = Domain(body, friction, float(joint_limit))
     key = bound_key(domain, budget)
     if cache is not None:
         entry = load_bounds(cache).get(key)
         if entry is not None:
-            return Bound(**{k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()})
+            fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+            return Bound(**fields)
     bound = compute_bound(domain, budget)
     if cache is not None:
         save_bound(cache, key, bound)

@@ -45,7 +45,7 @@ class Certificate:
     open_cells, cells : int
         Cells left when the time ran out, and cells examined.
     largest_multiplier : float
-        The largest M(1 + t); a gait of friction speed delta has ``d <= guaranteed W + largest_multiplier mu delta T``.
+        The largest M(1 + t) / mu of a closed cell (see `distance_allowance`).
     seconds : float
     """
 
@@ -55,6 +55,14 @@ class Certificate:
     cells: int
     largest_multiplier: float
     seconds: float
+
+    def distance_allowance(self, mu: float, delta: float, period: float = 1.0) -> float:
+        """Finite delta: a gait with delta-regularised friction has ``d <= guaranteed W + allowance``.
+
+        Its motions are within delta of minimal dissipation, and its power is at most delta below it (docs/bound.md).
+        Valid if no cell is left open.
+        """
+        return mu * (self.guaranteed + np.sqrt(2.0) * self.largest_multiplier) * delta * period
 
 
 class _Reference:
@@ -226,7 +234,8 @@ def certify(
     """
     if not friction.isotropic or body.n_link != 3 or len(set(body.lengths)) != 1 or bound.harmonics != (1,):
         raise ProblemError(
-            "a bound is guaranteed only for three equal links, isotropic friction and harmonic 1; otherwise the sampled value stands."
+            "a bound is guaranteed only for three equal links, isotropic friction and harmonic 1; "
+            "otherwise the sampled value stands."
         )
     begin = time.perf_counter()
     reference = _Reference(bound, body)
@@ -248,9 +257,7 @@ def certify(
                 out_of_time = True
                 break
             chosen = slice(first, first + _CHUNK)
-            cell_values, factors = _cell_bounds(
-                body, reference, low[:, chosen], size, multiplier * 2.0 ** (0.5 * level), delta
-            )
+            cell_values, factors = _cell_bounds(body, reference, low[:, chosen], size, multiplier * 2.0 ** (0.5 * level), delta)
             values[chosen] = np.minimum(parents[chosen], cell_values)
             closed = values[chosen] <= goal
             largest = max(largest, float(factors[closed].max(initial=0.0)))

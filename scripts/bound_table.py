@@ -1,6 +1,6 @@
 """Upper bounds for the six coefficient sets and three joint limits, kept in a cache and printed as a table.
 
-    python scripts/bound_table.py [--out results] [--limits 3.14159265 3.0 2.5]
+python scripts/bound_table.py [--out results] [--limits 3.14159265 3.0 2.5]
 """
 
 from __future__ import annotations

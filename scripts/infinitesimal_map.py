@@ -1,6 +1,6 @@
 """Map of the best infinitesimal gait over shape space (three equal links); writes JSON and a figure.
 
-    python scripts/infinitesimal_map.py [--mu MU_T MU_F MU_B] [--steps 32] [--out results]
+python scripts/infinitesimal_map.py [--mu MU_T MU_F MU_B] [--steps 32] [--out results]
 """
 
 from __future__ import annotations
