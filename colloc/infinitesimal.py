@@ -39,6 +39,16 @@ class SmallGait(NamedTuple):
         return shape[:, None] + size * corners / np.linalg.norm(sides, axis=0).sum()
 
 
+_REFINEMENTS = 4
+
+
+def _turned(angles: np.ndarray, rates: np.ndarray, turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """The shape, and directions of two joint rates on both sides of the given ones."""
+    c, s = np.cos(turn), np.sin(turn)
+    both = np.concatenate([np.array([[c, -s], [s, c]]) @ rates, np.array([[c, s], [-s, c]]) @ rates], axis=1)
+    return np.repeat(angles[:, :1], both.shape[1], axis=1), both
+
+
 def _best(motion: Motion, heading: float) -> tuple[float, np.ndarray]:
     along = np.cos(heading) * motion.velocity[0] + np.sin(heading) * motion.velocity[1]
     closed = np.vstack([motion.rates, motion.spin, motion.power])
@@ -53,7 +63,8 @@ def _best(motion: Motion, heading: float) -> tuple[float, np.ndarray]:
 def small_gait(body: Chain, friction: Friction, shape: np.ndarray, directions: int = 180, headings: int = 12) -> SmallGait:
     """Best infinitesimal gait at one shape ``(n_joint,)``, any order of the directions being equivalent at first order.
 
-    `directions` are spread over all senses of the rates, `headings` over half a turn and then refined twice about the best.
+    `directions` are spread over all senses of the rates, `headings` over half a turn (a whole one where mu_b differs from
+    mu_f); then both are refined about the best ones.
     """
     rates = unit_directions(body.n_joint, directions, half=False)
     angles = np.repeat(np.asarray(shape, dtype=float)[:, None], rates.shape[1], axis=1)
@@ -61,9 +72,12 @@ def small_gait(body: Chain, friction: Friction, shape: np.ndarray, directions: i
     turn = np.pi if friction.reversible else 2 * np.pi
     tried = np.arange(headings) * turn / headings
     best = max(((*_best(motion, float(h)), float(h)) for h in tried), key=lambda item: item[0])
-    for step in (0.5, 0.25, 0.125):
-        near = (best[2] - step * turn / headings, best[2] + step * turn / headings)
-        best = max([best, *((*_best(motion, h), h) for h in near)], key=lambda item: item[0])
+    for level in range(1, _REFINEMENTS + 1):
+        if body.n_joint == 2:
+            used = motion.rates[:, best[1] > 1e-9 * best[1].max()]
+            motion = motion.joined(balanced_motion(body, friction, *_turned(angles, used, 2 * np.pi / directions / 2**level)))
+        near = best[2] + np.array([-1.0, 0.0, 1.0]) * 0.5**level * turn / headings
+        best = max(((*_best(motion, float(h)), float(h)) for h in near), key=lambda item: item[0])
     value, weights, heading = best
     used = weights > 1e-9 * weights.max()
     return SmallGait(float(value), heading, motion.rates[:, used], weights[used])

@@ -1,6 +1,6 @@
 """Guarantee an upper bound for the isotropic three-link body; writes what was proved as JSON.
 
-    python scripts/bound_guaranteed.py --target 0.55 --seconds 300 [--limit 3.14159265] [--out results]
+python scripts/bound_guaranteed.py --target 0.55 --seconds 300 [--limit 3.14159265] [--out results]
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ def main() -> None:
         for j, b in enumerate(axis):
             shape = np.array([[a], [b]])
             if admissible(body, shape, 1e-9)[0] and fundamental(body, shape)[0]:
-                value = small_gait(body, friction, shape[:, 0], directions=90, headings=8).efficiency
+                value = small_gait(body, friction, shape[:, 0], directions=60, headings=6).efficiency
                 # mirror, exchange of the joints, and both
                 for k, m in ((i, j), (n - i, n - j), (j, i), (n - j, n - i)):
                     table[k, m] = value
