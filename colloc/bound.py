@@ -9,23 +9,20 @@ guarantees one for isotropic friction.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import time
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.optimize import linprog
 from scipy.sparse.linalg import spsolve
 
 from colloc.body import Chain
 from colloc.bound_sampling import Domain
-from colloc.errors import NotConvergedError, ProblemError
+from colloc.errors import ProblemError
 from colloc.friction import Friction
+from colloc.json_cache import hash_of, load_entries, save_entry
+from colloc.linear_bound import linear_optimum
 from colloc.motion import swaps_ends
 from colloc.potential import PotentialSpace, Samples
 from colloc.soft_maximum import minimise_soft_maximum
@@ -109,8 +106,13 @@ class Bound:
         return PotentialSpace(spline, self.harmonics, swaps_ends(body))
 
     def gap(self, efficiency: float) -> float:
-        """How far an efficiency is from the bound."""
+        """How far an efficiency is from the sampled bound."""
         return self.sampled - efficiency
+
+    def report(self, efficiency: float) -> str:
+        """One line for reports: efficiency, bound, gap, and what is proved."""
+        proved = f"guaranteed {self.guaranteed:.4f}" if self.guaranteed is not None else self.missing
+        return f"efficiency {efficiency:.4f}, upper bound {self.sampled:.4f}, gap {self.gap(efficiency):.4f} ({proved})"
 
 
 MISSING_MARGIN = "sampled at {samples} motions: not certified between them"
@@ -135,59 +137,8 @@ def lifted(coarse: PotentialSpace, free: np.ndarray, fine: PotentialSpace) -> np
     return result
 
 
-def linear_optimum(samples: Samples, free: np.ndarray, rounds: int, tolerance: float = 3e-4) -> tuple[np.ndarray, float]:
-    """Constraint generation from a good start: coefficients, and a lower bound for every potential of the space.
-
-    The programs are confined to a box around the best point so far; it grows while steps succeed. A last program without
-    it gives the lower bound, on the samples used.
-    """
-    ratio, heading = samples.ratio(free)
-    best, value = free, ratio.max()
-    radius = 0.02
-    rows, constants = [], []
-
-    def cut(ratio: np.ndarray, heading: np.ndarray, window: float) -> None:
-        chosen = np.flatnonzero(ratio > ratio.max() - window)
-        if chosen.size > _LARGEST_CUT:
-            chosen = chosen[np.argsort(-ratio[chosen])[:: -(-chosen.size // _LARGEST_CUT)]]
-        matrix, constant = samples.rows(chosen, heading[chosen])
-        rows.append(matrix)
-        constants.append(constant)
-
-    def program(radius: float) -> tuple[np.ndarray, float]:
-        matrix, constant = sparse.vstack(rows, format="csr"), np.concatenate(constants)
-        cost = np.zeros(free.size + 1)
-        cost[-1] = 1.0
-        left = sparse.hstack([matrix, -np.ones((matrix.shape[0], 1))], format="csr")
-        box = [(c - radius, c + radius) for c in best] + [(0.0, None)]
-        result = linprog(cost, A_ub=left, b_ub=-constant, bounds=box, method="highs")
-        if result.status != 0:
-            raise NotConvergedError(f"the linear program of the bound failed: {result.message}")
-        if matrix.shape[0] > 4 * _LARGEST_CUT:
-            tight = matrix @ result.x[:-1] + constant > result.x[-1] - 0.01
-            rows[:], constants[:] = [matrix[tight]], [constant[tight]]
-        return result.x[:-1], float(result.x[-1])
-
-    cut(ratio, heading, 0.05)
-    for _ in range(rounds):
-        trial, predicted = program(radius)
-        ratio, heading = samples.ratio(trial)
-        cut(ratio, heading, 0.02)
-        if ratio.max() < value:
-            if value - ratio.max() > 0.5 * (value - predicted):
-                radius *= 2.0
-            best, value = trial, ratio.max()
-        else:
-            radius = max(0.5 * radius, _SMALLEST_RADIUS)
-        if value - predicted < tolerance:
-            break
-    return best, program(_LARGEST_RADIUS)[1]
-
-
-_LARGEST_CUT = 1000
 _LARGEST_REFINED = 1500
 _SURPRISE = 1e-3
-_SMALLEST_RADIUS, _LARGEST_RADIUS = 1e-3, 10.0
 
 
 def _largest(values: np.ndarray, threshold: float, count: int) -> np.ndarray:
@@ -266,29 +217,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
     fields = {"version": VERSION, "domain": asdict(domain), "budget": asdict(budget)}
-    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()
-
-
-def load_bounds(cache: str | os.PathLike) -> dict[str, dict[str, Any]]:
-    """All entries of a cache file, {} if there is none."""
-    path = Path(cache)
-    if not path.exists():
-        return {}
-    try:
-        return json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise ProblemError(f"the bound cache {path} cannot be read ({error}); delete it or name another.") from None
-
-
-def save_bound(cache: str | os.PathLike, key: str, bound: Bound) -> None:
-    """Add a bound to a cache file, which is replaced in one step."""
-    path = Path(cache)
-    entries = load_bounds(path)
-    entries[key] = asdict(bound)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(json.dumps(entries))
-    temporary.replace(path)
+    return hash_of(fields)
 
 
 def efficiency_bound(
@@ -327,11 +256,11 @@ def efficiency_bound(
     domain = Domain(body, friction, float(joint_limit))
     key = bound_key(domain, budget)
     if cache is not None:
-        entry = load_bounds(cache).get(key)
+        entry = load_entries(cache).get(key)
         if entry is not None:
             fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
             return Bound(**fields)
     bound = compute_bound(domain, budget)
     if cache is not None:
-        save_bound(cache, key, bound)
+        save_entry(cache, key, asdict(bound))
     return bound

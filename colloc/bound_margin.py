@@ -13,6 +13,7 @@ with explicit t, a, b = O(size^2). Both components of V_c are bounded so. Cells 
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from dataclasses import dataclass
 
@@ -273,3 +274,9 @@ def certify(
     return Certificate(
         max(target, worst), target, int(parents.size), examined, largest / friction.mu_t, time.perf_counter() - begin
     )
+
+
+def with_guarantee(bound: Bound, certificate: Certificate) -> Bound:
+    """The bound together with what was proved; what is still missing is named if cells were left open."""
+    missing = "" if certificate.open_cells == 0 else f"{certificate.open_cells} of {certificate.cells} cells left open"
+    return dataclasses.replace(bound, guaranteed=certificate.guaranteed, missing=missing)

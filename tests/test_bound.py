@@ -5,10 +5,11 @@ import pytest
 
 from colloc.balance import instant, total_power
 from colloc.body import Chain
-from colloc.bound import Budget, bound_key, efficiency_bound, lifted, linear_optimum
+from colloc.bound import Budget, bound_key, efficiency_bound, lifted
 from colloc.bound_sampling import Domain
 from colloc.errors import ProblemError
 from colloc.friction import Friction
+from colloc.linear_bound import linear_optimum
 from colloc.motion import balanced_motion, fundamental
 from colloc.potential import PotentialSpace, Samples, largest_gain
 from colloc.soft_maximum import minimise_soft_maximum, soft_maximum
@@ -149,6 +150,8 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     first = efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
     monkeypatch.setattr("colloc.bound.compute_bound", lambda *_: pytest.fail("not taken from the cache"))
     assert efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache) == first
+    assert "gap 0.1000" in first.report(first.sampled - 0.1)
+    assert "not certified between" in first.report(0.3)
     keys = {
         bound_key(Domain(b, f, a), tiny)
         for b in (Chain(), Chain((0.3, 0.4, 0.3)))

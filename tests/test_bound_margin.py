@@ -5,7 +5,7 @@ import pytest
 
 from colloc.body import Chain
 from colloc.bound import Bound, Budget, efficiency_bound
-from colloc.bound_margin import _KAPPA, _cell_bounds, _Reference, certify
+from colloc.bound_margin import _KAPPA, _cell_bounds, _Reference, certify, with_guarantee
 from colloc.errors import ProblemError
 from colloc.friction import Friction
 from colloc.loaded_balance import loaded_balance
@@ -85,6 +85,7 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
     certificate = certify(BODY, Friction(), bound, 0.5, seconds=0.0)
     assert certificate.open_cells > 0
     assert certificate.guaranteed > 0.5
+    assert "left open" in with_guarantee(bound, certificate).missing
 
 
 def test_friction_without_a_potential_has_no_proof(bound):
