@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes", "parallel"],
+    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline"],
     1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
     2: ["balance", "problem", "damped_newton", "bump_body", "ellipses"],
     3: [
@@ -34,6 +34,13 @@ LEVELS = {
         "static_friction",
         "motion_record",
         "smooth_record",
+        "coulomb_motion",
+        "loaded_balance",
+        "potential",
+        "soft_maximum",
+        "linear_bound",
+        "bound_sampling",
+        "infinitesimal",
     ],
     5: [
         "verify",
@@ -48,11 +55,14 @@ LEVELS = {
         "sweep",
         "flap",
         "study",
+        "bound",
+        "bound_margin",
     ],
     6: [
         "optimise",
         "figures",
         "figures_smooth",
+        "figures_bound",
         "solve",
         "figures_style",
         "figures_bodies",
