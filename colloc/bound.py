@@ -19,11 +19,11 @@ from scipy.sparse.linalg import spsolve
 
 from colloc.body import Chain
 from colloc.bound_sampling import Domain
+from colloc.coulomb_motion import swaps_ends
 from colloc.errors import ProblemError
 from colloc.friction import Friction
 from colloc.json_cache import hash_of, load_entries, save_entry
 from colloc.linear_bound import linear_optimum
-from colloc.coulomb_motion import swaps_ends
 from colloc.potential import PotentialSpace, Samples
 from colloc.soft_maximum import minimise_soft_maximum
 from colloc.spline import TensorSpline

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.body import Chain
-from colloc.friction import Friction
 from colloc.coulomb_motion import Motion, admissible, balanced_motion, fundamental, unit_directions
+from colloc.friction import Friction
 
 OVERLAP = 0.1
 """Samples reach this angle [rad] beyond shapes whose links touch, so that the edge of the admissible set is covered."""

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.optimize import linprog
 
 from colloc.body import Chain
+from colloc.coulomb_motion import Motion, balanced_motion, unit_directions
 from colloc.errors import NotConvergedError
 from colloc.friction import Friction
-from colloc.coulomb_motion import Motion, balanced_motion, unit_directions
 
 
 class SmallGait(NamedTuple):

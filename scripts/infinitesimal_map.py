@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from colloc.body import Chain
+from colloc.coulomb_motion import admissible, fundamental
 from colloc.figures_bound import save_small_gait_map
 from colloc.friction import Friction
 from colloc.infinitesimal import small_gait
-from colloc.coulomb_motion import admissible, fundamental
 
 
 def main() -> None:

@@ -7,10 +7,10 @@ from colloc.balance import instant, total_power
 from colloc.body import Chain
 from colloc.bound import Budget, bound_key, efficiency_bound, lifted
 from colloc.bound_sampling import Domain
+from colloc.coulomb_motion import balanced_motion, fundamental
 from colloc.errors import ProblemError
 from colloc.friction import Friction
 from colloc.linear_bound import linear_optimum
-from colloc.coulomb_motion import balanced_motion, fundamental
 from colloc.potential import PotentialSpace, Samples, largest_gain
 from colloc.soft_maximum import minimise_soft_maximum, soft_maximum
 from colloc.spline import TensorSpline

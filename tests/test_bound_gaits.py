@@ -5,9 +5,9 @@ import pytest
 
 from colloc.body import Chain
 from colloc.bound import Bound, Budget, efficiency_bound
+from colloc.coulomb_motion import Motion, balanced_motion
 from colloc.friction import Friction
 from colloc.infinitesimal import small_gait
-from colloc.coulomb_motion import Motion, balanced_motion
 from colloc.potential import Samples
 
 BUDGET = Budget(intervals=(5,), shapes=14, directions=16, refinements=1, linear_rounds=5)

@@ -6,10 +6,10 @@ import pytest
 from colloc.body import Chain
 from colloc.bound import Bound, Budget, efficiency_bound
 from colloc.bound_margin import _KAPPA, _cell_bounds, _Reference, certify, with_guarantee
+from colloc.coulomb_motion import balanced_motion
 from colloc.errors import ProblemError
 from colloc.friction import Friction
 from colloc.loaded_balance import loaded_balance
-from colloc.coulomb_motion import balanced_motion
 from colloc.potential import Samples
 
 BODY = Chain()
