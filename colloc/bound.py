@@ -220,6 +220,22 @@ def bound_key(domain: Domain, budget: Budget) -> str:
     return hash_of(fields)
 
 
+def known_bound(
+    body: Chain,
+    friction: Friction,
+    joint_limit: float = float(np.pi),
+    *,
+    budget: Budget = QUICK,
+    cache: str | os.PathLike,
+) -> Bound | None:
+    """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
+    entry = load_entries(cache).get(bound_key(Domain(body, friction, float(joint_limit)), budget))
+    if entry is None:
+        return None
+    fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+    return Bound(**fields)
+
+
 def efficiency_bound(
     body: Chain,
     friction: Friction,
@@ -253,13 +269,11 @@ def efficiency_bound(
         raise ProblemError(
             f"bounds are computed for at most four links, not {body.n_link}: the samples fill all of shape space."
         )
+    known = known_bound(body, friction, joint_limit, budget=budget, cache=cache) if cache is not None else None
+    if known is not None:
+        return known
     domain = Domain(body, friction, float(joint_limit))
     key = bound_key(domain, budget)
-    if cache is not None:
-        entry = load_entries(cache).get(key)
-        if entry is not None:
-            fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
-            return Bound(**fields)
     bound = compute_bound(domain, budget)
     if cache is not None:
         save_entry(cache, key, asdict(bound))

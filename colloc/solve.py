@@ -11,12 +11,15 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from colloc.errors import CollocError, ProblemError
 from colloc.problem import Problem, Reference
 from colloc.problem_file import read_problem_file
 from colloc.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Level, Solution
+
+if TYPE_CHECKING:
+    from colloc.bound import Bound
 
 EXIT = {SOLVED: 0, NOT_CONVERGED: 3, CERTIFICATE_FAILED: 4}
 BAD_PROBLEM, INTERRUPTED = 2, 130
@@ -42,6 +45,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--formulation", choices=("map", "lifted"), help="how the balance becomes constraints")
     parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
     parser.add_argument("--output", metavar="PATH", default="results", help="folder, or .h5 file (default: results/NAME.h5)")
+    parser.add_argument(
+        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.json)"
+    )
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")
     parser.add_argument("--quiet", action="store_true", help="print the final summary only")
@@ -125,7 +131,25 @@ def _gait_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def summary_dict(solution: Solution, path: Path, reference: Reference | None) -> dict:
+def bound_line(solution: Solution, bound: Bound | None) -> str:
+    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu)."""
+    efficiency = solution.efficiency if solution.certificate is None else solution.certificate.efficiency
+    if bound is not None:
+        return f"  {bound.report(efficiency)}"
+    limit = 1.0 / solution.problem.friction.smallest
+    return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}; --bound computes a tighter one"
+
+
+def _upper_bound(problem: Problem, cache: Path, compute: bool) -> Bound | None:
+    """The bound from the cache beside the results, or computed if asked for and possible."""
+    from colloc.bound import efficiency_bound, known_bound
+
+    if compute:
+        return efficiency_bound(problem.body, problem.friction, problem.joint_limit, cache=cache)
+    return known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
+
+
+def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
     """The same as one JSON object."""
     certificate = solution.certificate
     result: dict = {
@@ -143,6 +167,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None) ->
         "gait": {key: getattr(solution.gait, key).tolist() for key in ("mean", "cos", "sin")},
         "certificate": None,
         "reference": None,
+        "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
         "versions": solution.versions,
     }
     if certificate is not None:
@@ -198,14 +223,15 @@ def _solve(
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")
     save(solution, path)
+    bound = _upper_bound(problem, path.parent / "bounds.json", options.bound)
     if not options.no_figure:
         from colloc.figures import save_figure, solution_figure
 
         save_figure(solution_figure(solution), path)
     if options.json:
-        print(json.dumps(summary_dict(solution, path, reference)))
+        print(json.dumps(summary_dict(solution, path, reference, bound)))
     else:
-        print("\n".join(summary_lines(solution, reference)))
+        print("\n".join([*summary_lines(solution, reference), bound_line(solution, bound)]))
         print(f"  saved {path}" + ("" if options.no_figure else f", {path.with_suffix('.png')}"))
     return EXIT[solution.status]
 
