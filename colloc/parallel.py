@@ -62,5 +62,17 @@ def parallel_map(
 
     if count <= 1:
         return shown(map(function, tasks))
-    with multiprocessing.get_context().Pool(count) as pool:
-        return shown(pool.imap(function, tasks))
+    # the function may carry much data (a velocity map): it travels once to each process, not with every task
+    with multiprocessing.get_context().Pool(count, _hold, (function,)) as pool:
+        return shown(pool.imap(_apply_held, tasks))
+
+
+_HELD: list[Callable[[Any], Any]] = []
+
+
+def _hold(function: Callable[[Any], Any]) -> None:
+    _HELD[:] = [function]
+
+
+def _apply_held(task: Any) -> Any:
+    return _HELD[0](task)
