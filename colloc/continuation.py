@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from colloc.closure import closed_parameters
 from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
 from colloc.problem import Problem
@@ -41,6 +42,8 @@ class _Run:
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
+        if problem.gait.symmetry == "none":
+            self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
 
     @property
     def gait(self) -> Fourier:

@@ -133,10 +133,6 @@ class Problem:
         if self.gait.symmetry == "bilateral":
             if not self.body.symmetric:
                 raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
-            if not self.friction.reversible:
-                raise ProblemError(
-                    "a bilateral gait closes its rotation only if mu_b = mu_f; use symmetry 'none' or 'antipodal'."
-                )
 
     def _check_guess(self) -> None:
         if self.guess.n_joint != self.body.n_joint:
