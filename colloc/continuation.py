@@ -26,6 +26,10 @@ FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.1
 """Trust region of the gait parameters [rad] at the first level, at later ones, and on a refined mesh: how far an optimum is
 expected to move. A region that turns out too small is moved, so it costs steps, not optima."""
 _SMALLEST_STEP = 0.8
+_RETRIES = 4
+"""A solve that has not converged after a few dozen iterations follows a kink of stick-slip in tiny steps. Hundreds more
+rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does. Between two
+levels a smaller step in delta is better still, so only a first level and a last one are retried."""
 _EXCHANGES = 4
 _REFINEMENTS = 4
 _ADMISSIBLE = 1e-8
@@ -51,8 +55,7 @@ class _Run:
 
     def attempt(self, delta: float) -> NlpResult:
         """Solve at delta from the last converged gait; take the result over if it is optimal."""
-        x = feasible_point(self.solver.transcription, self.parameters, delta)
-        result = self.solver.solve(x, delta, self.multipliers, self.radius)
+        result = self._solve(delta)
         if delta == self.problem.delta:
             # move the checks between nodes to the new gait's worst instants until none is exceeded
             for _ in range(_EXCHANGES):
@@ -65,6 +68,21 @@ class _Run:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
             self.radius = NEXT_RADIUS
+        return result
+
+    def _solve(self, delta: float) -> NlpResult:
+        """One solve; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
+        transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
+        x = feasible_point(transcription, self.parameters, delta)
+        result = self.solver.solve(x, delta, multipliers, radius)
+        stuck = not self.levels or self.levels[-1].delta == delta
+        for _ in range(_RETRIES if stuck else 0):
+            if result.optimal or not np.isfinite(result.x).all():
+                break
+            radius *= 0.5
+            own = transcription.layout.parameters[:, 0]
+            x = feasible_point(transcription, result.x[own], delta)
+            result = self.solver.solve(x, delta, None, radius).accumulated(result)
         return result
 
     def remesh(self, edges: np.ndarray) -> None:

@@ -10,6 +10,15 @@ from colloc.problem import Problem
 from colloc.solution import Solution
 from colloc.verify import certify
 
+TRIVIAL_EFFICIENCY = 1e-4
+"""Efficiency times the smallest friction coefficient below which a gait goes nowhere; the product is at most 1."""
+
+
+def is_trivial(solution: Solution) -> bool:
+    """Whether the search ended in a gait that goes nowhere, such as a retraced one: a critical point, but no optimum."""
+    last = solution.last
+    return last.optimal and abs(last.efficiency) * solution.problem.friction.smallest < TRIVIAL_EFFICIENCY
+
 
 def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Solution:
     """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
@@ -27,7 +36,12 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Sol
     """
     begin = time.perf_counter()
     solution = continue_delta(problem, on_level)
-    if solution.levels[-1].optimal:
+    if is_trivial(solution):
+        solution.message = (
+            "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
+            "efficiency). Try another guess, or an imposed symmetry."
+        )
+    elif solution.levels[-1].optimal:
         try:
             solution.certificate = certify(solution)
         except NotConvergedError as error:

@@ -17,6 +17,8 @@ from colloc.errors import ProblemError
 from colloc.gait import Fourier
 from colloc.problem import Problem
 
+LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
+SAMPLERS = (LATIN_HYPERCUBE, PERTURBED)
 BLOCK = 25
 """Starts per Latin hypercube: start k belongs to hypercube k // BLOCK, seeded by that number and the run's seed."""
 _FRACTIONS = (0.2, 0.95)
@@ -95,7 +97,7 @@ def _multiplied(problem: Problem, drawn: Fourier, fraction: float) -> Fourier:
 
 
 def perturbed_gait(problem: Problem, optima: Sequence[Fourier], seed: int, start: int, spread: float = 0.3) -> Fourier:
-    """Start number `start` near a known optimum: optima take turns, every coefficient is moved by `spread` [rad] times a normal.
+    """Start number `start` near a known optimum: optima take turns, coefficients move by normals of `spread` [rad].
 
     Where that leaves the admissible region, the whole gait is shrunk back into it.
     """
@@ -111,3 +113,12 @@ def perturbed_gait(problem: Problem, optima: Sequence[Fourier], seed: int, start
         if shape_speed(gait) > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
     raise ProblemError(f"found no admissible start within {spread:g} rad of the known optimum; change the spread.")
+
+
+def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> Fourier:
+    """The gait of start number `start` of a sampler by name; "perturbed" ones lie near the problem's own guess."""
+    if sampler not in SAMPLERS:
+        raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {sampler!r}.")
+    if sampler == PERTURBED:
+        return perturbed_gait(problem, [problem.guess], seed, start)
+    return latin_hypercube_gait(problem, seed, start)

@@ -7,11 +7,11 @@ ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
     0: ["arrays", "errors", "schemes"],
     1: ["friction", "body", "gait", "contact", "mesh"],
-    2: ["balance", "problem"],
-    3: ["fixed_point", "layout", "blocks", "kernels", "velocity_callback", "replay", "warm_start", "transcription"],
-    4: ["nlp", "solution", "problem_file", "store", "refinement"],
-    5: ["verify", "continuation"],
-    6: ["optimise", "figures", "solve"],
+    2: ["balance", "problem", "equivalence"],
+    3: ["fixed_point", "layout", "blocks", "kernels", "velocity_callback", "replay", "warm_start", "transcription", "sampling"],
+    4: ["nlp", "solution", "problem_file", "store", "refinement", "closure"],
+    5: ["verify", "continuation", "basins", "store_archive"],
+    6: ["optimise", "figures", "solve", "campaign", "multistart"],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
 ONLY = {"matplotlib": "figures", "h5py": "store"}
