@@ -26,10 +26,13 @@ FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.1
 """Trust region of the gait parameters [rad] at the first level, at later ones, and on a refined mesh: how far an optimum is
 expected to move. A region that turns out too small is moved, so it costs steps, not optima."""
 _SMALLEST_STEP = 0.8
-_RETRIES = 4
+_RETRIES = 2
 """A solve that has not converged after a few dozen iterations follows a kink of stick-slip in tiny steps. Hundreds more
 rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does. Between two
-levels a smaller step in delta is better still, so only a first level and a last one are retried."""
+levels a smaller step in delta is better still, so only solves on refined meshes are retried."""
+_FIRST_DELTAS = 4
+_LOWER_START = 0.3
+"""Where the first level fails, the next lower delta is tried, this factor below, up to so many first levels in all."""
 _EXCHANGES = 4
 _REFINEMENTS = 4
 _ADMISSIBLE = 1e-8
@@ -75,7 +78,7 @@ class _Run:
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
         x = feasible_point(transcription, self.parameters, delta)
         result = self.solver.solve(x, delta, multipliers, radius)
-        stuck = not self.levels or self.levels[-1].delta == delta
+        stuck = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
         for _ in range(_RETRIES if stuck else 0):
             if result.optimal or not np.isfinite(result.x).all():
                 break
@@ -147,7 +150,7 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
 def _descend(run: _Run) -> NlpResult:
     """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
     target = run.problem.delta
-    delta, factor, reached = run.problem.delta_start, FIRST_FACTOR, None
+    delta, factor, reached, failures = run.problem.delta_start, FIRST_FACTOR, None, 0
     while True:
         result = run.attempt(delta)
         if result.optimal:
@@ -155,8 +158,14 @@ def _descend(run: _Run) -> NlpResult:
             if delta <= target:
                 return result
             factor = max(FIRST_FACTOR, factor**2)
+        elif reached is None:
+            failures += 1
+            if failures == _FIRST_DELTAS or delta <= target:
+                return result
+            delta = max(_LOWER_START * delta, target)
+            continue
         else:
-            if reached is None or factor > _SMALLEST_STEP:
+            if factor > _SMALLEST_STEP:
                 return result
             factor = factor**0.5
         delta = reached * factor if reached * factor > 1.2 * target else target

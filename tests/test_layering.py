@@ -10,8 +10,8 @@ LEVELS = {
     2: ["balance", "problem", "equivalence"],
     3: ["fixed_point", "layout", "blocks", "kernels", "velocity_callback", "replay", "warm_start", "transcription", "sampling"],
     4: ["nlp", "solution", "problem_file", "store", "refinement", "closure"],
-    5: ["verify", "continuation", "basins", "store_archive"],
-    6: ["optimise", "figures", "solve", "campaign", "multistart"],
+    5: ["verify", "continuation", "basins", "store_archive", "delta_limit"],
+    6: ["optimise", "figures", "solve", "campaign", "multistart", "homotopy"],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
 ONLY = {"matplotlib": "figures", "h5py": "store"}
