@@ -126,21 +126,26 @@ def run_starts(
             queue = suspects if alone else waiting
             pool = executor(1 if alone else workers)
             pending: dict[Future[Outcome], int] = {}
+            submitted = False
             try:
                 while queue or pending:
                     while queue and len(pending) < (1 if alone else workers):
-                        start = queue.pop()
+                        start = queue[-1]
                         pending[pool.submit(run_start, problem, sampler, seed, start, time_limit)] = start
+                        queue.pop()
+                        submitted = True
                     for future in wait(pending, return_when=FIRST_COMPLETED).done:
                         outcome = future.result()
                         del pending[future]
                         yield outcome
             except BrokenExecutor:
+                if not submitted:
+                    raise
                 if alone:
-                    start = next(iter(pending.values()), start)
                     text = "its worker process died twice (killed, or out of memory)."
-                    yield Outcome(start, CRASHED, text, problem.guess, problem.guess)
+                    for start in pending.values():
+                        yield Outcome(start, CRASHED, text, problem.guess, problem.guess)
                 else:
-                    suspects = list(pending.values()) or [start]
+                    suspects = list(pending.values())
             finally:
                 pool.shutdown(wait=True, cancel_futures=True)

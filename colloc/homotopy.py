@@ -83,10 +83,8 @@ def continue_parameter(
     list of Step
         In the order they were solved. The target was reached if the last one is optimal and has its value.
     """
-    start = float(
-        getattr(problem, name) if "." not in name else getattr(getattr(problem, name.split(".")[0]), name.split(".")[1])
-    )
     with_parameter(problem, name, target)
+    start = float(attrgetter(name)(problem))
     logarithmic = min(start, target) > 0 and not 0.1 <= target / start <= 10
     to, back = (np.log, np.exp) if logarithmic else (float, float)
     steps: list[Step] = []
