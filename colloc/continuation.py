@@ -30,6 +30,10 @@ _RETRIES = 2
 """A solve that has not converged after a few dozen iterations follows a kink of stick-slip in tiny steps. Hundreds more
 rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does. Between two
 levels a smaller step in delta is better still, so only solves on refined meshes are retried."""
+_FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
+"""After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
+direction of sliding at a node, mu_b and mu_f give the collocated efficiency a kink, and an optimum may sit right on it:
+there first-order conditions never hold. Another mesh has its kinks elsewhere."""
 _FIRST_DELTAS = 4
 _LOWER_START = 0.3
 """Where the first level fails, the next lower delta is tried, this factor below, up to so many first levels in all."""
@@ -150,14 +154,14 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
 def _descend(run: _Run) -> NlpResult:
     """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
     target = run.problem.delta
-    delta, factor, reached, failures = run.problem.delta_start, FIRST_FACTOR, None, 0
+    delta, factor, reached, failures, meshes = run.problem.delta_start, FIRST_FACTOR, None, 0, 1
     while True:
         result = run.attempt(delta)
         if result.optimal:
             reached = delta
             if delta <= target:
                 return result
-            factor = max(FIRST_FACTOR, factor**2)
+            factor, failures = max(FIRST_FACTOR, factor**2), 0
         elif reached is None:
             failures += 1
             if failures == _FIRST_DELTAS or delta <= target:
@@ -165,9 +169,15 @@ def _descend(run: _Run) -> NlpResult:
             delta = max(_LOWER_START * delta, target)
             continue
         else:
-            if factor > _SMALLEST_STEP:
+            failures += 1
+            if failures >= _FAILURES_PER_MESH and meshes < _MESHES:
+                edges = run.solver.transcription.mesh.edges
+                run.remesh(np.linspace(0.0, edges[-1], 1 + round(_OTHER_MESH * (edges.size - 1)) | 1))
+                failures, meshes = 0, meshes + 1
+            elif factor > _SMALLEST_STEP:
                 return result
-            factor = factor**0.5
+            else:
+                factor = factor**0.5
         delta = reached * factor if reached * factor > 1.2 * target else target
 
 
