@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +26,8 @@ FIRST_FACTOR = 0.1
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.1
 """Trust region of the gait parameters [rad] at the first level, at later ones, and on a refined mesh: how far an optimum is
 expected to move. A region that turns out too small is moved, so it costs steps, not optima."""
+TRIVIAL, TRIVIAL_EFFICIENCY = "trivial gait", 1e-4
+"""Status of a level whose gait goes nowhere: efficiency times the smallest friction coefficient (at most 1) below this."""
 _SMALLEST_STEP = 0.8
 _RETRIES = 2
 """A solve that has not converged after a few dozen iterations follows a kink of stick-slip in tiny steps. Hundreds more
@@ -70,6 +73,10 @@ class _Run:
                     break
                 again = self.solver.solve(result.x, delta, (result.lam_x, result.lam_g), self.radius)
                 result = again.accumulated(result)
+        if result.optimal and abs(result.objective) * self.problem.friction.smallest < TRIVIAL_EFFICIENCY:
+            # a critical point, but no optimum: step out less far the next time
+            result = replace(result, complementarity=np.inf, status=TRIVIAL)
+            self.radius *= _LOWER_START
         self._record(delta, result)
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]

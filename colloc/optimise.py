@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import time
 
-from colloc.continuation import Report, continue_delta
+from colloc.continuation import TRIVIAL, Report, continue_delta
 from colloc.errors import NotConvergedError
 from colloc.problem import Problem
 from colloc.solution import Solution
 from colloc.verify import certify
 
-TRIVIAL_EFFICIENCY = 1e-4
-"""Efficiency times the smallest friction coefficient below which a gait goes nowhere; the product is at most 1."""
-
 
 def is_trivial(solution: Solution) -> bool:
     """Whether the search ended in a gait that goes nowhere, such as a retraced one: a critical point, but no optimum."""
-    last = solution.last
-    return last.optimal and abs(last.efficiency) * solution.problem.friction.smallest < TRIVIAL_EFFICIENCY
+    return solution.last.status == TRIVIAL
 
 
 def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Solution:

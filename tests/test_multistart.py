@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import campaign, multistart
+from colloc import campaign, continuation, multistart
 from colloc.basins import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.body import Chain
 from colloc.closure import closed_parameters, enclosed_area, net_rotations
@@ -20,7 +20,7 @@ from colloc.errors import ProblemError, StoreError
 from colloc.friction import Friction
 from colloc.gait import Fourier, Harmonic, ellipse, shifted
 from colloc.homotopy import continue_parameter, with_parameter
-from colloc.optimise import is_trivial
+from colloc.optimise import is_trivial, maximise_efficiency
 from colloc.problem import Problem
 from colloc.replay import replay
 from colloc.sampling import BLOCK, SAMPLERS, shape_speed, start_gait
@@ -136,13 +136,13 @@ def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retrac
     assert irreversibility(solution.gait) > 0.1
 
 
-def test_trivial_results_are_recognised():
-    def result(efficiency, optimal=True):
-        return SimpleNamespace(last=SimpleNamespace(optimal=optimal, efficiency=efficiency), problem=problem())
-
-    assert is_trivial(result(1e-7))
-    assert not is_trivial(result(1e-2))
-    assert not is_trivial(result(1e-7, optimal=False))
+def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
+    # with a threshold above every efficiency each level counts as going nowhere
+    monkeypatch.setattr(continuation, "TRIVIAL_EFFICIENCY", 2.0)
+    solution = maximise_efficiency(problem())
+    assert is_trivial(solution)
+    assert solution.status != SOLVED
+    assert "goes nowhere" in solution.message
 
 
 def outcome(start, gait=GAIT, efficiency=0.2, status=SOLVED):
