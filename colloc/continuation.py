@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from colloc.closure import closed_parameters
 from colloc.diagnosis import explanation, redundant_equations
 from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
@@ -25,7 +27,20 @@ FIRST_FACTOR = 0.1
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.1
 """Trust region of the gait parameters [rad] at the first level, at later ones, and on a refined mesh: how far an optimum is
 expected to move. A region that turns out too small is moved, so it costs steps, not optima."""
+TRIVIAL, TRIVIAL_EFFICIENCY = "trivial gait", 1e-4
+"""Status of a level whose gait goes nowhere: efficiency times the smallest friction coefficient (at most 1) below this."""
 _SMALLEST_STEP = 0.8
+_RETRIES = 2
+"""A solve that has not converged after a few dozen iterations follows a kink of stick-slip in tiny steps. Hundreds more
+rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does. Between two
+levels a smaller step in delta is better still, so only solves on refined meshes are retried."""
+_FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
+"""After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
+direction of sliding at a node, mu_b and mu_f give the collocated efficiency a kink, and an optimum may sit right on it:
+there first-order conditions never hold. Another mesh has its kinks elsewhere."""
+_FIRST_DELTAS = 4
+_LOWER_START = 0.3
+"""Where the first level fails, the next lower delta is tried, this factor below, up to so many first levels in all."""
 _EXCHANGES = 4
 _REFINEMENTS = 4
 _ADMISSIBLE = 1e-8
@@ -42,6 +57,8 @@ class _Run:
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
+        if problem.gait.symmetry == "none":
+            self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
 
     @property
     def gait(self) -> Fourier:
@@ -49,8 +66,7 @@ class _Run:
 
     def attempt(self, delta: float) -> NlpResult:
         """Solve at delta from the last converged gait; take the result over if it is optimal."""
-        x = feasible_point(self.solver.transcription, self.parameters, delta)
-        result = self.solver.solve(x, delta, self.multipliers, self.radius)
+        result = self._solve(delta)
         if delta == self.problem.delta:
             # move the checks between nodes to the new gait's worst instants until none is exceeded
             for _ in range(_EXCHANGES):
@@ -58,11 +74,30 @@ class _Run:
                     break
                 again = self.solver.solve(result.x, delta, (result.lam_x, result.lam_g), self.radius)
                 result = again.accumulated(result)
+        if result.optimal and abs(result.objective) * self.problem.friction.smallest < TRIVIAL_EFFICIENCY:
+            # a critical point, but no optimum: step out less far the next time
+            result = replace(result, complementarity=np.inf, status=TRIVIAL)
+            self.radius *= _LOWER_START
         self._record(delta, result)
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
             self.radius = NEXT_RADIUS
+        return result
+
+    def _solve(self, delta: float) -> NlpResult:
+        """One solve; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
+        transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
+        x = feasible_point(transcription, self.parameters, delta)
+        result = self.solver.solve(x, delta, multipliers, radius)
+        stuck = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
+        for _ in range(_RETRIES if stuck else 0):
+            if result.optimal or not np.isfinite(result.x).all():
+                break
+            radius *= 0.5
+            own = transcription.layout.parameters[:, 0]
+            x = feasible_point(transcription, result.x[own], delta)
+            result = self.solver.solve(x, delta, None, radius).accumulated(result)
         return result
 
     def remesh(self, edges: np.ndarray) -> None:
@@ -131,18 +166,30 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
 def _descend(run: _Run) -> NlpResult:
     """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
     target = run.problem.delta
-    delta, factor, reached = run.problem.delta_start, FIRST_FACTOR, None
+    delta, factor, reached, failures, meshes = run.problem.delta_start, FIRST_FACTOR, None, 0, 1
     while True:
         result = run.attempt(delta)
         if result.optimal:
             reached = delta
             if delta <= target:
                 return result
-            factor = max(FIRST_FACTOR, factor**2)
-        else:
-            if reached is None or factor > _SMALLEST_STEP:
+            factor, failures = max(FIRST_FACTOR, factor**2), 0
+        elif reached is None:
+            failures += 1
+            if failures == _FIRST_DELTAS or delta <= target:
                 return result
-            factor = factor**0.5
+            delta = max(_LOWER_START * delta, target)
+            continue
+        else:
+            failures += 1
+            if failures >= _FAILURES_PER_MESH and meshes < _MESHES:
+                edges = run.solver.transcription.mesh.edges
+                run.remesh(np.linspace(0.0, edges[-1], 1 + round(_OTHER_MESH * (edges.size - 1)) | 1))
+                failures, meshes = 0, meshes + 1
+            elif factor > _SMALLEST_STEP:
+                return result
+            else:
+                factor = factor**0.5
         delta = reached * factor if reached * factor > 1.2 * target else target
 
 

@@ -2,8 +2,9 @@
 
 Phase t runs over one period, 0 <= t <= 1. Symmetries of a gait q(t), joints counted from the tail:
 
-- ``bilateral``: q_j(-t) = -q_(n+1-j)(t). The body at -t, seen from its head, has the shape it has at t. With mu_b = mu_f
-  the net rotation vanishes (paper, appendix A) and the second half period repeats the first half's displacement and work.
+- ``bilateral``: q_j(-t) = -q_(n+1-j)(t). The body at -t, seen from its head, has the shape it has at t. For any
+  friction the net rotation vanishes (paper, appendix A; see `colloc.equivalence`) and the second half period repeats the
+  first half's displacement and work.
 - ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
 - ``none``.
 """

@@ -32,7 +32,7 @@ IPOPT_OPTIONS: dict[str, object] = {
     "warm_start_slack_bound_push": 1e-5,
     "warm_start_slack_bound_frac": 1e-5,
     "warm_start_mult_bound_push": 1e-5,
-    "max_iter": 300,
+    "max_iter": 60,
 }
 LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1}
 """With lifted forces this decides: it keeps the iterates near the balance manifold, from which a step along negative

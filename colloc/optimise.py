@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import time
 
-from colloc.continuation import Report, continue_delta
+from colloc.continuation import TRIVIAL, Report, continue_delta
 from colloc.errors import NotConvergedError
 from colloc.problem import Problem
 from colloc.solution import Solution
 from colloc.verify import certify
+
+
+def is_trivial(solution: Solution) -> bool:
+    """Whether the search ended in a gait that goes nowhere, such as a retraced one: a critical point, but no optimum."""
+    return solution.last.status == TRIVIAL
 
 
 def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Solution:
@@ -27,7 +32,12 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Sol
     """
     begin = time.perf_counter()
     solution = continue_delta(problem, on_level)
-    if solution.levels[-1].optimal:
+    if is_trivial(solution):
+        solution.message = (
+            "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
+            "efficiency). Try another guess, or an imposed symmetry."
+        )
+    elif solution.levels[-1].optimal:
         try:
             solution.certificate = certify(solution)
         except NotConvergedError as error:

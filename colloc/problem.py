@@ -130,13 +130,8 @@ class Problem:
             raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
 
     def _check_symmetry(self) -> None:
-        if self.gait.symmetry == "bilateral":
-            if not self.body.symmetric:
-                raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
-            if not self.friction.reversible:
-                raise ProblemError(
-                    "a bilateral gait closes its rotation only if mu_b = mu_f; use symmetry 'none' or 'antipodal'."
-                )
+        if self.gait.symmetry == "bilateral" and not self.body.symmetric:
+            raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
 
     def _check_guess(self) -> None:
         if self.guess.n_joint != self.body.n_joint:

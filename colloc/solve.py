@@ -25,13 +25,15 @@ EXIT = {SOLVED: 0, NOT_CONVERGED: 3, CERTIFICATE_FAILED: 4}
 BAD_PROBLEM, INTERRUPTED = 2, 130
 
 
-class _Parser(argparse.ArgumentParser):
+class Parser(argparse.ArgumentParser):
+    """Refuses bad options in one sentence, with the exit code of a bad problem."""
+
     def error(self, message: str) -> NoReturn:
         self.exit(BAD_PROBLEM, f"colloc: {message}; see {self.prog} --help.\n")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog="python -m colloc.solve",
         description="Find the gait of largest efficiency d/W for a problem file, and certify it by an independent replay.",
         epilog="Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed. "

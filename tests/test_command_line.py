@@ -56,10 +56,6 @@ BAD = {
         "cross each other",
     ),
     "mesh": (GOOD.replace("intervals=12", "intervals=1"), "mesh is too small"),
-    "symmetry and friction": (
-        GOOD.replace("PROBLEM = Problem(", "PROBLEM = Problem(friction=Friction(1, 1, 3), "),
-        "only if mu_b = mu_f",
-    ),
     "joints": (GOOD.replace("ellipse(0.0, 1.4, 0.8)", "Fourier([0], [[1]], [[1]])"), "1 joints"),
     "name": (GOOD.replace('"quick"', '"../quick"'), "name must be"),
     "still guess": (GOOD.replace("1.4, 0.8", "0.0, 0.0"), "hardly moves"),

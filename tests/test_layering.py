@@ -7,7 +7,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
     0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline"],
     1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
-    2: ["balance", "problem", "damped_newton", "bump_body", "ellipses"],
+    2: ["balance", "problem", "damped_newton", "bump_body", "ellipses", "equivalence"],
     3: [
         "fixed_point",
         "layout",
@@ -21,6 +21,7 @@ LEVELS = {
         "bump_balance",
         "bump_callback",
         "bump_transcription",
+        "sampling",
     ],
     4: [
         "nlp",
@@ -41,6 +42,7 @@ LEVELS = {
         "linear_bound",
         "bound_sampling",
         "infinitesimal",
+        "closure",
     ],
     5: [
         "verify",
@@ -57,9 +59,15 @@ LEVELS = {
         "study",
         "bound",
         "bound_margin",
+        "basins",
+        "store_archive",
+        "delta_limit",
     ],
     6: [
         "optimise",
+        "campaign",
+        "multistart",
+        "homotopy",
         "figures",
         "figures_smooth",
         "figures_bound",

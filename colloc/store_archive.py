@@ -1,0 +1,156 @@
+"""Archives of searches over many starts, as HDF5: one row a start, replaced atomically, and nothing but data.
+
+Layout (every dataset carries ``units`` and ``dims``)::
+
+    /problem   JSON text      /versions  JSON text     attributes problem_hash, sampler, seed, command
+    /outcomes/{start,status,message,efficiency,efficiency_error,distance,work,delta,iterations,seconds,cpu_seconds}
+    /outcomes/{guess,gait}/{mean,cos,sin}
+    /basins/{best_start,count,frequency,efficiency}      the distinct optima, best first
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from colloc.basins import Outcome, basins
+from colloc.errors import StoreError
+from colloc.gait import Fourier
+from colloc.problem import Problem
+from colloc.solution import versions
+
+FORMAT, FORMAT_VERSION = "colloc archive", 1
+_NUMBERS = {
+    "efficiency": "1/weight",
+    "efficiency_error": "1/weight",
+    "distance": "length",
+    "work": "weight length",
+    "delta": "length/period",
+    "iterations": "1",
+    "seconds": "s",
+    "cpu_seconds": "s",
+}
+
+
+@dataclass(eq=False)
+class Archive:
+    """A search: what was asked, and the outcomes so far by start number."""
+
+    problem: Problem
+    sampler: str
+    seed: int
+    command: str = ""
+    outcomes: dict[int, Outcome] = field(default_factory=dict)
+
+    def ordered(self) -> list[Outcome]:
+        """Outcomes by start number."""
+        return [self.outcomes[start] for start in sorted(self.outcomes)]
+
+
+def save_archive(archive: Archive, path: str | os.PathLike[str]) -> Path:
+    """Write an archive; an existing file is replaced only once the new one is complete.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be made or written.
+    """
+    path = Path(path)
+    temporary = ""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+        os.close(handle)
+        with h5py.File(temporary, "w") as file:
+            _write(file, archive)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise StoreError(f"cannot write {path}: {error.strerror or error}.") from None
+    finally:
+        if temporary:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(temporary)
+    return path
+
+
+def load_archive(path: str | os.PathLike[str]) -> Archive:
+    """The archive in a file that `save_archive` wrote.
+
+    Raises
+    ------
+    StoreError
+        If the file is missing, damaged, or not a colloc archive.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise StoreError(f"there is no file {path}.")
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise StoreError(f"{path} is an HDF5 file, but not a colloc archive.")
+            if int(file.attrs["format_version"]) > FORMAT_VERSION:
+                raise StoreError(f"{path} was written by a newer colloc; update colloc to read it.")
+            return _read(file)
+    except StoreError:
+        raise
+    except Exception as error:
+        # h5py raises many kinds for a damaged file
+        raise StoreError(f"{path} is not a readable colloc archive ({type(error).__name__}: {error}).") from None
+
+
+def _dataset(group: h5py.Group, name: str, value: list, units: str, dims: str = "start") -> None:
+    data = np.array(value, dtype=object) if units == "text" else np.array(value)
+    dataset = group.create_dataset(name, data=data, dtype=h5py.string_dtype() if units == "text" else None)
+    dataset.attrs["units"], dataset.attrs["dims"] = units, dims
+
+
+def _write(file: h5py.File, archive: Archive) -> None:
+    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    file.attrs["name"], file.attrs["problem_hash"] = archive.problem.name, archive.problem.hash
+    file.attrs["sampler"], file.attrs["seed"], file.attrs["command"] = archive.sampler, archive.seed, archive.command
+    file["problem"] = json.dumps(archive.problem.to_dict())
+    file["versions"] = json.dumps(versions())
+    outcomes = archive.ordered()
+    group = file.create_group("outcomes")
+    _dataset(group, "start", [o.start for o in outcomes], "1")
+    for name in ("status", "message"):
+        _dataset(group, name, [getattr(o, name) for o in outcomes], "text")
+    for name, units in _NUMBERS.items():
+        _dataset(group, name, [getattr(o, name) for o in outcomes], units)
+    for name in ("guess", "gait"):
+        own = group.create_group(name)
+        for part, dims in (("mean", "start, joint"), ("cos", "start, joint, harmonic"), ("sin", "start, joint, harmonic")):
+            _dataset(own, part, [getattr(getattr(o, name), part) for o in outcomes], "rad", dims)
+    found = basins(archive.problem, outcomes)
+    group = file.create_group("basins")
+    _dataset(group, "best_start", [b.best.start for b in found], "1", "basin")
+    _dataset(group, "count", [len(b.starts) for b in found], "1", "basin")
+    _dataset(group, "frequency", [b.frequency for b in found], "share of starts", "basin")
+    _dataset(group, "efficiency", [b.best.efficiency for b in found], "1/weight", "basin")
+
+
+def _read(file: h5py.File) -> Archive:
+    problem = Problem.from_dict(json.loads(file["problem"].asstr()[()]))
+    if problem.hash != file.attrs["problem_hash"]:
+        raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
+    archive = Archive(problem, str(file.attrs["sampler"]), int(file.attrs["seed"]), str(file.attrs["command"]))
+    group = file["outcomes"]
+    starts = group["start"][()]
+    if not starts.size:
+        return archive
+    status, message = group["status"].asstr()[()], group["message"].asstr()[()]
+    numbers = {name: group[name][()] for name in _NUMBERS}
+    gaits = {name: [group[name][part][()] for part in ("mean", "cos", "sin")] for name in ("guess", "gait")}
+    for row, start in enumerate(starts):
+        guess, gait = (Fourier(*(part[row] for part in gaits[name])) for name in ("guess", "gait"))
+        values = {name: column[row].item() for name, column in numbers.items()}
+        archive.outcomes[int(start)] = Outcome(int(start), str(status[row]), str(message[row]), guess, gait, **values)
+    return archive
