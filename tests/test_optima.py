@@ -63,7 +63,7 @@ def test_collocation_finds_the_maximum_of_a_grid_sweep(name, around, width, solv
     solution, reference = solved(name)
     assert solution.status == "solved"
     value, point = swept_maximum(around, width)
-    assert abs(solution.certificate.efficiency / value - 1) < 2e-4
+    assert abs(solution.certificate.efficiency / value - 1) < 1e-4
     gait = solution.gait
     np.testing.assert_allclose([abs(gait.mean[0]), gait.cos[0, 0], gait.sin[0, 0]], np.abs(point), atol=0.02)
     assert abs(solution.certificate.efficiency - reference.efficiency) < reference.tolerance
