@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ import numpy as np
 
 import colloc
 from colloc.errors import StoreError
+from colloc.replaced_file import replaced_file
 
 
 def write_arrays(
@@ -48,25 +47,14 @@ def write_arrays(
         "conventions": (colloc.__doc__ or "").strip(),
         **(attributes or {}),
     }
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-        os.close(handle)
-        try:
-            with h5py.File(name, "w") as file:
-                for key, value in arrays.items():
-                    value = np.asarray(value)
-                    plain = value.astype(h5py.string_dtype()) if value.dtype.kind in "US" else value
-                    dataset = file.create_dataset(key, data=plain, compression="gzip" if plain.size > 1000 else None)
-                    dataset.attrs["units"] = (units or {}).get(key, "1")
-                for key, value in described.items():
-                    file.attrs[key] = value if isinstance(value, (str, int, float)) else json.dumps(value)
-            os.replace(name, path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise StoreError(f"cannot write {path}: {error}.") from None
+    with replaced_file(path) as name, h5py.File(name, "w") as file:
+        for key, value in arrays.items():
+            value = np.asarray(value)
+            plain = value.astype(h5py.string_dtype()) if value.dtype.kind in "US" else value
+            dataset = file.create_dataset(key, data=plain, compression="gzip" if plain.size > 1000 else None)
+            dataset.attrs["units"] = (units or {}).get(key, "1")
+        for key, value in described.items():
+            file.attrs[key] = value if isinstance(value, (str, int, float)) else json.dumps(value)
 
 
 def read_arrays(path: Path) -> dict[str, Any]:

@@ -34,9 +34,10 @@ IPOPT_OPTIONS: dict[str, object] = {
     "warm_start_mult_bound_push": 1e-5,
     "max_iter": 60,
 }
-LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1}
-"""With lifted forces this decides: it keeps the iterates near the balance manifold, from which a step along negative
-curvature would otherwise carry them away for good. The velocity map needs no such leash, and is slowed by it."""
+LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
+"""With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along
+negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
+needs no such leash and is slowed by it."""
 
 
 @dataclass(frozen=True, eq=False)

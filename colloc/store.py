@@ -11,11 +11,9 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import os
-import tempfile
 from pathlib import Path
 
 import h5py
@@ -23,6 +21,7 @@ import numpy as np
 
 from colloc.errors import CollocError, StoreError
 from colloc.problem import Problem
+from colloc.replaced_file import replaced_file
 from colloc.solution import Certificate, Check, Level, Solution
 
 FORMAT, FORMAT_VERSION = "colloc solution", 1
@@ -40,24 +39,8 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
         If the folder cannot be made or written.
     """
     path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-        os.close(handle)
-    except OSError as error:
-        raise StoreError(f"cannot write to {path.parent}: {error.strerror or error}.") from None
-    try:
-        with h5py.File(temporary, "w") as file:
-            _write(file, solution)
-        with open(temporary, "rb") as written:
-            os.fsync(written.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise StoreError(f"cannot write {path}: {error.strerror or error}.") from None
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(temporary)
+    with replaced_file(path) as temporary, h5py.File(temporary, "w") as file:
+        _write(file, solution)
     return path
 
 

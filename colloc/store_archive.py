@@ -10,10 +10,8 @@ Layout (every dataset carries ``units`` and ``dims``)::
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -24,6 +22,7 @@ from colloc.basins import Outcome, basins
 from colloc.errors import StoreError
 from colloc.gait import Fourier
 from colloc.problem import Problem
+from colloc.replaced_file import replaced_file
 from colloc.solution import versions
 
 FORMAT, FORMAT_VERSION = "colloc archive", 1
@@ -63,21 +62,8 @@ def save_archive(archive: Archive, path: str | os.PathLike[str]) -> Path:
         If the folder cannot be made or written.
     """
     path = Path(path)
-    temporary = ""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-        os.close(handle)
-        with h5py.File(temporary, "w") as file:
-            _write(file, archive)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise StoreError(f"cannot write {path}: {error.strerror or error}.") from None
-    finally:
-        if temporary:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(temporary)
+    with replaced_file(path) as temporary, h5py.File(temporary, "w") as file:
+        _write(file, archive)
     return path
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline"],
+    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file"],
     1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
     2: ["balance", "problem", "damped_newton", "bump_body", "ellipses", "equivalence"],
     3: [
