@@ -43,6 +43,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--delta-start", type=float, metavar="SPEED", help="where the continuation in delta begins")
     parser.add_argument("--time-limit", type=float, default=300.0, metavar="S", help="seconds for one start (default: 300)")
     parser.add_argument("--retry", action="store_true", help="solve again what ended in an error, a crash or the time limit")
+    parser.add_argument(
+        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.json)"
+    )
     parser.add_argument("--output", metavar="PATH", default="results", help="folder, or .h5 (default: results/NAME.starts.h5)")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")
     parser.add_argument("--quiet", action="store_true", help="print the final summary only")
@@ -132,6 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(problem: Problem, path: Path, options: argparse.Namespace, command: str) -> int:
     # heavy imports only now: a bad problem is refused at once
     from colloc.campaign import run_starts
+    from colloc.gap import gap_line, upper_bound
     from colloc.store_archive import Archive, load_archive, save_archive
 
     quiet = options.quiet or options.json
@@ -165,7 +169,11 @@ def _run(problem: Problem, path: Path, options: argparse.Namespace, command: str
     if options.json:
         print(json.dumps(summary_dict(problem, outcomes, found, path)))
     else:
-        print("\n".join([*summary_lines(problem, outcomes, found), f"  saved {path}"]))
+        lines = summary_lines(problem, outcomes, found)
+        if found:
+            best = max(basin.best.efficiency for basin in found)
+            lines.append(gap_line(problem, best, upper_bound(problem, path.parent, compute=options.bound)))
+        print("\n".join([*lines, f"  saved {path}"]))
     if interrupted:
         print("colloc: interrupted; run the same command again to go on.", file=sys.stderr)
         return INTERRUPTED

@@ -133,24 +133,6 @@ def _gait_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def bound_line(solution: Solution, bound: Bound | None) -> str:
-    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu)."""
-    efficiency = solution.efficiency if solution.certificate is None else solution.certificate.efficiency
-    if bound is not None:
-        return f"  {bound.report(efficiency)}"
-    limit = 1.0 / solution.problem.friction.smallest
-    return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}; --bound computes a tighter one"
-
-
-def _upper_bound(problem: Problem, cache: Path, compute: bool) -> Bound | None:
-    """The bound from the cache beside the results, or computed if asked for and possible."""
-    from colloc.bound import efficiency_bound, known_bound
-
-    if compute:
-        return efficiency_bound(problem.body, problem.friction, problem.joint_limit, cache=cache)
-    return known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
-
-
 def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
     """The same as one JSON object."""
     certificate = solution.certificate
@@ -210,6 +192,7 @@ def _solve(
     problem: Problem, source: str, reference: Reference | None, path: Path, options: argparse.Namespace, quiet: bool
 ) -> int:
     # heavy imports only now: a bad problem is refused at once
+    from colloc.gap import gap_line, upper_bound
     from colloc.optimise import maximise_efficiency
     from colloc.store import save
 
@@ -225,7 +208,8 @@ def _solve(
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")
     save(solution, path)
-    bound = _upper_bound(problem, path.parent / "bounds.json", options.bound)
+    bound = upper_bound(problem, path.parent, compute=options.bound)
+    efficiency = solution.efficiency if solution.certificate is None else solution.certificate.efficiency
     if not options.no_figure:
         from colloc.figures import save_figure, solution_figure
 
@@ -233,7 +217,7 @@ def _solve(
     if options.json:
         print(json.dumps(summary_dict(solution, path, reference, bound)))
     else:
-        print("\n".join([*summary_lines(solution, reference), bound_line(solution, bound)]))
+        print("\n".join([*summary_lines(solution, reference), gap_line(problem, efficiency, bound)]))
         print(f"  saved {path}" + ("" if options.no_figure else f", {path.with_suffix('.png')}"))
     return EXIT[solution.status]
 

@@ -67,6 +67,7 @@ LEVELS = {
         "optimise",
         "campaign",
         "multistart",
+        "gap",
         "homotopy",
         "figures",
         "figures_smooth",
