@@ -25,6 +25,7 @@ _BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
 _ROUNDING = 8e-16
 _FIXED_POINT_STEPS_AFTER_FAILURE = 3
 _DIRECT_ITERATIONS = 60
+_DRY, _VISCOUS = 1e-100, 1e8
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
 METHODS = ("auto", "newton", "fixed_point")
 
@@ -47,6 +48,24 @@ class Batch(Protocol):
         """The slowest reference ``(n,)`` of every instant, and its velocity ``(3, n)``, for z in the batch's own."""
 
 
+def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
+    """Regularisation ``(1, n_time)`` in units of the largest rate ``(n_time,)``.
+
+    Beyond the limits the law has reached its viscous or its dry limit to the last digit, but its squares would overflow.
+    """
+    with np.errstate(over="ignore", under="ignore"):
+        return np.clip(delta / speed, _DRY, _VISCOUS)[None]
+
+
+def force_unit(friction: Friction, delta: np.ndarray) -> np.ndarray:
+    """Friction on a body that moves at unit speed: the largest coefficient where delta is small.
+
+    Above unit delta friction is viscous and falls with delta; a residual in units of the coefficient would then vanish
+    whatever the velocity.
+    """
+    return friction.largest / np.hypot(1.0, delta)
+
+
 MakeBatch = Callable[[np.ndarray, int], Batch]
 """Makes the batch of some instants (indices) with a given reference."""
 
@@ -60,7 +79,8 @@ class State:
     anchor : (n_time,)
     velocity : (3, n_time)
     residual : (n_time,)
-        Largest of |net force| and |torque about the anchor| / body length, in units of the largest coefficient.
+        Largest of |net force| and |torque about the anchor| / body length, in units of the friction at unit speed (see
+        `force_unit`).
     iterations : (n_time,)
     """
 
@@ -151,7 +171,7 @@ def iterate(
     active = np.arange(n_time)
     links, force, merit = batch.evaluate(active, z, delta)
     while True:
-        residual[active] = np.abs(force).max(axis=0) / batch.friction.largest
+        residual[active] = np.abs(force).max(axis=0) / force_unit(batch.friction, delta[0, active])
         keep = (residual[active] > tolerance) & (iterations[active] < max_iterations)
         if not keep.any():
             return z, residual, iterations

@@ -18,7 +18,7 @@ import numpy as np
 
 from colloc.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
 from colloc.body import TAIL, Chain, LinkVelocity, Posture
-from colloc.damped_newton import METHODS, solve, solve3, starting_state
+from colloc.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
 from colloc.errors import NotConvergedError, ProblemError
 from colloc.friction import Friction, link_dissipation
 
@@ -32,7 +32,8 @@ class BalanceSolution:
     z : (3, n_time)
         Tail velocity (u, v, omega) in the body frame.
     residual : (n_time,)
-        Largest of |net force| and |torque about the anchor| / body length, in units of the largest coefficient.
+        Largest of |net force| and |torque about the anchor| / body length, in units of the friction on a body that moves at
+        the largest rate: the largest coefficient, or less where delta exceeds that rate.
     iterations : (n_time,)
         Newton and fixed-point steps taken.
     converged : (n_time,)
@@ -135,7 +136,7 @@ def solve_balance(
     start : (3, n_time), optional
         Tail velocities to start from; by default the links' mean rotation is taken out of a body at rest.
     tolerance : float
-        Largest net force or torque (over the largest coefficient) at which an instant counts as converged.
+        Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
         Steps allowed to an instant in each of at most three attempts.
     method : {"auto", "newton", "fixed_point"}
@@ -173,7 +174,7 @@ def solve_balance(
     # work in units of the largest rate: the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
     speed[speed == 0] = 1.0
-    scaled_rates, scaled_delta = rates / speed, (delta / speed)[None]
+    scaled_rates, scaled_delta = rates / speed, relative_delta(delta, speed)
     tail = _Batch(body, friction, angles, scaled_rates, TAIL)
     anchor = np.full(n_time, body.n_link // 2)
     velocity = np.zeros((3, n_time)) if start is None else tail.rereferenced(z / speed, scaled_delta, anchor)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.curve import Curve, Panels, curve, node_velocity, pulled_back, resultant
-from colloc.damped_newton import solve, solve3, starting_state
+from colloc.damped_newton import relative_delta, solve, solve3, starting_state
 from colloc.errors import NotConvergedError, ProblemError
 from colloc.friction import Friction
 from colloc.motion import Motion
@@ -35,7 +35,7 @@ class SmoothSolution:
     power : rate of work against friction
     power_inside : the part of it done on the arcs `regions`
     slowest : smallest speed of a whole panel: how fast the part at stick creeps
-    residual : largest net force or torque over the largest coefficient
+    residual : largest net force or torque, in units as in `colloc.damped_newton.State`
     quadrature_error : largest panel's difference from its halves, in force or power
     panels : panels used
     iterations : steps taken, over all refinements
@@ -219,7 +219,7 @@ def solve_smooth(
         fields = _Fields(motion, t[active], grid)
         # work in units of the largest rate: the law is homogeneous once delta scales along
         speed = fields.speed
-        d = (delta / speed)[None]
+        d = relative_delta(delta, speed)
 
         def make(members: np.ndarray, reference: int, fields: _Fields = fields) -> _Batch:
             return _Batch(fields, friction, members, reference)
