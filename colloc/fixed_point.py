@@ -111,6 +111,17 @@ class _Batch:
         return np.stack([vs * c - vn * s, vs * s + vn * c, w])
 
 
+def _real(name: str, values: np.ndarray) -> np.ndarray:
+    """A two-dimensional array of floats, or a `ProblemError`."""
+    try:
+        array = np.atleast_2d(np.asarray(values))
+    except ValueError:  # rows of different lengths
+        array = np.array([[None]])
+    if array.dtype.kind not in "iuf":
+        raise ProblemError(f"{name} must be an array of real numbers, not {values!r:.80}.")
+    return array.astype(float)
+
+
 def solve_balance(
     body: Chain,
     friction: Friction,
@@ -150,24 +161,25 @@ def solve_balance(
     Raises
     ------
     ProblemError
-        For arrays of wrong shape, non-finite numbers or delta that is not positive.
+        For arrays of wrong shape or kind, non-finite numbers, or delta or tolerance that are not positive.
     """
-    angles, rates = np.array(angles, dtype=float, ndmin=2), np.array(rates, dtype=float, ndmin=2)
+    angles, rates = _real("angles", angles), _real("rates", rates)
     n_time = angles.shape[1]
     if angles.shape != (body.n_joint, n_time) or rates.shape != angles.shape:
         raise ProblemError(
             f"angles and rates must both have shape (n_joint, n_time) = ({body.n_joint}, n), "
             f"not {angles.shape} and {rates.shape}."
         )
-    if not (np.isfinite(delta) and delta > 0):
-        raise ProblemError(f"delta must be a positive finite number, not {delta!r}.")
+    for name, value in (("delta", delta), ("tolerance", tolerance)):
+        if not (isinstance(value, (int, float, np.number)) and np.isfinite(value) and value > 0):
+            raise ProblemError(f"{name} must be a positive finite number, not {value!r}.")
     if method not in METHODS:
         raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
     if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
         raise ProblemError("angles and rates must be finite.")
     z = np.zeros((3, n_time))
     if start is not None:
-        z = np.array(start, dtype=float)
+        z = _real("start", start)
         if z.shape != (3, n_time) or not np.isfinite(z).all():
             raise ProblemError(f"start must be finite with shape (3, {n_time}).")
 

@@ -10,6 +10,15 @@ from colloc.problem import Problem
 from colloc.solution import Solution
 from colloc.verify import certify
 
+FINER = "more intervals or a smaller mesh_tolerance"
+ADVICE = {
+    "joint limits": "another guess or a smaller joint_limit",
+    "self-contact": "another guess or a smaller joint_limit",
+    "delta influence": "a smaller delta",
+    "delta step": "a smaller delta",
+}
+"""What helps against a check that failed; anything else is a matter of the mesh."""
+
 
 def is_trivial(solution: Solution) -> bool:
     """Whether the search ended in a gait that goes nowhere, such as a retraced one: a critical point, but no optimum."""
@@ -43,8 +52,10 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Sol
         except NotConvergedError as error:
             solution.message = f"the replay failed: {error}"
         else:
-            failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in solution.certificate.failures)
-            if failures:
-                solution.message = f"the certificate failed: {failures}. Try more intervals or a smaller mesh_tolerance."
+            failed = solution.certificate.failures
+            if failed:
+                failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
+                advice = " and ".join(dict.fromkeys(ADVICE.get(c.name, FINER) for c in failed))
+                solution.message = f"the certificate failed: {failures}. Try {advice}."
     solution.seconds = time.perf_counter() - begin
     return solution

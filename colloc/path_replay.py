@@ -14,6 +14,7 @@ from scipy.integrate import cumulative_simpson, simpson
 
 from colloc.balance import Instant, instant, total_power
 from colloc.body import Chain
+from colloc.errors import ProblemError
 from colloc.fixed_point import solve_balance
 from colloc.friction import Friction
 
@@ -113,13 +114,19 @@ def replay(
 
     Raises
     ------
+    ProblemError
+        If the path does not move, or the grid is too small.
     NotConvergedError
         If the balance cannot be solved at some instant.
     """
+    if instants < 4 or instants % 2:
+        raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
     grid = _at(body, friction, path, delta, np.linspace(0.0, 1.0, instants + 1))
     while True:
         fine = _integrated(*grid)
         coarse = _integrated(*(a[::2] for a in grid))
+        if not (fine[1] > 0 and coarse[1] > 0):
+            raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
         # kinks at stick limit the order to two: the difference over three estimates the finer grid's error
         efficiency, before = fine[0] / fine[1], coarse[0] / coarse[1]
         error = abs(efficiency - before) / 3 / max(abs(efficiency), 1e-300)

@@ -1,0 +1,165 @@
+"""Instants at stick, at folds, frozen, straight, with extreme coefficients and delta: the answer, or a clear refusal.
+
+The reference is a 40-digit Newton iteration on textbook antiderivatives (`benchmarks.reference`), which shares nothing
+with the solver. A residual of 1e-11 of the largest coefficient leaves the velocity of a body whose smallest coefficient
+is c times less uncertain by c times as much, so that is the accuracy asked for.
+"""
+
+import itertools
+
+import mpmath as mp
+import numpy as np
+import pytest
+from cases import COEFFICIENTS, DELTAS, HARD
+
+from benchmarks.reference import balanced_velocity
+from colloc.balance import instant, net_force, total_power
+from colloc.body import Chain
+from colloc.fixed_point import solve_balance
+from colloc.friction import Friction
+from colloc.static_friction import SYMMETRIC_CASES, WORKED_CASES
+
+BODY = Chain()
+NAMES = list(HARD)
+ANGLES = np.array([HARD[name][0] for name in NAMES]).T
+RATES = np.array([HARD[name][1] for name in NAMES]).T
+SPEED = np.abs(RATES).max(axis=0)
+
+
+def errors(coefficients, delta, solved, chosen):
+    """Distance of the anchor's velocity from the reference, over the largest rate, for the chosen cases."""
+    result = {}
+    for k in chosen:
+        anchor, velocity = int(solved.anchor[k]), solved.anchor_velocity[:, k]
+        exact = balanced_velocity(BODY.lengths, coefficients, ANGLES[:, k], RATES[:, k], delta, anchor, velocity)
+        result[NAMES[k]] = max(abs(float(e - mp.mpf(v))) for e, v in zip(exact, velocity, strict=True)) / SPEED[k]
+    return result
+
+
+@pytest.mark.parametrize("delta", DELTAS)
+@pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
+def test_every_hard_instant_converges(coefficients, delta):
+    solved = solve_balance(BODY, Friction(*coefficients), ANGLES, RATES, delta)
+    assert solved.converged.all(), [NAMES[k] for k in np.flatnonzero(~solved.converged)]
+    assert np.isfinite(solved.z).all()
+    assert solved.residual.max() <= 1e-11
+
+
+@pytest.mark.parametrize("delta", [1.0, 1e-4, 1e-12])
+def test_every_hard_instant_is_the_one_answer_of_isotropic_friction(delta):
+    solved = solve_balance(BODY, Friction(), ANGLES, RATES, delta)
+    found = errors((1, 1, 1), delta, solved, range(len(NAMES)))
+    assert max(found.values()) < 1e-10, found
+
+
+@pytest.mark.parametrize("coefficients", [(1.7, 1.0, 1.3), (100.0, 0.01, 1.0), (0.01, 100.0, 1.0)], ids=str)
+def test_hard_instants_are_roots_for_unequal_coefficients(coefficients):
+    for delta in (1e-4, 1e-12):
+        solved = solve_balance(BODY, Friction(*coefficients), ANGLES, RATES, delta)
+        found = errors(coefficients, delta, solved, range(0, len(NAMES), 2))
+        assert max(found.values()) < 1e-10 * max(coefficients) / min(coefficients), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delta", DELTAS)
+@pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
+def test_every_hard_instant_against_the_reference(coefficients, delta):
+    solved = solve_balance(BODY, Friction(*coefficients), ANGLES, RATES, delta)
+    found = errors(coefficients, delta, solved, range(len(NAMES)))
+    assert max(found.values()) < 1e-10 * max(coefficients) / min(coefficients), found
+
+
+def test_coefficients_equal_up_to_rounding_give_the_isotropic_answer():
+    one, other = (solve_balance(BODY, Friction(1, mu_f, 1), ANGLES, RATES, 1e-8).z for mu_f in (1.0, 1.0 + 1e-15))
+    np.testing.assert_allclose(one / SPEED, other / SPEED, atol=1e-10)
+
+
+@pytest.mark.parametrize("case", [*WORKED_CASES, *SYMMETRIC_CASES], ids=lambda c: f"{c.what[:20]}")
+def test_at_stick_the_velocity_tends_to_its_limit_linearly_in_delta(case):
+    angles, rates = np.array(case.angles)[:, None], np.array(case.rates)[:, None]
+    z = [solve_balance(BODY, Friction(), angles, rates, delta).require().z for delta in (1e-4, 1e-5, 1e-6, 1e-13)]
+    away = [np.abs(value - z[-1]).max() for value in z[:-1]]
+    assert away[0] < 1e-2
+    for coarse, fine in itertools.pairwise(away):
+        assert 5 < coarse / fine < 20
+
+
+@pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
+def test_frozen_joints_leave_the_body_exactly_at_rest(coefficients):
+    rest = np.zeros_like(RATES)
+    for delta in (1.0, 1e-4, 1e-14):
+        assert np.array_equal(solve_balance(BODY, Friction(*coefficients), ANGLES, rest, delta).z, np.zeros((3, len(NAMES))))
+
+
+def test_frozen_joints_come_to_rest_from_any_start():
+    rng = np.random.default_rng(3)
+    for scale in (1.0, 1e6):
+        start = scale * rng.normal(size=(3, len(NAMES)))
+        solved = solve_balance(BODY, Friction(1.7, 1, 1.3), ANGLES, np.zeros_like(RATES), 1e-4, start=start)
+        assert solved.converged.all()
+        # at rest the force is viscous, about mu v / delta: the residual bounds the speed
+        assert np.abs(solved.z).max() < 1e-11
+
+
+@pytest.mark.parametrize("coefficients", COEFFICIENTS[:7], ids=str)
+def test_the_answer_does_not_depend_on_a_start_1e6_away(coefficients):
+    rng = np.random.default_rng(4)
+    friction, chosen = Friction(*coefficients), SPEED == 1
+    angles, rates = ANGLES[:, chosen], RATES[:, chosen]
+    for delta in (1e-2, 1e-8):
+        near = solve_balance(BODY, friction, angles, rates, delta)
+        far = solve_balance(BODY, friction, angles, rates, delta, start=1e6 * rng.normal(size=(3, angles.shape[1])))
+        assert far.converged.all()
+        ratio = friction.largest / friction.smallest
+        np.testing.assert_allclose(far.z, near.z, atol=2e-10 * ratio)
+
+
+def test_a_joint_at_1e9_of_the_other_moves_the_body_like_a_frozen_one():
+    angles = ANGLES[:, :12]
+    for friction in (Friction(), Friction(10, 1, 1), Friction(0.5, 1, 5)):
+        z = [solve_balance(BODY, friction, angles, np.full_like(angles, 1.0) * [[1.0], [r]], 1e-6).z for r in (0, 1e-9, -1e-9)]
+        # at delta = 1e-6 a held link yields by about delta per unit force: 1e-9 of rate can do no more than that
+        np.testing.assert_allclose(z[1], z[0], atol=1e-8)
+        np.testing.assert_allclose(z[2], z[0], atol=1e-8)
+
+
+@pytest.mark.parametrize("coefficients", COEFFICIENTS[:7], ids=str)
+def test_mirror_images_of_a_straight_body_cannot_move_it_along_itself(coefficients):
+    """Opposite bends of a straight body: the reflected motion is the same one, seen from the other side."""
+    angles, rates = np.zeros((2, 1)), np.array([[1.0], [-1.0]])
+    for delta in (1.0, 1e-4, 1e-12):
+        solved = solve_balance(BODY, Friction(*coefficients), angles, rates, delta).require()
+        assert abs(solved.z[0, 0]) < 1e-13
+
+
+@pytest.mark.parametrize("lengths", [(1 / 3, 1 / 3, 1 / 3), (0.1, 0.6, 0.3), (0.001, 0.998, 0.001)])
+def test_a_straight_body_sliding_along_itself_meets_coulomb_friction_exactly(lengths):
+    body, friction = Chain(lengths), Friction(7.0, 2.0, 5.0)
+    still = np.zeros((2, 2))
+    z = np.array([[3.0, -3.0], [0.0, 0.0], [0.0, 0.0]])
+    for delta in (1e-3, 1e-9, 1e-14):
+        now = instant(body, friction, still, still, z, delta)
+        expected = np.array([[-2.0, 5.0], [0.0, 0.0], [0.0, 0.0]]) * 3 / np.hypot(3, delta)
+        np.testing.assert_allclose(net_force(now.posture, now.force), expected, atol=1e-14)
+        np.testing.assert_allclose(total_power(now.velocity, now.force)[0], 3 * np.abs(expected[0]), rtol=1e-14)
+
+
+def test_rates_below_delta_are_solved_to_their_own_scale():
+    """Viscous limit: the velocity is linear in the rates, whatever their size, and does not depend on delta."""
+    angles, rates = ANGLES[:, 7:12], np.array([[1.0], [0.3]]) * np.ones((1, 5))
+    for coefficients in COEFFICIENTS[:7]:
+        friction = Friction(*coefficients)
+        z = [solve_balance(BODY, friction, angles, k * rates, 1.0).require().z / k for k in (1e-6, 1e-12, 1e-100, 1e-300)]
+        for other in z[1:]:
+            np.testing.assert_allclose(other, z[0], atol=2e-10 * friction.largest / friction.smallest)
+
+
+def test_rates_and_delta_over_600_decades_do_not_overflow():
+    angles, rates = np.array([[1.1], [-0.6]]), np.array([[1.0], [0.3]])
+    dry = solve_balance(BODY, Friction(), angles, rates, 1e-13).z
+    for k in (1e-290, 1e-100, 1e100, 1e290):
+        solved = solve_balance(BODY, Friction(), angles, k * rates, max(k * 1e-13, 5e-324))
+        assert solved.converged.all()
+        np.testing.assert_allclose(solved.z / k, dry, atol=1e-11)
+    for delta in (5e-324, 1e-200, 1e200):
+        assert solve_balance(BODY, Friction(), angles, rates, delta).converged.all()

@@ -1,0 +1,116 @@
+"""Gaits of vanishing amplitude, gaits that touch themselves, meshes too coarse for delta: certified, or refused in words."""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, maximise_efficiency, replay
+from colloc.contact import crossing_depth
+from colloc.solution import CERTIFICATE_FAILED, SOLVED
+
+BODY = Chain()
+BILATERAL = Harmonic(1, "bilateral")
+FINE = np.arange(4000) / 4000
+TOUCHING = 2 * np.pi / 3
+
+
+def replayed(gait, delta, **settings):
+    return replay(BODY, Friction(), lambda t: (gait.angles(t), gait.rates(t)), delta, **settings)
+
+
+def test_small_gaits_scale_down_to_amplitude_1e_8():
+    """About a shape, distance falls with the square of the amplitude and work with the amplitude itself."""
+    sizes = np.array([1e-3, 1e-4, 1e-6, 1e-8])
+    runs = [replayed(ellipse(1.0, a, 0.7 * a), 1e-4 * a) for a in sizes]
+    np.testing.assert_allclose([r.distance for r in runs] / sizes**2, runs[-1].distance / sizes[-1] ** 2, rtol=2e-3)
+    np.testing.assert_allclose([r.work for r in runs] / sizes, runs[-1].work / sizes[-1], rtol=2e-3)
+    for run in runs:
+        assert run.residual < 1e-11
+        assert run.actuator_work == pytest.approx(run.work, rel=1e-9)
+
+
+def test_gaits_slower_than_delta_are_viscous_and_go_nowhere():
+    """Linear drag, equal in all directions: its sum is the velocity of the centre of mass, which therefore rests."""
+    runs = [replayed(ellipse(1.0, a, 0.7 * a), 1e-4, instants=200, most_instants=200) for a in (1e-6, 1e-7, 1e-8)]
+    assert runs[1].work / runs[2].work == pytest.approx(100, rel=1e-4)
+    dry = replayed(ellipse(1.0, 1e-6, 0.7e-6), 1e-10)
+    assert dry.distance == pytest.approx(3.503e-14, rel=1e-3)  # 0.035 amplitude^2, from amplitudes of 1e-2 and 1e-4 too
+    for run, size in zip(runs, (1e-6, 1e-7, 1e-8), strict=True):
+        assert run.distance < 1e-3 * dry.distance * (size / 1e-6) ** 2
+
+
+def test_a_guess_that_hardly_moves_is_refused():
+    with pytest.raises(ProblemError, match="hardly moves"):
+        Problem("small", ellipse(1.0, 1e-6, 0.7e-6), gait=BILATERAL)
+
+
+def test_an_optimum_in_the_viscous_regime_is_not_called_solved():
+    problem = Problem(
+        "small", ellipse(1.0, 1e-6, 0.7e-6), gait=BILATERAL, intervals=12, smallest_shape_speed=1e-9, delta_start=1e-4
+    )
+    solution = maximise_efficiency(problem)
+    if solution.status == SOLVED:  # only if it left the viscous regime altogether
+        speed = np.abs(solution.gait.rates(FINE)).max()
+        assert speed > 1e3 * problem.delta
+    else:
+        assert len(solution.message) > 30
+
+
+def test_touching_is_admissible_and_crossing_is_not():
+    Problem("touching", ellipse(0.0, 1.0, TOUCHING), gait=BILATERAL)
+    with pytest.raises(ProblemError, match="cross"):
+        Problem("crossing", ellipse(0.0, 1.0, TOUCHING + 1e-6), gait=BILATERAL)
+    with pytest.raises(ProblemError, match="beyond the limit"):
+        Problem("folded", ellipse(np.pi - 1, 1.0 + 1e-6, 0.1), gait=BILATERAL)
+
+
+def test_from_a_gait_that_touches_itself_the_answer_does_not_cross_or_is_refused():
+    problem = Problem("touching", ellipse(0.0, 1.0, TOUCHING), gait=BILATERAL, intervals=12, delta_start=1e-2, delta=1e-3)
+    solution = maximise_efficiency(problem)
+    depth = crossing_depth(BODY, solution.gait.angles(FINE)).max()
+    if solution.status == SOLVED:
+        assert depth < 1e-6
+    else:
+        assert len(solution.message) > 30
+
+
+@pytest.mark.parametrize(("intervals", "delta"), [(2, 1e-4), (3, 1e-6), (5, 1e-8), (10, 1e-10)])
+def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, delta):
+    """The replay knows better than the mesh: a wrong efficiency is never called solved, and the message says why."""
+    problem = Problem("coarse", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, intervals=intervals, delta=delta, mesh_tolerance=0)
+    solution = maximise_efficiency(problem)
+    assert solution.status == CERTIFICATE_FAILED
+    assert "replay gap" in solution.message
+    error = abs(solution.efficiency / solution.certificate.efficiency - 1)
+    assert error > 1e-4
+    # what the certificate itself reports is right: an independent, finer replay agrees with it
+    again = replayed(solution.gait, delta, instants=4800, tolerance=1e-7)
+    assert again.efficiency == pytest.approx(solution.certificate.efficiency, rel=1e-5)
+
+
+def test_refinement_repairs_what_a_coarse_mesh_gets_wrong():
+    problem = Problem("refined", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, intervals=8, delta=1e-8, delta_start=1e-3)
+    solution = maximise_efficiency(problem)
+    assert solution.status == SOLVED
+    assert solution.efficiency == pytest.approx(solution.certificate.efficiency, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        (100, 1, 1),
+        (1, 1 + 1e-15, 1),
+        (1, 100, 0.01),
+        *(pytest.param(law, marks=pytest.mark.slow) for law in ((0.01, 1, 1), (1, 0.01, 100), (0.01, 100, 1))),
+    ],
+    ids=str,
+)
+def test_extreme_coefficients_are_solved_or_refused(law):
+    friction = Friction(*law)
+    problem = Problem("extreme", ellipse(0.2, 1.0, 0.6), friction=friction, gait=BILATERAL, intervals=12, delta=1e-3)
+    solution = maximise_efficiency(problem)
+    if solution.status == SOLVED:
+        assert solution.certificate.efficiency <= 1 / friction.smallest
+        again = replay(BODY, friction, lambda t: (solution.gait.angles(t), solution.gait.rates(t)), 1e-3, tolerance=1e-7)
+        assert again.efficiency == pytest.approx(solution.efficiency, rel=2e-4)
+    else:
+        assert len(solution.message) > 30
