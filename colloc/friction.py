@@ -114,13 +114,14 @@ def _roots(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> _Root
     opposite = T < 0
     wl2 = xp.where(opposite, 4.0 * half * half, 1.0)
     Q = xp.where(opposite, (r0r1 - T) / wl2, a2 / xp.where(opposite, 1.0, r0r1 + T))
-    root_q = xp.abs(2.0 * half) / S
-    q = root_q * root_q
+    # squared before |w| appears: automatic differentiation loses q'' where w = 0 behind an absolute value
+    signed_root_q = 2.0 * half / S
+    q = signed_root_q * signed_root_q
     small = q < _SERIES_LIMIT
     h_small = _H_SERIES[-1]
     for coefficient in _H_SERIES[-2::-1]:
         h_small = h_small * q + coefficient
-    safe = xp.where(small, 0.5, root_q)
+    safe = xp.where(small, 0.5, xp.abs(signed_root_q))
     # 1 - q = 2 P / S^2 = 2 a^2 / (Q S^2)
     g_large = 0.5 * xp.log((1.0 + safe) * (1.0 + safe) * Q * S * S / (2.0 * a2)) / safe
     h = xp.where(small, h_small, (g_large - 1.0) / (safe * safe))
