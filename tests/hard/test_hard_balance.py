@@ -163,3 +163,18 @@ def test_rates_and_delta_over_600_decades_do_not_overflow():
         np.testing.assert_allclose(solved.z / k, dry, atol=1e-11)
     for delta in (5e-324, 1e-200, 1e200):
         assert solve_balance(BODY, Friction(), angles, rates, delta).converged.all()
+
+
+@pytest.mark.parametrize("delta", [1e-2, 1e-6, 1e-10])
+def test_scissors_share_their_rate_equally(delta):
+    """Two equal links folded onto each other: without delta any split of the rate balances; delta picks the even one.
+
+    The couple about the common end changes with the split by delta^2 only, so a residual of 1e-11 fixes it to 1e-11 / delta^2:
+    at tiny delta not at all. The power does not depend on it.
+    """
+    body, angles, rates = Chain((0.5, 0.5)), np.array([[np.pi]]), np.array([[1.0]])
+    z = solve_balance(body, Friction(), angles, rates, delta).require().z
+    assert abs(z[2, 0] + 0.5) < min(1e-10 / delta**2, 0.5)
+    power = total_power(*instant(body, Friction(), angles, rates, z, delta)[1:])
+    # two halves, each turning at 1/2 about its end: 2 * integral of s/2 over 0..1/2
+    assert power.item() == pytest.approx(0.125, abs=2 * delta)
