@@ -1,0 +1,129 @@
+"""Smooth bodies: panels and order against error, adaptive panels, and the chain: python -m benchmarks --only smooth_panels
+
+A sine wave (the paper's figure 5B) at five phases, isotropic and with mu_t = 100. The reference integrates position,
+velocity, force, torque and power along the body as one ordinary differential equation with SciPy's DOP853 (tolerance 1e-13)
+and finds the balance by Newton's method with difference quotients: no panels, no Gauss points.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from benchmarks.tables import cpu_seconds, markdown_table
+from colloc import Chain, Friction, solve_balance
+from colloc.balance import instant, total_power
+from colloc.figures_style import BLUE, GREEN, ORANGE, VERMILION, save, styled
+from colloc.motion import Motion, sine_wave
+from colloc.smooth_balance import solve_smooth
+
+PHASES = np.array([0.03, 0.11, 0.2, 0.31, 0.44])
+MOTION = sine_wave()
+ORDERS = {4: ORANGE, 8: BLUE, 12: GREEN}
+
+
+def loads(motion: Motion, friction: Friction, t: float, z: np.ndarray, delta: float) -> np.ndarray:
+    """Net force, torque about the tail and power at phase t for tail velocity z, by integration along the body."""
+    when = np.array([t])
+
+    def field(f: object, s: float) -> float:
+        return float(f(np.array([[s]]), when).item())  # type: ignore[operator]
+
+    turn = z[2] - field(motion.rate, 0.0)
+
+    def along(s: float, state: np.ndarray) -> list[float]:
+        x, y, vx, vy = state[:4]
+        angle, w = field(motion.angle, s), field(motion.rate, s) + turn
+        c, sn = np.cos(angle), np.sin(angle)
+        vs, vn = vx * c + vy * sn, vy * c - vx * sn
+        r = np.sqrt(vs * vs + vn * vn + delta * delta)
+        fs, fn = -(friction.mu_f if vs > 0 else friction.mu_b) * vs / r, -friction.mu_t * vn / r
+        fx, fy = fs * c - fn * sn, fs * sn + fn * c
+        return [c, sn, -w * sn, w * c, fx, fy, x * fy - y * fx, -(fs * vs + fn * vn)]
+
+    start = np.array([0.0, 0.0, z[0], z[1], 0.0, 0.0, 0.0, 0.0])
+    return solve_ivp(along, (0, 1), start, method="DOP853", rtol=1e-13, atol=1e-14, max_step=0.02).y[4:, -1]
+
+
+def reference_power(friction: Friction, delta: float) -> np.ndarray:
+    """Power at the balance, ``(n_phase,)``, found from a coarse velocity by Newton's method on `loads`."""
+    start = solve_smooth(MOTION, friction, PHASES, delta, quadrature_tolerance=1e-6).require()
+    result = np.empty(PHASES.size)
+    for k, t in enumerate(PHASES):
+        # z of `solve_smooth` is relative to the frame of Theta; here rotation is that of the tail's tangent
+        z = start.z[:, k] + [0, 0, MOTION.rate(np.zeros((1, 1)), PHASES[k : k + 1]).item()]
+        for _ in range(3):
+            here = loads(MOTION, friction, t, z, delta)
+            h = 1e-4 * delta
+            slope = np.array([(loads(MOTION, friction, t, z + h * e, delta) - here)[:3] / h for e in np.eye(3)]).T
+            z = z - np.linalg.solve(slope, here[:3])
+        result[k] = loads(MOTION, friction, t, z, delta)[3]
+    return result
+
+
+def chain_power(friction: Friction, delta: float, n: int) -> np.ndarray:
+    """Power of a chain of n links whose directions are those of the curve at the links' middles."""
+    s = ((np.arange(n) + 0.5) / n)[:, None] * np.ones((1, PHASES.size))
+    body = Chain((1 / n,) * (n - 1) + (1 - (n - 1) / n,))
+    angles, rates = np.diff(MOTION.angle(s, PHASES), axis=0), np.diff(MOTION.rate(s, PHASES), axis=0)
+    solved = solve_balance(body, friction, angles, rates, delta).require()
+    now = instant(body, friction, angles, rates, solved.z, delta)
+    return total_power(now.velocity, now.force)[0]
+
+
+def report(quick: bool, folder: Path) -> str:
+    """Relative error of the power against panels, order and tolerance, with time an instant; and a figure."""
+    cases = [(Friction(), 1e-2), (Friction(100, 1, 1), 1e-3)]
+    cases += [] if quick else [(Friction(), 1e-4)]
+    panels = (4, 8, 16, 32) if quick else (2, 4, 8, 16, 32, 64)
+    parts, curves = [], []
+    for friction, delta in cases:
+        exact = reference_power(friction, delta)
+
+        def error(power: np.ndarray, exact: np.ndarray = exact) -> float:
+            return float(np.max(np.abs(power / exact - 1)))
+
+        def milliseconds(friction: Friction = friction, delta: float = delta, **settings: object) -> float:
+            work = cpu_seconds(lambda: solve_smooth(MOTION, friction, PHASES, delta, **settings), 0.02)  # type: ignore[arg-type]
+            return 1e3 * work / PHASES.size
+
+        rows, lines = [], {}
+        for order in ORDERS:
+            fixed = [{"panels": n, "order": order, "quadrature_tolerance": 0} for n in panels]
+            found = [solve_smooth(MOTION, friction, PHASES, delta, **f) for f in fixed]  # type: ignore[arg-type]
+            errors = [error(f.power) for f in found]
+            lines[order] = [(n * order, e) for n, e in zip(panels, errors, strict=True)]
+            rows.append([f"{order} nodes a panel", *errors, milliseconds(**fixed[-1])])
+        chains = [error(chain_power(friction, delta, 4 * n)) for n in panels]
+        lines["chain"] = [(4 * n, e) for n, e in zip(panels, chains, strict=True)]
+        rows.append(["chain, 4 links a panel", *chains, ""])
+        adaptive = []
+        for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
+            found = solve_smooth(MOTION, friction, PHASES, delta, quadrature_tolerance=tolerance)
+            spent = milliseconds(quadrature_tolerance=tolerance)
+            adaptive.append([f"{tolerance:.0e}", error(found.power), int(found.panels.max()), spent])
+        title = f"({friction.mu_t:g}, {friction.mu_f:g}, {friction.mu_b:g}), delta = {delta:g}"
+        header = ["uniform panels", *map(str, panels), "ms an instant, last"]
+        text = markdown_table(["tolerance", "error", "panels", "ms an instant"], adaptive)
+        parts.append(f"{title}: largest relative error of the power.\n\n{markdown_table(header, rows)}\n\nAdaptive:\n\n{text}")
+        lines["adaptive"] = [(8 * row[2], row[1]) for row in adaptive]
+        curves.append((title, lines))
+    _figure(curves, folder)
+    return "\n\n".join(parts)
+
+
+def _figure(curves: list, folder: Path) -> None:
+    with styled():
+        figure, axes = plt.subplots(1, len(curves), figsize=(3.1 * len(curves), 3.2), squeeze=False)
+        for axis, (title, lines) in zip(axes[0], curves, strict=True):
+            for order, colour in ORDERS.items():
+                axis.loglog(*zip(*lines[order], strict=True), color=colour, marker="o", ms=3, label=f"{order} nodes a panel")
+            axis.loglog(*zip(*lines["chain"], strict=True), color="#999999", marker="s", ms=3, label="chain of links")
+            axis.loglog(*zip(*lines["adaptive"], strict=True), color=VERMILION, marker="x", label="adaptive panels")
+            axis.set(xlabel="nodes (or links) on the body", title=title)
+        axes[0][0].set_ylabel("relative error of the power")
+        axes[0][0].legend(fontsize=7)
+        save(figure, folder, "smooth_panels")

@@ -1,0 +1,43 @@
+"""What all measurements share: processor time, medians of interleaved runs, Markdown tables."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+
+def cpu_seconds(work: Callable[[], object], at_least: float = 0.05) -> float:
+    """Processor time of one call: the mean over enough calls to fill `at_least` seconds."""
+    calls, begin = 0, time.process_time()
+    while True:
+        work()
+        calls += 1
+        spent = time.process_time() - begin
+        if spent >= at_least:
+            return spent / calls
+
+
+def interleaved_seconds(works: dict[str, Callable[[], object]], rounds: int = 3, at_least: float = 0.05) -> dict[str, float]:
+    """Median processor time of each call over `rounds` rounds in turn, so that disturbances fall on all alike."""
+    spent: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(rounds):
+        for name, work in works.items():
+            spent[name].append(cpu_seconds(work, at_least))
+    return {name: float(np.median(values)) for name, values in spent.items()}
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table; floats in three digits."""
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, (float, np.floating)):
+        if value != 0 and (abs(value) < 1e-2 or abs(value) >= 1e5):
+            return f"{value:.1e}"
+        return f"{value:.3g}"
+    return str(value)

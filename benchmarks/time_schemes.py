@@ -1,0 +1,89 @@
+"""Collocation schemes on one gait: error of d/W against points and time: python -m benchmarks --only time_schemes
+
+The gait is held fixed (no optimisation), so that only the discretisation in time is measured. The reference integrates
+orientation, path and work by SciPy's adaptive DOP853 to a tolerance of 1e-10, with the balance solved anew at every stage.
+At delta = 1 the motion is smooth and every scheme shows its order; at delta = 1e-4 links stick and slip, the integrand has
+kinks, and uniform meshes of any scheme converge like second order. `mesh_tolerance` shows what refinement does about it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from benchmarks.tables import cpu_seconds, markdown_table
+from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
+from colloc.balance import instant, total_power
+from colloc.figures_style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled
+from colloc.gait import Fourier
+from colloc.transcription import transcribe
+from colloc.warm_start import feasible_point
+
+GAIT = ellipse(0, 2.85, 1.29)
+SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
+COLOURS = dict(zip(SCHEMES, ("#999999", SKY, GREEN, BLUE, PURPLE, ORANGE), strict=True))
+
+
+def adaptive_efficiency(gait: Fourier, delta: float, tolerance: float = 1e-11) -> float:
+    """d/W of a gait of the isotropic three-link body by adaptive integration in time."""
+    body, friction = Chain(), Friction()
+
+    def rate(t: float, state: np.ndarray) -> list[float]:
+        angles, rates = gait.angles([t]), gait.rates([t])
+        solved = solve_balance(body, friction, angles, rates, delta, tolerance=1e-12)
+        now = instant(body, friction, angles, rates, solved.z, delta)
+        cx, cy = (c.item() for c in body.centre_velocity(now.posture, now.velocity))
+        c, s = np.cos(state[0]), np.sin(state[0])
+        power = total_power(now.velocity, now.force).item()
+        return [solved.z[2, 0], c * cx - s * cy, s * cx + c * cy, power]
+
+    # a maximal step keeps the error control from stepping over a stick phase
+    run = solve_ivp(rate, (0, 1), np.zeros(4), method="DOP853", rtol=tolerance, atol=tolerance, max_step=0.05)
+    _, x, y, work = run.y[:, -1]
+    return float(np.hypot(x, y) / work)
+
+
+def collocated(name: str, intervals: int, delta: float) -> tuple[float, int, float]:
+    """d/W, points, and processor seconds of solving the balance at all points of a uniform mesh on half a period."""
+    problem = Problem("scheme", GAIT, gait=Harmonic(1, "bilateral"), scheme=name, intervals=intervals, delta=delta)
+    transcription = transcribe(problem)
+    parameters = problem.gait.parameters(GAIT)
+    x = feasible_point(transcription, parameters, delta)
+    layout = transcription.layout
+    seconds = cpu_seconds(lambda: feasible_point(transcription, parameters, delta), at_least=0.01)
+    efficiency = x[layout.distance[0, -1]] / x[layout.work[0, -1]]
+    return float(efficiency), transcription.mesh.n_point, seconds
+
+
+def report(quick: bool, folder: Path) -> str:
+    """Tables of relative error against intervals for three deltas, and a figure against points."""
+    deltas = (1.0, 1e-4) if quick else (1.0, 1e-2, 1e-4)
+    intervals = (8, 16, 32) if quick else (6, 12, 24, 48, 96, 192)
+    parts, curves = [], {}
+    for delta in deltas:
+        reference = adaptive_efficiency(GAIT, delta, 1e-7 if quick else 1e-10)
+        rows = []
+        for name in SCHEMES:
+            runs = [collocated(name, n, delta) for n in intervals]
+            errors = [abs(e / reference - 1) for e, _, _ in runs]
+            curves[delta, name] = [(points, seconds, error) for (_, points, seconds), error in zip(runs, errors, strict=True)]
+            slope = np.polyfit(np.log([r[1] for r in runs[1:]]), np.log(np.maximum(errors[1:], 1e-16)), 1)[0]
+            rows.append([name, *errors, -slope, 1e3 * runs[-1][2]])
+        header = ["scheme", *(f"{n} intervals" for n in intervals), "fitted order", "ms at the last"]
+        parts.append(f"delta = {delta:g}, reference d/W = {reference:.9f}:\n\n{markdown_table(header, rows)}")
+    with styled():
+        figure, axes = plt.subplots(1, len(deltas), figsize=(3.0 * len(deltas), 3.2), squeeze=False)
+        for axis, delta in zip(axes[0], deltas, strict=True):
+            for name in SCHEMES:
+                points, _, errors = zip(*curves[delta, name], strict=True)
+                axis.loglog(points, np.maximum(errors, 1e-15), color=COLOURS[name], marker="o", ms=3, label=name)
+            n = np.array([30, 300])
+            axis.loglog(n, 3.0 * n**-2.0, color=VERMILION, ls=":", lw=1, label="second order")
+            axis.set(xlabel="points on half a period", title=f"delta = {delta:g}")
+        axes[0][0].set_ylabel("relative error of d/W")
+        axes[0][-1].legend(fontsize=7)
+        save(figure, folder, "time_schemes")
+    return "\n\n".join(parts)
