@@ -13,7 +13,6 @@ Minimised is ``(W / (smallest coefficient x) - 1) / (2 epsilon)``, the relative 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -24,8 +23,8 @@ from colloc.bump_balance import balance_and_power, bump_instant
 from colloc.bump_body import BumpBody
 from colloc.bump_callback import BumpVelocity
 from colloc.friction import Friction
+from colloc.layout import RADIANS
 from colloc.mesh import Mesh, uniform_mesh
-from colloc.problem import MAP
 from colloc.schemes import scheme
 
 POSITION_SCALE = 1.3
@@ -128,9 +127,12 @@ class BumpTranscription:
     velocity: BumpVelocity
 
     @property
-    def problem(self) -> SimpleNamespace:
-        """What the solver asks of a problem: how the balance enters."""
-        return SimpleNamespace(formulation=MAP)
+    def lifted(self) -> bool:
+        return False
+
+    @property
+    def speed_unit(self) -> float:
+        return RADIANS
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks, objective first; they do not change."""

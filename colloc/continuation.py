@@ -20,7 +20,7 @@ from colloc.nlp import NlpResult, Solver
 from colloc.problem import Problem
 from colloc.refinement import refined_edges
 from colloc.solution import Level, Solution
-from colloc.transcription import transcribe
+from colloc.transcription import Transcription, transcribe
 from colloc.warm_start import feasible_point
 
 FIRST_FACTOR = 0.1
@@ -51,7 +51,7 @@ Report = Callable[[Level], None]
 class _Run:
     """A continuation under way: the solver of the current mesh, the last converged result, and all levels so far."""
 
-    def __init__(self, problem: Problem, solver: Solver, on_level: Report | None) -> None:
+    def __init__(self, problem: Problem, solver: Solver[Transcription], on_level: Report | None) -> None:
         self.problem, self.solver, self.on_level = problem, solver, on_level
         self.levels: list[Level] = []
         self.parameters = problem.gait.parameters(problem.guess)
@@ -70,7 +70,7 @@ class _Run:
         if delta == self.problem.delta:
             # move the checks between nodes to the new gait's worst instants until none is exceeded
             for _ in range(_EXCHANGES):
-                if not result.optimal or self.solver.check_excess(result.x) <= _ADMISSIBLE:
+                if not result.optimal or self.solver.transcription.check_excess(result.x) <= _ADMISSIBLE:
                     break
                 again = self.solver.solve(result.x, delta, (result.lam_x, result.lam_g), self.radius)
                 result = again.accumulated(result)
@@ -132,7 +132,7 @@ class _Run:
             self.on_level(level)
 
 
-def continue_delta(problem: Problem, on_level: Report | None = None, solver: Solver | None = None) -> Solution:
+def continue_delta(problem: Problem, on_level: Report | None = None, solver: Solver[Transcription] | None = None) -> Solution:
     """Solve a problem through falling delta, from ``delta_start`` to ``delta``, then refine its mesh.
 
     Parameters

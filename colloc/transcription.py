@@ -83,9 +83,29 @@ class Transcription:
     checks: list[tuple[str, ca.Function]]
     velocity: VelocityMap
 
+    @property
+    def lifted(self) -> bool:
+        return self.problem.formulation == LIFTED
+
+    @property
+    def speed_unit(self) -> float:
+        return RADIANS
+
     def gait(self, x: np.ndarray) -> Fourier:
         """The gait of a vector of variables."""
         return self.problem.gait.fourier(x[self.layout.parameters[:, 0]], self.problem.body.n_joint)
+
+    def check_excess(self, x: np.ndarray) -> float:
+        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
+        worst = worst_instants(self.problem, self.mesh, self.checks, x[self.layout.parameters[:, 0]])
+        gait = self.gait(x)
+        excess = 0.0
+        for (name, check), times in zip(self.checks, worst, strict=True):
+            rows = self.groups[name]
+            values = np.array(check.map(times.size)(gait.angles(times))).ravel()
+            excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
+            excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
+        return excess
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.

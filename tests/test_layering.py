@@ -12,6 +12,7 @@ LEVELS = {
         "fixed_point",
         "layout",
         "blocks",
+        "program",
         "kernels",
         "velocity_callback",
         "replay",
