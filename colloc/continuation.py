@@ -15,12 +15,13 @@ import numpy as np
 
 from colloc.closure import closed_parameters
 from colloc.diagnosis import explanation, redundant_equations
-from colloc.gait import Fourier
+from colloc.gait_fields import AnyGait
 from colloc.nlp import NlpResult, Solver
+from colloc.path_start import nearest_parameters, transcribed
 from colloc.problem import Problem
+from colloc.program import GaitProgram
 from colloc.refinement import refined_edges
 from colloc.solution import Level, Solution
-from colloc.transcription import Transcription, transcribe
 from colloc.warm_start import feasible_point
 
 FIRST_FACTOR = 0.1
@@ -51,18 +52,18 @@ Report = Callable[[Level], None]
 class _Run:
     """A continuation under way: the solver of the current mesh, the last converged result, and all levels so far."""
 
-    def __init__(self, problem: Problem, solver: Solver[Transcription], on_level: Report | None) -> None:
+    def __init__(self, problem: Problem, solver: Solver[GaitProgram], on_level: Report | None) -> None:
         self.problem, self.solver, self.on_level = problem, solver, on_level
         self.levels: list[Level] = []
-        self.parameters = problem.gait.parameters(problem.guess)
+        self.parameters = nearest_parameters(solver.transcription, problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
-        if problem.gait.symmetry == "none":
+        if problem.gait.symmetry == "none" and not problem.has_path:
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
 
     @property
-    def gait(self) -> Fourier:
-        return self.problem.gait.fourier(self.parameters, self.problem.body.n_joint)
+    def gait(self) -> AnyGait:
+        return self.solver.transcription.member(self.parameters)
 
     def attempt(self, delta: float) -> NlpResult:
         """Solve at delta from the last converged gait; take the result over if it is optimal."""
@@ -102,7 +103,9 @@ class _Run:
 
     def remesh(self, edges: np.ndarray) -> None:
         """Go on with another mesh; multipliers do not carry over."""
-        self.solver = Solver(transcribe(self.problem, edges))
+        gait = self.gait
+        self.solver = Solver(transcribed(self.problem, gait, edges))
+        self.parameters = nearest_parameters(self.solver.transcription, gait)
         self.multipliers = None
         self.radius = REMESH_RADIUS
 
@@ -111,7 +114,7 @@ class _Run:
         layout, periods = transcription.layout, 1.0 / self.problem.gait.fraction
         level = Level(
             delta,
-            transcription.mesh.edges,
+            transcription.phase_mesh(transcription.member(result.x[layout.parameters[:, 0]])).edges,
             result.x,
             result.lam_x,
             result.lam_g,
@@ -132,7 +135,7 @@ class _Run:
             self.on_level(level)
 
 
-def continue_delta(problem: Problem, on_level: Report | None = None, solver: Solver[Transcription] | None = None) -> Solution:
+def continue_delta(problem: Problem, on_level: Report | None = None, solver: Solver[GaitProgram] | None = None) -> Solution:
     """Solve a problem through falling delta, from ``delta_start`` to ``delta``, then refine its mesh.
 
     Parameters
@@ -149,7 +152,7 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
         Without a certificate; the last level is one at ``problem.delta`` only if all went well.
     """
     begin = time.perf_counter()
-    run = _Run(problem, solver or Solver(transcribe(problem)), on_level)
+    run = _Run(problem, solver or Solver(transcribed(problem)), on_level)
     result = _descend(run)
     if result.optimal and problem.mesh_tolerance > 0:
         result = _refine(run, result)
@@ -197,8 +200,9 @@ def _refine(run: _Run, result: NlpResult) -> NlpResult:
     """Solve again on refined meshes until the gait found needs no further refinement."""
     problem = run.problem
     for _ in range(_REFINEMENTS):
-        mesh = run.solver.transcription.mesh
-        edges = refined_edges(problem, mesh, run.gait, problem.delta, problem.mesh_tolerance)
+        gait = run.gait
+        mesh = run.solver.transcription.phase_mesh(gait)
+        edges = refined_edges(problem, mesh, gait, problem.delta, problem.mesh_tolerance)
         if edges is None:
             break
         run.remesh(edges)

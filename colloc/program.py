@@ -7,6 +7,10 @@ from typing import Protocol
 import numpy as np
 
 from colloc.blocks import Assembly
+from colloc.gait_fields import AnyGait
+from colloc.layout import Layout
+from colloc.mesh import Mesh
+from colloc.problem import Problem
 
 
 class ProgramLayout(Protocol):
@@ -54,3 +58,25 @@ class Program(Protocol):
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks, objective first, for a gait's parameters ``(n_parameter,)``."""
+
+
+class GaitProgram(Program, Protocol):
+    """The program of a problem: what continuation, refinement and explanation ask of it."""
+
+    @property
+    def problem(self) -> Problem: ...
+
+    @property
+    def mesh(self) -> Mesh: ...
+
+    @property
+    def layout(self) -> Layout: ...
+
+    def member(self, parameters: np.ndarray) -> AnyGait:
+        """The gait of a parameter vector ``(n_parameter,)``."""
+
+    def phase_mesh(self, gait: AnyGait) -> Mesh:
+        """The mesh in phases of a member."""
+
+    def check_excess(self, x: np.ndarray) -> float:
+        """How far shapes between nodes exceed what is admissible, for variables x [rad]."""
