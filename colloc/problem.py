@@ -20,6 +20,7 @@ from colloc.path_samples import fourier_through, symmetric_samples
 from colloc.schemes import scheme
 
 MAP, LIFTED = "map", "lifted"
+DELTA_START, PATH_DELTA_START = 0.1, 0.01
 _CHECKED_PHASES = 2000
 _SLACK = 1e-9
 
@@ -60,7 +61,7 @@ class Problem:
         Regularisation speed of friction at which the problem is finally solved, in body lengths per period; for free paths
         and polygons at unit shape speed, in body lengths per radian of path.
     delta_start : float
-        Where the continuation in delta begins.
+        Where the continuation in delta begins; by default 0.1, and 0.01 where delta is measured at unit shape speed.
     joint_limit : float
         Largest |joint angle| [rad], at most pi.
     smallest_shape_speed : float
@@ -83,7 +84,7 @@ class Problem:
     friction: Friction = Friction()
     gait: AnyClass = Harmonic()
     delta: float = 1e-4
-    delta_start: float = 0.1
+    delta_start: float = None  # type: ignore[assignment]
     joint_limit: float = float(np.pi)
     smallest_shape_speed: float = 0.1
     intervals: int = 30
@@ -111,6 +112,8 @@ class Problem:
         return isinstance(self.gait, (FreePath, Polygon))
 
     def _check_numbers(self) -> None:
+        if self.delta_start is None:
+            object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
