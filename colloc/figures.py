@@ -113,12 +113,12 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
     """Speeds of the link midpoints over a period, on a logarithmic scale that shows stick, and delta."""
     problem, motion = solution.problem, solution.sample(t)
-    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, solution.last.delta).velocity
+    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, solution.delta_per_period).velocity
     speed = np.hypot(link.vs, link.vn)
     for i, colour in zip(range(problem.body.n_link), [BLUE, ORANGE, GREEN, RED, PURPLE, SKY] * 2, strict=False):
         axes.semilogy(t, speed[i], color=colour, lw=1.4, label=f"link {i + 1}")
-    axes.axhline(solution.last.delta, color=GREY, lw=1, ls=":")
-    axes.text(1.0, solution.last.delta, "δ ", color=GREY, ha="right", va="bottom")
+    axes.axhline(solution.delta_per_period, color=GREY, lw=1, ls=":")
+    axes.text(1.0, solution.delta_per_period, "δ ", color=GREY, ha="right", va="bottom")
     axes.set(xlim=(0, 1), ylabel="midpoint speed  [1/period]", xlabel="phase t")
     axes.legend(loc="lower left", ncols=min(3, problem.body.n_link), handlelength=1.2, columnspacing=1)
 
@@ -157,7 +157,8 @@ def solution_figure(solution: Solution) -> Figure:
         verdict = "" if solution.status == "solved" else f"   —   {solution.status.upper()}"
         figure.suptitle(
             f"{solution.problem.name}: efficiency d/W = {solution.efficiency:.5f}   "
-            f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}",
+            f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}\n"
+            f"class: {solution.problem.gait.describe()}",
             x=0.01,
             ha="left",
             color="black" if solution.status == "solved" else RED,
