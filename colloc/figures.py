@@ -20,7 +20,7 @@ from colloc.solution import Solution
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#777777"
 """Okabe-Ito colours, distinguishable with any colour vision."""
 
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -82,15 +82,20 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     axes.legend(loc="upper right", fontsize=7, handlelength=1.2)
 
 
+def draw_allowed(axes: Axes, body: Chain, joint_limit: float) -> None:
+    """Grey over the pairs of joint angles that joint limits or links do not allow."""
+    grid = np.linspace(-np.pi, np.pi, 181)
+    a, b = np.meshgrid(grid, grid)
+    allowed = crossing_depth(body, np.stack([a.ravel(), b.ravel()])) < 1e-9
+    allowed &= np.maximum(abs(a), abs(b)).ravel() <= joint_limit + 1e-9
+    shade = np.where(allowed.reshape(a.shape), np.nan, 1.0)
+    axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
+
+
 def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
     """The gait in the plane of two joint angles, over the shapes that joint limits and links allow."""
     if problem.body.n_joint == 2:
-        grid = np.linspace(-np.pi, np.pi, 181)
-        a, b = np.meshgrid(grid, grid)
-        allowed = crossing_depth(problem.body, np.stack([a.ravel(), b.ravel()])) < 1e-9
-        allowed &= np.maximum(abs(a), abs(b)).ravel() <= problem.joint_limit + 1e-9
-        shade = np.where(allowed.reshape(a.shape), np.nan, 1.0)
-        axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
+        draw_allowed(axes, problem.body, problem.joint_limit)
     q = angles[[first, second]]
     segments = np.stack([q[:, :-1].T, q[:, 1:].T], axis=1)
     lines = LineCollection(list(segments), cmap="cividis_r", lw=2.2, capstyle="round")
@@ -135,7 +140,7 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 def solution_figure(solution: Solution) -> Figure:
     """Filmstrip, lab paths, path in the joint plane, speeds and power of a solution."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11, 8.2), layout="constrained")
         grid = figure.add_gridspec(3, 3, height_ratios=(0.75, 1.25, 0.9))
         t = np.linspace(0.0, 1.0, 1201)
@@ -168,6 +173,6 @@ def solution_figure(solution: Solution) -> Figure:
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Save as PNG and PDF beside each other, whatever suffix `path` has."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         for suffix in (".png", ".pdf"):
             figure.savefig(path.with_suffix(suffix))

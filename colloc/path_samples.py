@@ -34,6 +34,12 @@ class Gait(Protocol):
     def rates(self, t: np.ndarray) -> np.ndarray: ...
 
 
+def path_length(gait: Gait, count: int = _DENSE) -> float:
+    """Length of the closed path of a gait [rad], which is its mean shape speed per period."""
+    points = gait.angles(np.linspace(0.0, 1.0, count + 1))
+    return float(np.linalg.norm(np.diff(points), axis=0).sum())
+
+
 def symmetric_samples(gait: Gait, symmetry: str, count: int = _DENSE) -> np.ndarray:
     """Points ``(n_joint, count + 1)`` along the solved part of the symmetric gait nearest to `gait`, evenly in phase.
 

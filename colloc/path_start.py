@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from colloc.blocks import oracles
 from colloc.errors import NotConvergedError
 from colloc.gait_fields import AnyGait
 from colloc.nlp import Solver
@@ -14,7 +15,8 @@ from colloc.problem import Problem
 from colloc.program import GaitProgram
 from colloc.transcription import transcribe
 
-_EXACT = 1e-9
+_EXACT, _ADMISSIBLE = 1e-7, 1e-9
+"""Largest violation at which a gait counts as a member already: what optima keep to; and what a new member keeps to."""
 _ROUNDS = 4
 _FIT_OPTIONS: dict[str, object] = {"max_iter": 200, "mu_init": 1e-2, "bound_push": 1e-2, "bound_frac": 1e-2}
 
@@ -48,12 +50,14 @@ def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:
         x = result.x
         if not result.optimal:
             break
-        if fit.check_excess(x) < _EXACT:
+        if fit.check_excess(x) < _ADMISSIBLE:
             return x
     bound = f"; allow more curvature than {problem.gait.curvature:g}" if isinstance(problem.gait, FreePath) else ""
     raise NotConvergedError(f"found no {problem.gait.describe()} near the guess; try another guess{bound}.")
 
 
 def _largest_violation(fit: PathTranscription, x: np.ndarray) -> float:
-    solver = Solver(fit, {"max_iter": 0})
-    return max(solver.solve(x, 1.0).violation, fit.check_excess(x))
+    functions = oracles(fit.assembly)
+    g = np.array(functions.options["jac_g"](x, functions.parameter_vector(1.0, fit.block_parameters(x)))[0]).ravel()
+    rows = np.maximum(fit.constraint_lower - g, g - fit.constraint_upper).max()
+    return float(max(rows, (fit.lower - x).max(), (x - fit.upper).max(), fit.check_excess(x)))
