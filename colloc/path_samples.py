@@ -16,6 +16,8 @@ from colloc.path_gait import ArcPath, Corners
 from colloc.symmetry import ANTIPODAL, BILATERAL, NONE, fraction
 
 _DENSE = 2000
+_BEND = 1.5
+"""Angle [rad] over whose sharpest allowed bend a corner's intervals are spread."""
 _POLYGON_POINTS = 241
 
 
@@ -68,6 +70,25 @@ def _by_arc_length(points: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, floa
     """Points at fractions `at` of the length of a polyline, and its length."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points), axis=0))])
     return np.stack([np.interp(at * along[-1], along, row) for row in points]), float(along[-1])
+
+
+def graded_edges(gait: Gait, target: FreePath, n: int) -> np.ndarray:
+    """Phases of `n` intervals along the path of a gait, half of them spread by length and half by how much it turns.
+
+    A turn counts as spread over the length that the sharpest allowed bend needs, so that a corner gets several intervals.
+    """
+    points = symmetric_samples(gait, target.symmetry)
+    points, length = _by_arc_length(points, np.linspace(0.0, 1.0, _DENSE + 1))
+    step = np.diff(_extended(points, target.symmetry))
+    cosine = np.sum(step[:, 1:] * step[:, :-1], axis=0)
+    area = np.sqrt(np.maximum(np.sum(step[:, 1:] ** 2, axis=0) * np.sum(step[:, :-1] ** 2, axis=0) - cosine**2, 0.0))
+    turn = np.arctan2(area, cosine)
+    width = min(_DENSE, max(1, round(_BEND / target.curvature / length * _DENSE)))
+    spread = np.convolve(turn, np.ones(width) / width, mode="same")[_DENSE - 1 : 2 * _DENSE]
+    density = np.full(_DENSE + 1, 1.0 / _DENSE) + spread / max(spread.sum(), 1e-300)
+    along = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    at = np.interp(np.linspace(0.0, along[-1], n + 1), along, np.linspace(0.0, 1.0, _DENSE + 1))
+    return fraction(target.symmetry) * at
 
 
 def arcs_through(gait: Gait, target: FreePath, edges: np.ndarray) -> ArcPath:

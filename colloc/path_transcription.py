@@ -24,7 +24,7 @@ from colloc.path_class import FreePath
 from colloc.path_gait import ArcPath, Corners
 from colloc.path_geometry import PathGeometry, arc_geometry, side_geometry
 from colloc.path_kernels import ADVANCE, OMEGA, POWER, path_point, squared_distance
-from colloc.path_samples import Gait, arcs_through, corners_through
+from colloc.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.problem import Problem
 from colloc.transcription import worst_instants
 from colloc.velocity_callback import VelocityMap
@@ -106,6 +106,8 @@ def _geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near
 
 def path_through(problem: Problem, gait: Gait, edges: np.ndarray | None) -> tuple[ArcPath | Corners, Mesh]:
     """A path of the problem's kind laid through a gait, and the mesh in its phases; it need not keep every constraint."""
+    if isinstance(problem.gait, FreePath) and edges is None:
+        edges = graded_edges(gait, problem.gait, problem.intervals)
     mesh = problem_mesh(problem, edges)
     if isinstance(problem.gait, FreePath):
         return arcs_through(gait, problem.gait, mesh.edges), mesh
@@ -136,7 +138,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     gait : Gait
         Where the search begins: it fixes winding, start phase, and which interval lies on which side.
     edges : (n + 1,), optional
-        Phases; by default uniform.
+        Phases; by default graded by the turns of the gait (free paths), or evenly spread over the sides (polygons).
     """
     near, mesh = path_through(problem, gait, edges)
     layout = problem_layout(problem, mesh)
