@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from colloc.friction import Friction
     from colloc.gait import Fourier, Harmonic, ellipse
     from colloc.optimise import maximise_efficiency
+    from colloc.path_class import FreePath, Polygon
+    from colloc.path_gait import ArcPath, Corners
     from colloc.path_replay import replay
     from colloc.problem import Problem, Reference
     from colloc.solution import Solution
@@ -37,12 +39,16 @@ if TYPE_CHECKING:
     from colloc.verify import certify
 
 __all__ = [
+    "ArcPath",
     "Chain",
     "CollocError",
+    "Corners",
     "Fourier",
+    "FreePath",
     "Friction",
     "Harmonic",
     "NotConvergedError",
+    "Polygon",
     "Problem",
     "ProblemError",
     "Reference",
@@ -63,6 +69,8 @@ _HOME = {
     "fixed_point": ("solve_balance",),
     "friction": ("Friction",),
     "gait": ("Fourier", "Harmonic", "ellipse"),
+    "path_class": ("FreePath", "Polygon"),
+    "path_gait": ("ArcPath", "Corners"),
     "optimise": ("maximise_efficiency",),
     "problem": ("Problem", "Reference"),
     "path_replay": ("replay",),

@@ -76,6 +76,27 @@ def total_function(
     return _packed(name, local, parameter, delta, out, jacobian, ca.triu(hessian), weight)
 
 
+def implicit_function(
+    name: str, local: ca.SX, given: ca.SX, solved: ca.SX, delta: ca.SX, equations: ca.SX, out: ca.SX
+) -> LocalFunction:
+    """Outputs as functions of the locals alone, where `solved` solves ``equations(solved, local) = 0`` (see `Block.implicit`).
+
+    With R the equations, z what they are solved for, y the locals and L the weighted outputs: dz/dy = -R_z^-1 R_y, and the
+    total Hessian is that of L + nu.R pulled back along (I, dz/dy), with nu = -R_z^-T L_z.
+    """
+    n = solved.shape[0]
+    R_z, R_y = ca.jacobian(equations, solved), ca.jacobian(equations, local)
+    slope = -ca.solve(R_z, ca.densify(R_y))
+    jacobian = ca.jacobian(out, local) + ca.jacobian(out, solved) @ slope
+    weight, nu = ca.SX.sym("weight", out.shape[0]), ca.SX.sym("nu", n)
+    total = ca.dot(weight, out)
+    inner = ca.hessian(total + ca.dot(nu, equations), ca.vertcat(local, solved))[0]
+    inner = ca.substitute(inner, nu, -ca.solve(R_z.T, ca.densify(ca.jacobian(total, solved).T)))
+    frame = ca.vertcat(ca.SX.eye(local.shape[0]), slope)
+    hessian = frame.T @ inner @ frame
+    return total_function(name, local, ca.vertcat(given, solved), delta, out, jacobian, hessian, weight)
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """A local function repeated over instances.

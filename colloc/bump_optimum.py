@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -147,8 +147,7 @@ def optimise_bump(
     """
     transcription = transcribe_bump(body, friction, vertices, largest_angle=largest_angle)
     layout = transcription.layout
-    # the interface of a transcription that the solver uses is the same
-    solver = Solver(cast(Any, transcription), {"max_iter": iterations, "theta_max_fact": 1e-3})
+    solver = Solver(transcription, {"max_iter": iterations, "theta_max_fact": 1e-3})
 
     def start(at: np.ndarray) -> tuple[np.ndarray, float]:
         x = feasible_bump(transcription, at, delta)

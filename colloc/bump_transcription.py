@@ -13,19 +13,18 @@ Minimised is ``(W / (smallest coefficient x) - 1) / (2 epsilon)``, the relative 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.blocks import Assembly, Block, LocalFunction, local_function, total_function
+from colloc.blocks import Assembly, Block, LocalFunction, implicit_function, local_function
 from colloc.bump_balance import balance_and_power, bump_instant
 from colloc.bump_body import BumpBody
 from colloc.bump_callback import BumpVelocity
 from colloc.friction import Friction
+from colloc.layout import RADIANS
 from colloc.mesh import Mesh, uniform_mesh
-from colloc.problem import MAP
 from colloc.schemes import scheme
 
 POSITION_SCALE = 1.3
@@ -64,8 +63,7 @@ def bump_point(body: BumpBody, friction: Friction, h: float) -> LocalFunction:
     """Rotation rate, rate of distance and power at a point, as functions of the coordinates alone.
 
     Locals: coordinates at both ends of the interval, theta. Instance parameters: the point's place tau in the interval,
-    0 to 1, and the velocity Z that balances it. With R(Z, y) = 0 the balance and L the weighted outputs, dZ/dy is
-    -R_z^-1 R_y, and the total Hessian is that of L + nu.R pulled back along (I, dZ/dy), with nu = -R_z^-T L_z.
+    0 to 1, and the velocity Z that balances it.
     """
     q0, q1, z = (ca.SX.sym(name, size) for name, size in (("q0", body.n), ("q1", body.n), ("Z", 3)))
     theta, tau, delta = (ca.SX.sym(name) for name in ("theta", "tau", "delta"))
@@ -74,15 +72,7 @@ def bump_point(body: BumpBody, friction: Friction, h: float) -> LocalFunction:
     out = ca.vertcat(z[2], ca.cos(theta) * z[0] - ca.sin(theta) * z[1], power)
 
     y = ca.vertcat(q0, q1, theta)
-    R_z, R_y = ca.jacobian(balance, z), ca.jacobian(balance, y)
-    slope = -ca.solve(R_z, ca.densify(R_y))
-    jacobian = ca.jacobian(out, y) + ca.jacobian(out, z) @ slope
-    weight, nu = ca.SX.sym("weight", 3), ca.SX.sym("nu", 3)
-    total = ca.dot(weight, out)
-    inner = ca.hessian(total + ca.dot(nu, balance), ca.vertcat(y, z))[0]
-    inner = ca.substitute(inner, nu, -ca.solve(R_z.T, ca.densify(ca.jacobian(total, z).T)))
-    frame = ca.vertcat(ca.SX.eye(y.shape[0]), slope)
-    return total_function("bump", y, ca.vertcat(tau, z), delta, out, jacobian, frame.T @ inner @ frame, weight)
+    return implicit_function("bump", y, tau, z, delta, balance, out)
 
 
 def _piece_length(n: int) -> LocalFunction:
@@ -128,9 +118,12 @@ class BumpTranscription:
     velocity: BumpVelocity
 
     @property
-    def problem(self) -> SimpleNamespace:
-        """What the solver asks of a problem: how the balance enters."""
-        return SimpleNamespace(formulation=MAP)
+    def lifted(self) -> bool:
+        return False
+
+    @property
+    def speed_unit(self) -> float:
+        return RADIANS
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks, objective first; they do not change."""

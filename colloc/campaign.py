@@ -11,13 +11,18 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from dataclasses import replace
 
 from colloc.basins import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
-from colloc.gait import Fourier
+from colloc.gait import Fourier, Harmonic
 from colloc.optimise import is_trivial, maximise_efficiency
+from colloc.path_samples import fourier_through
 from colloc.problem import Problem
-from colloc.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.sampling import LATIN_HYPERCUBE, seed_class, start_gait
 from colloc.solution import Certificate, Level, Solution
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+ARCHIVED_HARMONICS = 16
+"""Free paths and polygons are archived and told apart by their Fourier series in arc length."""
 
 
 class _TimeLimit(Exception):
@@ -30,7 +35,7 @@ def run_start(problem: Problem, sampler: str, seed: int, start: int, time_limit:
     The time limit [s] is checked between the levels of the continuation.
     """
     begin, cpu = time.perf_counter(), time.process_time()
-    guess = problem.guess
+    guess = fourier_through(problem.guess, seed_class(problem))
     reached: list[Level] = []
     outcome = Outcome(start, ERROR, "", guess, guess)
 
@@ -61,7 +66,8 @@ def _outcome(start: int, guess: Fourier, solution: Solution) -> Outcome:
     optimal = [level for level in solution.levels if level.optimal]
     measured: Certificate | Level | None = solution.certificate or (optimal[-1] if optimal else None)
     status = TRIVIAL if is_trivial(solution) else solution.status
-    outcome = Outcome(start, status, solution.message, guess.resized(solution.gait.n_harmonic), solution.gait)
+    gait = fourier_through(solution.gait, Harmonic(ARCHIVED_HARMONICS, solution.problem.gait.symmetry))
+    outcome = Outcome(start, status, solution.message, guess.resized(gait.n_harmonic), gait)
     if measured is not None:
         efficiency, distance, work = measured.efficiency, measured.distance, measured.work
         outcome = replace(outcome, delta=optimal[-1].delta, efficiency=efficiency, distance=distance, work=work)
@@ -144,7 +150,8 @@ def run_starts(
                 if alone:
                     text = "its worker process died twice (killed, or out of memory)."
                     for start in pending.values():
-                        yield Outcome(start, CRASHED, text, problem.guess, problem.guess)
+                        guess = fourier_through(problem.guess, seed_class(problem))
+                        yield Outcome(start, CRASHED, text, guess, guess)
                 else:
                     suspects = list(pending.values())
             finally:

@@ -7,7 +7,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from colloc.nlp import NlpResult, Solver
-from colloc.transcription import Transcription
+from colloc.program import GaitProgram
 
 _SATISFIED = 1e-8
 _COMPONENTS = ("force along the tail", "force across the tail", "torque about the tail")
@@ -15,12 +15,12 @@ _LAWS = ("tangential force", "normal force", "couple")
 _SMALLEST_PIVOT = 1e-9
 
 
-def row_meaning(transcription: Transcription, row: int) -> tuple[str, float]:
+def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
     """What a constraint row states, and the phase at which it does.
 
     Parameters
     ----------
-    transcription : Transcription
+    transcription : GaitProgram
     row : int
         Index among all constraint rows.
     """
@@ -48,7 +48,7 @@ def row_meaning(transcription: Transcription, row: int) -> tuple[str, float]:
     return kind + name, float(mesh.edges[index])
 
 
-def time_window(transcription: Transcription, excess: np.ndarray, group: str) -> tuple[float, float]:
+def time_window(transcription: GaitProgram, excess: np.ndarray, group: str) -> tuple[float, float]:
     """First and last phase at which a group of rows is violated by at least a tenth of its worst."""
     rows = transcription.groups[group]
     bad = rows.start + np.flatnonzero(excess[rows] >= 0.1 * excess[rows].max())
@@ -56,7 +56,7 @@ def time_window(transcription: Transcription, excess: np.ndarray, group: str) ->
     return min(phases), max(phases)
 
 
-def explanation(transcription: Transcription, result: NlpResult, delta: float) -> str:
+def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> str:
     """One or two sentences: what failed where, and what to try next."""
     worst = int(np.argmax(result.excess))
     if result.excess[worst] > _SATISFIED:
@@ -85,7 +85,7 @@ def _advice(group: str) -> str:
     return "use more intervals or another guess"
 
 
-def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
+def redundant_equations(solver: Solver[GaitProgram], x: np.ndarray, delta: float) -> list[str]:
     """Kinds of equations that are (nearly) linear combinations of others at x; an optimiser fails on those.
 
     Parameters

@@ -20,7 +20,7 @@ from colloc.solution import Solution
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#777777"
 """Okabe-Ito colours, distinguishable with any colour vision."""
 
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -82,15 +82,20 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     axes.legend(loc="upper right", fontsize=7, handlelength=1.2)
 
 
+def draw_allowed(axes: Axes, body: Chain, joint_limit: float) -> None:
+    """Grey over the pairs of joint angles that joint limits or links do not allow."""
+    grid = np.linspace(-np.pi, np.pi, 181)
+    a, b = np.meshgrid(grid, grid)
+    allowed = crossing_depth(body, np.stack([a.ravel(), b.ravel()])) < 1e-9
+    allowed &= np.maximum(abs(a), abs(b)).ravel() <= joint_limit + 1e-9
+    shade = np.where(allowed.reshape(a.shape), np.nan, 1.0)
+    axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
+
+
 def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
     """The gait in the plane of two joint angles, over the shapes that joint limits and links allow."""
     if problem.body.n_joint == 2:
-        grid = np.linspace(-np.pi, np.pi, 181)
-        a, b = np.meshgrid(grid, grid)
-        allowed = crossing_depth(problem.body, np.stack([a.ravel(), b.ravel()])) < 1e-9
-        allowed &= np.maximum(abs(a), abs(b)).ravel() <= problem.joint_limit + 1e-9
-        shade = np.where(allowed.reshape(a.shape), np.nan, 1.0)
-        axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
+        draw_allowed(axes, problem.body, problem.joint_limit)
     q = angles[[first, second]]
     segments = np.stack([q[:, :-1].T, q[:, 1:].T], axis=1)
     lines = LineCollection(list(segments), cmap="cividis_r", lw=2.2, capstyle="round")
@@ -113,12 +118,12 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
     """Speeds of the link midpoints over a period, on a logarithmic scale that shows stick, and delta."""
     problem, motion = solution.problem, solution.sample(t)
-    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, solution.last.delta).velocity
+    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, solution.delta_per_period).velocity
     speed = np.hypot(link.vs, link.vn)
     for i, colour in zip(range(problem.body.n_link), [BLUE, ORANGE, GREEN, RED, PURPLE, SKY] * 2, strict=False):
         axes.semilogy(t, speed[i], color=colour, lw=1.4, label=f"link {i + 1}")
-    axes.axhline(solution.last.delta, color=GREY, lw=1, ls=":")
-    axes.text(1.0, solution.last.delta, "δ ", color=GREY, ha="right", va="bottom")
+    axes.axhline(solution.delta_per_period, color=GREY, lw=1, ls=":")
+    axes.text(1.0, solution.delta_per_period, "δ ", color=GREY, ha="right", va="bottom")
     axes.set(xlim=(0, 1), ylabel="midpoint speed  [1/period]", xlabel="phase t")
     axes.legend(loc="lower left", ncols=min(3, problem.body.n_link), handlelength=1.2, columnspacing=1)
 
@@ -135,7 +140,7 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 def solution_figure(solution: Solution) -> Figure:
     """Filmstrip, lab paths, path in the joint plane, speeds and power of a solution."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11, 8.2), layout="constrained")
         grid = figure.add_gridspec(3, 3, height_ratios=(0.75, 1.25, 0.9))
         t = np.linspace(0.0, 1.0, 1201)
@@ -157,7 +162,8 @@ def solution_figure(solution: Solution) -> Figure:
         verdict = "" if solution.status == "solved" else f"   —   {solution.status.upper()}"
         figure.suptitle(
             f"{solution.problem.name}: efficiency d/W = {solution.efficiency:.5f}   "
-            f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}",
+            f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}\n"
+            f"class: {solution.problem.gait.describe()}",
             x=0.01,
             ha="left",
             color="black" if solution.status == "solved" else RED,
@@ -167,6 +173,6 @@ def solution_figure(solution: Solution) -> Figure:
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Save as PNG and PDF beside each other, whatever suffix `path` has."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         for suffix in (".png", ".pdf"):
             figure.savefig(path.with_suffix(suffix))

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.errors import ProblemError
-
-SYMMETRIES = ("none", "bilateral", "antipodal")
+from colloc.symmetry import SYMMETRIES, fraction
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +50,11 @@ class Fourier:
     @property
     def n_joint(self) -> int:
         return len(self.mean)
+
+    @property
+    def delta_unit(self) -> float:
+        """Delta of harmonic gaits is in body lengths per period as it is."""
+        return 1.0
 
     @property
     def n_harmonic(self) -> int:
@@ -108,7 +112,11 @@ class Harmonic:
     @property
     def fraction(self) -> float:
         """The part of the period that has to be solved; symmetry gives the rest."""
-        return 1.0 if self.symmetry == "none" else 0.5
+        return fraction(self.symmetry)
+
+    def describe(self) -> str:
+        """The class in words, for reports."""
+        return f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}, symmetry {self.symmetry}"
 
     def _basis(self, n_joint: int) -> np.ndarray:
         """``(n_joint * (2 K + 1), n_parameter)``: parameters to (mean, cos_1, sin_1, cos_2, ...) of every joint."""
@@ -139,6 +147,10 @@ class Harmonic:
         """The gait of a parameter vector."""
         table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
         return Fourier(table[:, 0], table[:, 1::2], table[:, 2::2])
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Fourier:
+        """The gait of a parameter vector; the mesh does not matter."""
+        return self.fourier(parameters, n_joint)
 
     def parameters(self, gait: Fourier) -> np.ndarray:
         """The parameter vector of the class member nearest to `gait`, after shifting its start phase if that is free."""

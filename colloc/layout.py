@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mesh import Mesh, uniform_mesh
+from colloc.path_class import FreePath
 from colloc.problem import LIFTED, Problem
 from colloc.schemes import scheme
 
@@ -39,15 +40,18 @@ def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
 def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
     """Index arrays of all variables of a problem on a mesh."""
     n_joint, n_link = problem.body.n_joint, problem.body.n_link
+    gait, path = problem.gait, problem.has_path
+    size = gait.size(n_joint, mesh.n) if isinstance(gait, FreePath) else gait.size(n_joint)
+    n_point = 0 if path else mesh.n_point  # along a path angles, rates and velocities follow from the parameters
     sizes = {
-        "parameters": (problem.gait.size(n_joint), 1),
+        "parameters": (size, 1),
         "theta": (1, mesh.n_site),
         "distance": (1, mesh.n + 1),
         "work": (1, mesh.n + 1),
-        "angles": (n_joint, mesh.n_point),
-        "rates": (n_joint, mesh.n_point),
-        "z": (3, mesh.n_point),
-        "forces": (3 * n_link if problem.formulation == LIFTED else 0, mesh.n_point),
+        "angles": (n_joint, n_point),
+        "rates": (n_joint, n_point),
+        "z": (3, n_point),
+        "forces": (3 * n_link if problem.formulation == LIFTED else 0, n_point),
     }
     indices, start = {}, 0
     for name, (rows, columns) in sizes.items():

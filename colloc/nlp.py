@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -11,9 +12,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from colloc.blocks import Oracles, oracles
-from colloc.layout import RADIANS
-from colloc.problem import LIFTED
-from colloc.transcription import Transcription, worst_instants
+from colloc.program import Program
 
 IPOPT_OPTIONS: dict[str, object] = {
     "print_level": 0,
@@ -94,16 +93,17 @@ class NlpResult:
 
 
 OPTIMAL_TOLERANCE = 1e-6
+AnyProgram = TypeVar("AnyProgram", bound=Program)
 _REGIONS = 20
 
 
-class Solver:
+class Solver(Generic[AnyProgram]):
     """A transcription bound to IPOPT; built once, solved for many deltas and starts."""
 
-    def __init__(self, transcription: Transcription, options: dict[str, object] | None = None) -> None:
+    def __init__(self, transcription: AnyProgram, options: dict[str, object] | None = None) -> None:
         self.transcription = transcription
         self.oracles: Oracles = oracles(transcription.assembly)
-        chosen = {**IPOPT_OPTIONS, **(LIFTED_OPTIONS if transcription.problem.formulation == LIFTED else {}), **(options or {})}
+        chosen = {**IPOPT_OPTIONS, **(LIFTED_OPTIONS if transcription.lifted else {}), **(options or {})}
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True, **self.oracles.options}
@@ -142,7 +142,7 @@ class Solver:
     ) -> NlpResult:
         t = self.transcription
         own = t.layout.parameters[:, 0]
-        parameters = self.oracles.parameter_vector(delta / RADIANS, t.block_parameters(x[own]))
+        parameters = self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[own]))
         lower, upper = t.lower.copy(), t.upper.copy()
         lower[own], upper[own] = np.maximum(lower[own], x[own] - radius), np.minimum(upper[own], x[own] + radius)
         bounds = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
@@ -173,23 +173,9 @@ class Solver:
 
     def equality_jacobian(self, x: np.ndarray, delta: float) -> tuple[sparse.csr_matrix, np.ndarray]:
         """Jacobian of the equations in the free variables at x, and their row numbers among all constraints."""
-        own = self.transcription.layout.parameters[:, 0]
-        parameters = self.oracles.parameter_vector(delta / RADIANS, self.transcription.block_parameters(x[own]))
-        return self._equality_jacobian(x, parameters)
-
-    def check_excess(self, x: np.ndarray) -> float:
-        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
         t = self.transcription
-        parameters = x[t.layout.parameters[:, 0]]
-        worst = worst_instants(t.problem, t.mesh, t.checks, parameters)
-        gait = t.gait(x)
-        excess = 0.0
-        for (name, check), times in zip(t.checks, worst, strict=True):
-            rows = t.groups[name]
-            values = np.array(check.map(times.size)(gait.angles(times))).ravel()
-            excess = max(excess, float(np.max(values - t.constraint_upper[rows])))
-            excess = max(excess, float(np.max(t.constraint_lower[rows] - values)))
-        return excess
+        parameters = self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
+        return self._equality_jacobian(x, parameters)
 
     def _measured(
         self,

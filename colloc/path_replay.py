@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import cumulative_simpson, simpson
@@ -20,6 +21,9 @@ from colloc.friction import Friction
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
+
+
+_ONE_SIDED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -74,17 +78,18 @@ def _at(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray
     return t, solved.z[2], cx[0], cy[0], power, _actuator_power(body, now, angles, rates), solved.residual
 
 
-def _integrated(t, omega, cx, cy, power, actuator, residual) -> tuple[float, float, float, float, float]:
-    theta = cumulative_simpson(omega, x=t, initial=0.0)
-    c, s = np.cos(theta), np.sin(theta)
-    dx, dy = simpson(c * cx - s * cy, x=t), simpson(s * cx + c * cy, x=t)
-    return (
-        float(np.hypot(dx, dy)),
-        float(simpson(power, x=t)),
-        float(theta[-1]),
-        float(simpson(actuator, x=t)),
-        float(residual.max()),
-    )
+def _integrated(segments: list[tuple[np.ndarray, ...]], every: int) -> tuple[float, float, float, float, float]:
+    """Distance, work, rotation, actuator work and largest residual, by Simpson's rule on every `every`-th instant."""
+    heading, end, worked, actuated, worst = 0.0, 0j, 0.0, 0.0, 0.0
+    for segment in segments:
+        t, omega, cx, cy, power, actuator, residual = (a[::every] for a in segment)
+        theta = heading + cumulative_simpson(omega, x=t, initial=0.0)
+        c, s = np.cos(theta), np.sin(theta)
+        end += simpson(c * cx - s * cy, x=t) + 1j * simpson(s * cx + c * cy, x=t)
+        heading = float(theta[-1])
+        worked, actuated = worked + float(simpson(power, x=t)), actuated + float(simpson(actuator, x=t))
+        worst = max(worst, float(residual.max()))
+    return float(abs(end)), worked, heading, actuated, worst
 
 
 def replay(
@@ -96,6 +101,7 @@ def replay(
     instants: int = 1600,
     tolerance: float = 1e-6,
     most_instants: int = 25600,
+    breaks: np.ndarray | tuple[float, ...] = (),
 ) -> Replay:
     """Distance, work and efficiency of a path over one period, to a relative error in the efficiency.
 
@@ -111,6 +117,8 @@ def replay(
     tolerance : float
         Relative error of the efficiency.
     most_instants : int
+    breaks : (n,), optional
+        Phases in (0, 1) where the rates jump (corners); they are integrated up to and from there.
 
     Raises
     ------
@@ -121,20 +129,27 @@ def replay(
     """
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
-    grid = _at(body, friction, path, delta, np.linspace(0.0, 1.0, instants + 1))
+    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
+    segments = []
+    for a, b in pairwise(ends):
+        count = 4 * max(1, round(instants * (b - a) / 4))
+        grid = np.linspace(a, b, count + 1)
+        # one-sided limits at jumps
+        inside = grid.copy()
+        inside[0] += _ONE_SIDED * (b - a) if a > 0 else 0.0
+        inside[-1] -= _ONE_SIDED * (b - a) if b < 1 else 0.0
+        segments.append((grid, *_at(body, friction, path, delta, inside)[1:]))
     while True:
-        fine = _integrated(*grid)
-        coarse = _integrated(*(a[::2] for a in grid))
+        fine, coarse = _integrated(segments, 1), _integrated(segments, 2)
         if not (fine[1] > 0 and coarse[1] > 0):
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
         # kinks at stick limit the order to two: the difference over three estimates the finer grid's error
         efficiency, before = fine[0] / fine[1], coarse[0] / coarse[1]
         error = abs(efficiency - before) / 3 / max(abs(efficiency), 1e-300)
-        n = grid[0].size - 1
+        n = sum(segment[0].size - 1 for segment in segments)
         if error <= tolerance or 2 * n > most_instants:
             return Replay(fine[0], fine[1], efficiency, fine[2], fine[3], fine[4], error, n)
-        between = 0.5 * (grid[0][1:] + grid[0][:-1])
-        grid = _interleaved(grid, _at(body, friction, path, delta, between))
+        segments = [_interleaved(old, _at(body, friction, path, delta, 0.5 * (old[0][1:] + old[0][:-1]))) for old in segments]
 
 
 def _interleaved(old: tuple[np.ndarray, ...], new: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:

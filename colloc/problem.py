@@ -13,10 +13,14 @@ from colloc.body import Chain
 from colloc.contact import crossing_depth
 from colloc.errors import ProblemError
 from colloc.friction import Friction
-from colloc.gait import Fourier, Harmonic
+from colloc.gait import Harmonic
+from colloc.gait_fields import CLASSES, GAITS, AnyClass, AnyGait, class_from, fields, gait_from
+from colloc.path_class import FreePath, Polygon
+from colloc.path_samples import fourier_through, symmetric_samples
 from colloc.schemes import scheme
 
 MAP, LIFTED = "map", "lifted"
+DELTA_START, PATH_DELTA_START = 0.1, 0.01
 _CHECKED_PHASES = 2000
 _SLACK = 1e-9
 
@@ -47,20 +51,22 @@ class Problem:
     ----------
     name : str
         Used for file names: letters, digits, ``_``, ``-`` and ``.``.
-    guess : Fourier
-        An admissible gait to start from; it is projected onto the class `gait`.
+    guess : Fourier, ArcPath or Corners
+        An admissible gait to start from, of any class; it is projected onto the class `gait`.
     body : Chain
     friction : Friction
-    gait : Harmonic
-        The class of gaits; which paths in shape space are allowed decides the answer.
+    gait : Harmonic, FreePath or Polygon
+        The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md).
     delta : float
-        Regularisation speed of friction at which the problem is finally solved, in body lengths per period.
+        Regularisation speed of friction at which the problem is finally solved, in body lengths per period; for free paths
+        and polygons at unit shape speed, in body lengths per radian of path.
     delta_start : float
-        Where the continuation in delta begins.
+        Where the continuation in delta begins; by default 0.1, and 0.01 where delta is measured at unit shape speed.
     joint_limit : float
         Largest |joint angle| [rad], at most pi.
     smallest_shape_speed : float
-        Lower bound on the root-mean-square shape speed [rad per radian of phase]. It keeps the search away from gaits
+        Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
+        2 pi. It keeps the search away from gaits
         whose speeds sink to delta, where regularised friction is viscous and efficiency meaningless.
     intervals : int
         Mesh intervals on the part of the period that is solved.
@@ -73,12 +79,12 @@ class Problem:
     """
 
     name: str
-    guess: Fourier
+    guess: AnyGait
     body: Chain = Chain()
     friction: Friction = Friction()
-    gait: Harmonic = Harmonic()
+    gait: AnyClass = Harmonic()
     delta: float = 1e-4
-    delta_start: float = 0.1
+    delta_start: float = None  # type: ignore[assignment]
     joint_limit: float = float(np.pi)
     smallest_shape_speed: float = 0.1
     intervals: int = 30
@@ -95,11 +101,19 @@ class Problem:
     def _check_types(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
-        for field, kind in (("guess", Fourier), ("body", Chain), ("friction", Friction), ("gait", Harmonic)):
-            if not isinstance(getattr(self, field), kind):
-                raise ProblemError(f"{field} must be a {kind.__name__}, not {type(getattr(self, field)).__name__}.")
+        for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
+            if not isinstance(getattr(self, field), kinds):
+                names = " or ".join(kind.__name__ for kind in kinds)
+                raise ProblemError(f"{field} must be a {names}, not {type(getattr(self, field)).__name__}.")
+
+    @property
+    def has_path(self) -> bool:
+        """Whether the class bounds the path itself (free paths, polygons) rather than its harmonics."""
+        return isinstance(self.gait, (FreePath, Polygon))
 
     def _check_numbers(self) -> None:
+        if self.delta_start is None:
+            object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
@@ -116,31 +130,50 @@ class Problem:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
         if self.formulation not in (MAP, LIFTED):
             raise ProblemError(f"formulation must be {MAP!r} or {LIFTED!r}, not {self.formulation!r}.")
-        collocation = scheme(self.scheme)
         if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
-        per_interval = collocation.s - collocation.left
-        fewest = max(2, -(-4 * self.gait.harmonics // per_interval))
-        if self.intervals < fewest:
-            raise ProblemError(
-                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot resolve "
-                f"{self.gait.harmonics} harmonics; use at least {fewest}."
-            )
+        self._check_resolution()
         if self.intervals > 100_000:
             raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
+
+    def _check_resolution(self) -> None:
+        collocation, kind = scheme(self.scheme), type(self.gait).__name__
+        if isinstance(self.gait, Harmonic):
+            per_interval = collocation.s - collocation.left
+            fewest, what = max(2, -(-4 * self.gait.harmonics // per_interval)), f"{self.gait.harmonics} harmonics"
+        else:
+            if self.formulation != MAP:
+                raise ProblemError(f"the class {kind} is solved in the formulation {MAP!r} only.")
+            if collocation.left:
+                raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
+            fewest, what = (2 * self.gait.pieces, "the sides") if isinstance(self.gait, Polygon) else (4, "a path")
+        if self.intervals < fewest:
+            raise ProblemError(
+                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot resolve {what}; "
+                f"use at least {fewest}."
+            )
 
     def _check_symmetry(self) -> None:
         if self.gait.symmetry == "bilateral" and not self.body.symmetric:
             raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
+        if self.has_path and self.body.n_joint < 2:
+            raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links.")
+        if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
+            raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
 
     def _check_guess(self) -> None:
         if self.guess.n_joint != self.body.n_joint:
             raise ProblemError(
                 f"guess has {self.guess.n_joint} joints but a body of {self.body.n_link} links has {self.body.n_joint}."
             )
-        parameters = self.gait.parameters(self.guess)
-        guess = self.gait.fourier(parameters, self.body.n_joint)
-        rms = np.sqrt(0.5 * np.sum(np.arange(1, guess.n_harmonic + 1) ** 2 * (guess.cos**2 + guess.sin**2)))
+        if isinstance(self.gait, Harmonic):
+            near = fourier_through(self.guess, self.gait)
+            guess: AnyGait = self.gait.fourier(self.gait.parameters(near), self.body.n_joint)
+            rms = np.sqrt(0.5 * np.sum(np.arange(1, guess.n_harmonic + 1) ** 2 * (guess.cos**2 + guess.sin**2)))
+        else:
+            guess = self.guess
+            points = symmetric_samples(guess, self.gait.symmetry)
+            rms = np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.gait.fraction)
         if rms < self.smallest_shape_speed:
             raise ProblemError(
                 f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
@@ -165,14 +198,15 @@ class Problem:
 
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON)."""
-        fields = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        fields["guess"] = {k: getattr(self.guess, k).tolist() for k in ("mean", "cos", "sin")}
-        for name in ("body", "friction", "gait"):
-            fields[name] = dataclasses.asdict(fields[name])
-        return fields
+        stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        for name in ("guess", "gait"):
+            stated[name] = fields(stated[name])
+        for name in ("body", "friction"):
+            stated[name] = dataclasses.asdict(stated[name])
+        return stated
 
     @classmethod
-    def from_dict(cls, fields: dict) -> Problem:
+    def from_dict(cls, stated: dict) -> Problem:
         """The problem that `to_dict` wrote.
 
         Raises
@@ -181,12 +215,12 @@ class Problem:
             If a field is missing, unknown or has an unusable value.
         """
         try:
-            fields = dict(fields)
-            fields["guess"] = Fourier(**fields["guess"])
-            fields["body"] = Chain(tuple(fields["body"]["lengths"]))
-            fields["friction"] = Friction(**fields["friction"])
-            fields["gait"] = Harmonic(**fields["gait"])
-            return cls(**fields)
+            stated = dict(stated)
+            stated["guess"] = gait_from(stated["guess"])
+            stated["body"] = Chain(tuple(stated["body"]["lengths"]))
+            stated["friction"] = Friction(**stated["friction"])
+            stated["gait"] = class_from(stated["gait"])
+            return cls(**stated)
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from colloc.balance import instant, total_power
 from colloc.fixed_point import solve_balance
-from colloc.gait import Fourier
+from colloc.gait_fields import AnyGait
 from colloc.mesh import Mesh
 from colloc.problem import Problem
 
@@ -20,16 +20,16 @@ _SPLIT_SHARE = 0.3
 _MOST_INTERVALS = 4000
 
 
-def interval_errors(problem: Problem, mesh: Mesh, gait: Fourier, delta: float) -> np.ndarray:
+def interval_errors(problem: Problem, mesh: Mesh, gait: AnyGait, delta: float) -> np.ndarray:
     """Each interval's contribution to the relative efficiency error of collocating `gait` on `mesh`, signed, ``(n,)``.
 
     Parameters
     ----------
     problem : Problem
     mesh : Mesh
-    gait : Fourier
+    gait : AnyGait
     delta : float
-        Regularisation speed, per period.
+        Regularisation speed, in the units of the problem's class of gaits.
     """
     n, s = mesh.n, mesh.scheme.s
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
@@ -39,8 +39,9 @@ def interval_errors(problem: Problem, mesh: Mesh, gait: Fourier, delta: float) -
     tau = np.concatenate([mesh.scheme.c, panel_nodes])
     t = (mesh.edges[:-1, None] + mesh.h[:, None] * tau).ravel()
     angles, rates = gait.angles(t), gait.rates(t)
-    solved = solve_balance(problem.body, problem.friction, angles, rates, delta)
-    now = instant(problem.body, problem.friction, angles, rates, solved.z, delta)
+    slow = delta * gait.delta_unit
+    solved = solve_balance(problem.body, problem.friction, angles, rates, slow)
+    now = instant(problem.body, problem.friction, angles, rates, solved.z, slow)
     cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
     power = total_power(now.velocity, now.force)
     omega, cx, cy, power = (a.reshape(n, tau.size) for a in (solved.z[2], cx[0], cy[0], power[0]))
@@ -85,7 +86,7 @@ def _panel_integrals(nodes: np.ndarray) -> np.ndarray:
     return result / _PANELS
 
 
-def refined_edges(problem: Problem, mesh: Mesh, gait: Fourier, delta: float, tolerance: float) -> np.ndarray | None:
+def refined_edges(problem: Problem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float) -> np.ndarray | None:
     """Edges of a mesh on which collocating `gait` is wrong by less than `tolerance`; None if `mesh` is good already.
 
     Intervals are halved, largest errors first and several times in one call, since the gait can be tried on any mesh.

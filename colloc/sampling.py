@@ -14,13 +14,16 @@ from scipy.stats import qmc
 
 from colloc.contact import crossing_depth
 from colloc.errors import ProblemError
-from colloc.gait import Fourier
+from colloc.gait import Fourier, Harmonic
+from colloc.gait_fields import AnyGait
+from colloc.path_samples import fourier_through
 from colloc.problem import Problem
 
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
 SAMPLERS = (LATIN_HYPERCUBE, PERTURBED)
 BLOCK = 25
 """Starts per Latin hypercube: start k belongs to hypercube k // BLOCK, seeded by that number and the run's seed."""
+PATH_SEED_HARMONICS = 2
 _FRACTIONS = (0.2, 0.95)
 _PHASES = 200
 _BISECTIONS = 40
@@ -51,6 +54,11 @@ def shape_speed(gait: Fourier) -> float:
     return float(np.sqrt(0.5 * np.sum(k**2 * (gait.cos**2 + gait.sin**2))))
 
 
+def seed_class(problem: Problem) -> Harmonic:
+    """The harmonics that starts are drawn from: the problem's own, or a few where its class bounds the path."""
+    return problem.gait if isinstance(problem.gait, Harmonic) else Harmonic(PATH_SEED_HARMONICS, problem.gait.symmetry)
+
+
 def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
     """Start number `start` of a Latin hypercube over the mean and the harmonics of the problem's class of gaits.
 
@@ -62,7 +70,7 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
         If no admissible gait moves as fast as the problem's ``smallest_shape_speed``.
     """
     block, row = divmod(start, BLOCK)
-    n_joint, harmonics = problem.body.n_joint, problem.gait.harmonics
+    n_joint, harmonics = problem.body.n_joint, seed_class(problem).harmonics
     dimension = n_joint * (2 * harmonics + 1) + 1
     rng = np.random.default_rng([seed, block])
     unit = qmc.LatinHypercube(dimension, seed=rng).random(BLOCK)[row]
@@ -79,7 +87,7 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
 
 def _scaled(problem: Problem, unit: np.ndarray) -> Fourier:
     """The member of the class that a point of the unit cube stands for."""
-    n_joint, harmonics = problem.body.n_joint, problem.gait.harmonics
+    n_joint, harmonics = problem.body.n_joint, seed_class(problem).harmonics
     table = (2 * unit[:-1] - 1).reshape(n_joint, -1)
     falling = 1.0 / np.arange(1, harmonics + 1)
     drawn = Fourier(table[:, 0], table[:, 1 : harmonics + 1] * falling, table[:, harmonics + 1 :] * falling)
@@ -88,7 +96,7 @@ def _scaled(problem: Problem, unit: np.ndarray) -> Fourier:
 
 def _multiplied(problem: Problem, drawn: Fourier, fraction: float) -> Fourier:
     """The class member nearest to `drawn`, at a fraction of the largest admissible amplitude."""
-    gait = problem.gait.fourier(problem.gait.parameters(drawn), problem.body.n_joint)
+    gait = seed_class(problem).fourier(seed_class(problem).parameters(drawn), problem.body.n_joint)
     largest = largest_amplitude(problem, gait)
     if not np.isfinite(largest):
         return gait
@@ -96,7 +104,7 @@ def _multiplied(problem: Problem, drawn: Fourier, fraction: float) -> Fourier:
     return Fourier(factor * gait.mean, factor * gait.cos, factor * gait.sin)
 
 
-def perturbed_gait(problem: Problem, optima: Sequence[Fourier], seed: int, start: int, spread: float = 0.3) -> Fourier:
+def perturbed_gait(problem: Problem, optima: Sequence[AnyGait], seed: int, start: int, spread: float = 0.3) -> Fourier:
     """Start number `start` near a known optimum: optima take turns, coefficients move by normals of `spread` [rad].
 
     Where that leaves the admissible region, the whole gait is shrunk back into it.
@@ -104,11 +112,11 @@ def perturbed_gait(problem: Problem, optima: Sequence[Fourier], seed: int, start
     if not optima:
         raise ProblemError("perturbed starts need at least one known optimum.")
     rng = np.random.default_rng([seed, start])
-    near = optima[start % len(optima)].resized(problem.gait.harmonics)
+    near = fourier_through(optima[start % len(optima)], seed_class(problem)).resized(seed_class(problem).harmonics)
     for _ in range(_ATTEMPTS):
         mean, cos, sin = (a + spread * rng.standard_normal(a.shape) for a in (near.mean, near.cos, near.sin))
         drawn = Fourier(mean, cos, sin)
-        member = problem.gait.fourier(problem.gait.parameters(drawn), problem.body.n_joint)
+        member = seed_class(problem).fourier(seed_class(problem).parameters(drawn), problem.body.n_joint)
         gait = _multiplied(problem, member, min(1.0, 1.0 / largest_amplitude(problem, member)))
         if shape_speed(gait) > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait

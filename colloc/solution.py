@@ -10,7 +10,8 @@ from importlib import metadata
 import numpy as np
 
 from colloc.balance import Instant, instant, total_power
-from colloc.gait import Fourier
+from colloc.fixed_point import solve_balance
+from colloc.gait_fields import AnyGait
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
 from colloc.problem import Problem
@@ -25,9 +26,9 @@ class Level:
     Attributes
     ----------
     delta : float
-        Regularisation speed, per period.
+        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit shape speed.
     edges : (n_interval + 1,)
-        The mesh.
+        The mesh, in phases of the gait found.
     x, lam_x : (n,)
         Variables (see `colloc.layout`) and multipliers of their bounds.
     lam_g : (m,)
@@ -199,16 +200,29 @@ class Solution:
         return problem_layout(self.problem, self.mesh)
 
     @property
-    def gait(self) -> Fourier:
+    def gait(self) -> AnyGait:
         """The gait of the last level."""
         parameters = self.last.x[self.layout.parameters[:, 0]]
-        return self.problem.gait.fourier(parameters, self.problem.body.n_joint)
+        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.last.edges)
+
+    @property
+    def delta_per_period(self) -> float:
+        """Regularisation speed of the last level in body lengths per period, whatever the class measures it in."""
+        return self.last.delta * self.gait.delta_unit
 
     def at_points(self) -> tuple[np.ndarray, Instant]:
         """Phases of the collocation points and the body there, from the variables of the last level (per period)."""
+        problem = self.problem
+        return self.mesh.times, instant(problem.body, problem.friction, *self._point_motion(), self.delta_per_period)
+
+    def _point_motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, rates and tail velocities per period at the collocation points."""
         x, layout, problem = self.last.x, self.layout, self.problem
-        angles, rates, z = x[layout.angles], RADIANS * x[layout.rates], RADIANS * x[layout.z]
-        return self.mesh.times, instant(problem.body, problem.friction, angles, rates, z, self.last.delta)
+        if layout.z.size:
+            return x[layout.angles], RADIANS * x[layout.rates], RADIANS * x[layout.z]
+        gait, times = self.gait, self.mesh.times
+        angles, rates = gait.angles(times), gait.rates(times)
+        return angles, rates, solve_balance(problem.body, problem.friction, angles, rates, self.delta_per_period).z
 
     def sample(self, t: np.ndarray | float) -> Motion:
         """The motion at phases t, any real numbers; whole periods add up.
@@ -230,7 +244,7 @@ class Solution:
         if symmetry == "bilateral":
             # seen from the head the body repeats itself with reversed rates
             here = instant(
-                body, self.problem.friction, self.gait.angles(reduced), self.gait.rates(reduced), z, self.last.delta
+                body, self.problem.friction, self.gait.angles(reduced), self.gait.rates(reduced), z, self.delta_per_period
             ).velocity
             head = np.stack([here.vs[-1], here.vn[-1] + 0.5 * body.lengths[-1] * here.w[-1], -here.w[-1]])
             z = np.where(second, head, z)
@@ -255,7 +269,7 @@ class Solution:
         k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
         tau = (t - mesh.edges[k]) / mesh.h[k]
         value, integral = scheme.lagrange(tau), scheme.integrals(tau)
-        z_points = RADIANS * x[layout.z]
+        z_points = self._point_motion()[2]
         _, now = self.at_points()
         site_theta = np.empty(mesh.n_point)
         site_theta[mesh.points] = x[layout.theta[0]][mesh.sites]
@@ -273,7 +287,7 @@ class Solution:
     def power(self, motion: Motion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         problem = self.problem
-        now = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, self.last.delta)
+        now = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, self.delta_per_period)
         return total_power(now.velocity, now.force)[0]
 
 

@@ -13,7 +13,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+import numpy as np
+
 from colloc.errors import CollocError, ProblemError
+from colloc.gait import Fourier
+from colloc.gait_fields import fields
+from colloc.path_gait import ArcPath
 from colloc.problem import Problem, Reference
 from colloc.problem_file import read_problem_file
 from colloc.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Level, Solution
@@ -123,14 +128,20 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
 
 def _gait_lines(solution: Solution) -> list[str]:
     gait = solution.gait
-    lines = []
-    for j in range(gait.n_joint):
-        terms = [f"{gait.mean[j]:+.4f}"]
-        for k in range(gait.n_harmonic):
-            wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
-            terms.append(f"{gait.cos[j, k]:+.4f} cos {wave} {gait.sin[j, k]:+.4f} sin {wave}")
-        lines.append(f"joint {j + 1}: " + " ".join(terms))
-    return lines
+    lines = [f"class: {solution.problem.gait.describe()}"]
+    if isinstance(gait, Fourier):
+        for j in range(gait.n_joint):
+            terms = [f"{gait.mean[j]:+.4f}"]
+            for k in range(gait.n_harmonic):
+                wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
+                terms.append(f"{gait.cos[j, k]:+.4f} cos {wave} {gait.sin[j, k]:+.4f} sin {wave}")
+            lines.append(f"joint {j + 1}: " + " ".join(terms))
+        return lines
+    what = f"path of length {gait.length:.4f} rad"
+    if isinstance(gait, ArcPath):
+        turned = "" if gait.winding is None else f", winding {gait.winding}"
+        return [*lines, f"{what}{turned}, largest curvature {np.abs(gait.curvatures()).max():.3f} per rad"]
+    return [*lines, what, *(f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in gait.corners.T)]
 
 
 def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
@@ -148,7 +159,8 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "distance": solution.distance,
         "work": solution.work,
         "iterations": sum(level.iterations for level in solution.levels),
-        "gait": {key: getattr(solution.gait, key).tolist() for key in ("mean", "cos", "sin")},
+        "class": solution.problem.gait.describe(),
+        "gait": fields(solution.gait),
         "certificate": None,
         "reference": None,
         "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},

@@ -4,6 +4,7 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
 
     /problem            JSON text of all fields          /source     text of the problem file
     /gait/{mean,cos,sin}                                 /versions   JSON text
+         or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
     /levels/000/{edges,x,lam_x,lam_g}, attributes delta, efficiency, distance, work, kkt_error, iterations, ...
     /certificate/{name,value,threshold,passed,meaning}, attributes efficiency, efficiency_error, ...
@@ -20,14 +21,26 @@ import h5py
 import numpy as np
 
 from colloc.errors import CollocError, StoreError
+from colloc.gait_fields import fields
 from colloc.problem import Problem
 from colloc.replaced_file import replaced_file
 from colloc.solution import Certificate, Check, Level, Solution
 
-FORMAT, FORMAT_VERSION = "colloc solution", 1
+FORMAT, FORMAT_VERSION = "colloc solution", 2
 _LARGEST_FILE = 2**31
 _MOTION_SAMPLES = 401
 _LEVEL_ARRAYS = {"edges": "period", "x": "see colloc.layout", "lam_x": "see colloc.layout", "lam_g": "see colloc.layout"}
+
+_GAIT_ARRAYS = {
+    "mean": ("rad", "joint"),
+    "cos": ("rad", "joint, harmonic"),
+    "sin": ("rad", "joint, harmonic"),
+    "edges": ("period", "edge"),
+    "shapes": ("rad", "joint, edge"),
+    "tangents": ("heading in rad, or unit vector", "component, edge"),
+    "length": ("rad", ""),
+    "corners": ("rad", "joint, vertex"),
+}
 
 
 def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -100,8 +113,11 @@ def _write(file: h5py.File, solution: Solution) -> None:
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
     gait = file.create_group("gait")
-    for name, dims in (("mean", "joint"), ("cos", "joint, harmonic"), ("sin", "joint, harmonic")):
-        _dataset(gait, name, getattr(solution.gait, name), "rad", dims)
+    for name, value in fields(solution.gait).items():
+        if name in _GAIT_ARRAYS:
+            _dataset(gait, name, value, *_GAIT_ARRAYS[name])
+        else:
+            gait.attrs[name] = value
     motion = solution.sample(np.linspace(0.0, 1.0, _MOTION_SAMPLES))
     group = file.create_group("motion")
     _dataset(group, "t", motion.t, "period", "time")

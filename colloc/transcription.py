@@ -12,42 +12,23 @@ turns the motion into that direction; nothing is imposed on the sideways displac
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from colloc.blocks import Assembly, Block
+from colloc.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector, stacked
 from colloc.gait import Fourier
 from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function, shape_checks
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
+from colloc.path_samples import Gait
 from colloc.problem import LIFTED, MAP, Problem
 from colloc.velocity_callback import VelocityMap
 
 _SAMPLES_PER_CELL = 16
-
-
-@dataclass(eq=False)
-class Group:
-    """Constraint rows of one kind: bounds, linear part, and what the outputs of each named block contribute."""
-
-    name: str
-    lower: np.ndarray
-    upper: np.ndarray
-    linear: sparse.csr_matrix
-    parts: dict[str, sparse.csr_matrix] = field(default_factory=dict)
-
-    @property
-    def m(self) -> int:
-        return self.lower.size
-
-
-def _selector(columns: np.ndarray, n: int) -> sparse.csr_matrix:
-    """``(len(columns), n)`` matrix that picks entries of a vector."""
-    rows = np.arange(columns.size)
-    return sparse.csr_matrix((np.ones(columns.size), (rows, columns)), shape=(columns.size, n))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +64,37 @@ class Transcription:
     checks: list[tuple[str, ca.Function]]
     velocity: VelocityMap
 
+    @property
+    def lifted(self) -> bool:
+        return self.problem.formulation == LIFTED
+
+    @property
+    def speed_unit(self) -> float:
+        return RADIANS
+
     def gait(self, x: np.ndarray) -> Fourier:
         """The gait of a vector of variables."""
-        return self.problem.gait.fourier(x[self.layout.parameters[:, 0]], self.problem.body.n_joint)
+        return self.member(x[self.layout.parameters[:, 0]])
+
+    def member(self, parameters: np.ndarray) -> Fourier:
+        """The gait of a parameter vector."""
+        return self.problem.gait.fourier(parameters, self.problem.body.n_joint)
+
+    def phase_mesh(self, gait: Fourier) -> Mesh:
+        """The mesh in phases of a gait: the program's own."""
+        return self.mesh
+
+    def check_excess(self, x: np.ndarray) -> float:
+        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
+        gait = self.gait(x)
+        worst = worst_instants(gait, self.mesh, self.checks)
+        excess = 0.0
+        for (name, check), times in zip(self.checks, worst, strict=True):
+            rows = self.groups[name]
+            values = np.array(check.map(times.size)(gait.angles(times))).ravel()
+            excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
+            excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
+        return excess
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
@@ -94,15 +103,12 @@ class Transcription:
         at every solve this is the exchange method for semi-infinite programs.
         """
         blocks = (self.assembly.objective, *self.assembly.blocks)
-        worst = iter(worst_instants(self.problem, self.mesh, self.checks, parameters))
+        worst = iter(worst_instants(self.member(parameters), self.mesh, self.checks))
         return [_check_parameters(self.problem, next(worst)) if b.parameters.shape[0] else b.parameters for b in blocks]
 
 
-def worst_instants(
-    problem: Problem, mesh: Mesh, checks: list[tuple[str, ca.Function]], parameters: np.ndarray
-) -> list[np.ndarray]:
+def worst_instants(gait: Gait, mesh: Mesh, checks: list[tuple[str, ca.Function]]) -> list[np.ndarray]:
     """For each check, the instant in every mesh cell where it comes closest to its bound, ``(n_interval,)``."""
-    gait = problem.gait.fourier(parameters, problem.body.n_joint)
     fine = np.linspace(0.0, 1.0, _SAMPLES_PER_CELL + 1)
     cells = np.arange(mesh.n)
 
@@ -157,8 +163,8 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None) -> Transcripti
         _gait_group("rates", layout.rates, problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS, layout),
         *_point_groups(problem, point.n_out, mesh.n_point, layout.n),
         *_orientation_groups(problem, mesh, layout),
-        _quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n),
-        _quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n),
+        quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
+        quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
         *(_check_group(name, problem, mesh.n, layout.n) for name, _ in checks),
         Group(
             "shape speed",
@@ -192,7 +198,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None) -> Transcripti
                 Block(
                     function,
                     gather,
-                    _stacked(groups, name, function.n_out * gather.shape[1]),
+                    stacked(groups, name, function.n_out * gather.shape[1]),
                     parameters,
                     velocity_map if name == "point" and problem.formulation == MAP else None,
                 )
@@ -209,10 +215,6 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None) -> Transcripti
     )
 
 
-def _stacked(groups: list[Group], block: str, n_source: int) -> sparse.csr_matrix:
-    return sparse.vstack([g.parts.get(block, sparse.csr_matrix((g.m, n_source))) for g in groups]).tocsr()
-
-
 def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
     # a function bounded by L has Fourier coefficients of at most 4 L / pi
@@ -227,50 +229,27 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
     return lower, upper
 
 
-def _equalities(name: str, linear: sparse.spmatrix, parts: dict[str, sparse.csr_matrix] | None = None) -> Group:
-    zero = np.zeros(linear.shape[0])
-    return Group(name, zero, zero, sparse.csr_matrix(linear), parts or {})
-
-
 def _gait_group(name: str, variables: np.ndarray, matrix: np.ndarray, layout: Layout) -> Group:
     """``variables - matrix p = 0`` at every point."""
-    parameters = _selector(layout.parameters[:, 0], layout.n)
+    parameters = selector(layout.parameters[:, 0], layout.n)
     rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[-1]))
-    return _equalities(name, _selector(variables.ravel(order="F"), layout.n) - rows @ parameters)
+    return equalities(name, selector(variables.ravel(order="F"), layout.n) - rows @ parameters)
 
 
 def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
     """The equations of every point: lifted force laws, then the balance (or the velocity map in its place)."""
     n_law = n_out - N_RATE - 3
-    groups = [_output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
+    groups = [output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
     if problem.formulation == LIFTED:
-        groups.insert(0, _output_group("force law", range(n_law), n_out, n_point, n))
+        groups.insert(0, output_group("force law", range(n_law), n_out, n_point, n))
     return groups
-
-
-def _output_group(name: str, outputs: range, n_out: int, n_point: int, n: int) -> Group:
-    """Outputs of the point function that have to vanish at every point."""
-    columns = (np.arange(n_point)[:, None] * n_out + np.array(outputs)).ravel()
-    return _equalities(name, sparse.csr_matrix((columns.size, n)), {"point": _selector(columns, n_out * n_point)})
 
 
 def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Group]:
     """theta' = omega, and how theta closes where no symmetry does it."""
     state, rate = mesh.integration()
-    linear = state @ _selector(layout.theta[0], layout.n) - RADIANS * rate @ _selector(layout.z[2], layout.n)
-    groups = [_equalities("orientation", linear)]
-    sign = {"none": -1.0, "antipodal": 1.0, "bilateral": None}[problem.gait.symmetry]
-    if sign is not None:
-        first, last = layout.theta[0, 0], layout.theta[0, -1]
-        row = sparse.csr_matrix(([1.0, sign], ([0, 0], [last, first])), shape=(1, layout.n))
-        groups.append(_equalities("rotation", row))
-    return groups
-
-
-def _quadrature_group(name: str, variable: np.ndarray, output: int, n_out: int, mesh: Mesh, n: int) -> Group:
-    state, rate = mesh.quadrature()
-    pick = _selector(np.arange(mesh.n_point) * n_out + output, n_out * mesh.n_point)
-    return _equalities(name, state @ _selector(variable[0], n), {"point": (-RADIANS * rate @ pick).tocsr()})
+    linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
+    return [equalities("orientation", linear), *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n)]
 
 
 def _check_group(name: str, problem: Problem, n_cell: int, n: int) -> Group:

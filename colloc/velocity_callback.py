@@ -15,8 +15,8 @@ _TOLERANCE = 1e-12
 class VelocityMap(ca.Callback):
     """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``; not differentiable by CasADi.
 
-    The start only saves steps. The same arguments are not solved twice. An instant that does not
-    converge gives NaN, which an optimiser takes as a step too far.
+    The start only saves steps; NaN stands for the velocities last found. The same arguments are not solved twice. An
+    instant that does not converge gives NaN, which an optimiser takes as a step too far.
     """
 
     def __init__(self, body: Chain, friction: Friction, n_time: int) -> None:
@@ -49,6 +49,8 @@ class VelocityMap(ca.Callback):
                 return [ca.DM(self._z)]
         if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
             return [ca.DM(np.full((3, self._n_time), np.nan))]
+        if np.isnan(start).any() and self._z is not None:
+            start = self._z
         solved = solve_balance(
             self._body, self._friction, angles, rates, delta, start=np.nan_to_num(start), tolerance=_TOLERANCE
         )

@@ -6,10 +6,13 @@ import numpy as np
 
 from colloc.balance import net_force
 from colloc.contact import crossing_depth
+from colloc.gait_fields import AnyGait
+from colloc.path_gait import ArcPath, Corners
 from colloc.path_replay import Path, Replay, replay
 from colloc.solution import Certificate, Check, Solution
 
 KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK, DELTA = 1e-6, 1e-8, 1e-6, 1e-9, 1e-3, 1e-6, 1e-4, 1e-7, 1e-2
+CURVATURE = 1e-6
 """Largest values that pass. ROTATION: turning by r a period shortens the straight-line distance by r^2/24 only. DELTA is
 the paper's own claim (less than 1 % below delta = 1e-4)."""
 
@@ -20,6 +23,16 @@ def gait_path(solution: Solution) -> Path:
     """Joint angles and rates of the solution's gait as a function of phase."""
     gait = solution.gait
     return lambda t: (gait.angles(t), gait.rates(t))
+
+
+def corner_phases(gait: AnyGait) -> np.ndarray:
+    """Phases in (0, 1) where the rates of a gait jump."""
+    if not isinstance(gait, Corners):
+        return np.empty(0)
+    phases = gait.phases
+    images = {"none": phases, "bilateral": 1 - phases, "antipodal": 0.5 + phases}[gait.symmetry]
+    both = np.concatenate([phases, images])
+    return np.unique(both[(both > 0) & (both < 1)])
 
 
 def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
@@ -38,15 +51,18 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     NotConvergedError
         If the balance cannot be solved at some instant of the replay.
     """
-    problem, level = solution.problem, solution.last
+    problem = solution.problem
     path = gait_path(solution)
     if instants is None:
         instants = max(1600, 2 * int(np.ceil(5 * solution.mesh.n_point / problem.gait.fraction)))
-    fine = replay(problem.body, problem.friction, path, level.delta, instants=instants, tolerance=tolerance)
-    at_tenth = replay(problem.body, problem.friction, path, 0.1 * level.delta, instants=fine.instants, tolerance=tolerance)
+    delta, breaks = solution.delta_per_period, corner_phases(solution.gait)
+    fine = replay(problem.body, problem.friction, path, delta, instants=instants, tolerance=tolerance, breaks=breaks)
+    at_tenth = replay(
+        problem.body, problem.friction, path, 0.1 * delta, instants=fine.instants, tolerance=tolerance, breaks=breaks
+    )
     # the influence of delta is linear to leading order: the rest is a ninth of the last step
     at_zero = at_tenth.efficiency + (at_tenth.efficiency - fine.efficiency) / 9
-    checks = (*_optimality(solution), *_motion(solution, fine, path), *_delta(solution, fine, at_zero))
+    checks = (*_optimality(solution), *_motion(solution, fine, path), *_class(solution), *_delta(solution, fine, at_zero))
     return Certificate(checks, fine.efficiency, fine.distance, fine.work, fine.error * fine.efficiency, at_zero, fine.instants)
 
 
@@ -77,6 +93,19 @@ def _motion(solution: Solution, fine: Replay, path: Path) -> list[Check]:
         Check("replay error", fine.error, GAP, "relative, estimated from half the replay grid"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
     ]
+
+
+def _class(solution: Solution) -> list[Check]:
+    """How far a free path bends more than its class allows, from the directions of its rates alone."""
+    gait = solution.gait
+    if not isinstance(gait, ArcPath):
+        return []
+    t = np.linspace(0.0, 1.0, _FINE_PHASES + 1)
+    tangent = gait.rates(t) / gait.length
+    turn = 2 * np.arcsin(0.5 * np.linalg.norm(np.diff(tangent), axis=0))
+    curvature = float(turn.max()) * _FINE_PHASES / gait.length
+    excess = max(curvature / solution.problem.gait.curvature - 1, 0.0)
+    return [Check("curvature", excess, CURVATURE, "of the path between nodes, relative excess over its bound")]
 
 
 def _delta(solution: Solution, fine: Replay, at_zero: float) -> list[Check]:

@@ -8,32 +8,32 @@ from scipy.sparse.linalg import spsolve
 from colloc.balance import instant, total_power
 from colloc.fixed_point import solve_balance
 from colloc.layout import RADIANS
-from colloc.transcription import Transcription
+from colloc.program import GaitProgram
 
 
-def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: float) -> np.ndarray:
+def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: float) -> np.ndarray:
     """Variables that satisfy every equation of the transcription but net rotation, for a gait and delta.
 
     Parameters
     ----------
-    transcription : Transcription
+    transcription : GaitProgram
     parameters : (n_parameter,)
         Gait parameters.
     delta : float
-        Regularisation speed, per period.
+        Regularisation speed, in the units of the problem's class of gaits.
 
     Returns
     -------
     (n,) array
     """
-    problem, mesh, layout = transcription.problem, transcription.mesh, transcription.layout
+    problem, layout, gait = transcription.problem, transcription.layout, transcription.member(parameters)
+    mesh = transcription.phase_mesh(gait)
     x = np.zeros(layout.n)
     x[layout.parameters[:, 0]] = parameters
-    n_joint = problem.body.n_joint
-    angles = (problem.gait.angle_matrix(mesh.times, n_joint) @ parameters).T
-    rates = (problem.gait.rate_matrix(mesh.times, n_joint) @ parameters).T / RADIANS
-    solved = solve_balance(problem.body, problem.friction, angles, rates, delta / RADIANS)
-    now = instant(problem.body, problem.friction, angles, rates, solved.z, delta / RADIANS)
+    slow = delta * gait.delta_unit / RADIANS
+    angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
+    solved = solve_balance(problem.body, problem.friction, angles, rates, slow)
+    now = instant(problem.body, problem.friction, angles, rates, solved.z, slow)
 
     state, rate = mesh.integration()
     # theta_0 = 0 closes the system; the matrix is block bidiagonal
@@ -55,7 +55,8 @@ def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: 
     x[layout.distance[0, 1:]] = np.cumsum(RADIANS * (quadrature @ (c * cx[0] - s * cy[0])))
     x[layout.work[0, 1:]] = np.cumsum(RADIANS * (quadrature @ total_power(now.velocity, now.force)[0]))
     x[layout.theta[0]] = theta
-    x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, solved.z
+    if layout.z.size:
+        x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, solved.z
     if layout.forces.size:
         x[layout.forces] = np.concatenate(now.force)
     return x

@@ -5,13 +5,28 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file"],
-    1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
-    2: ["balance", "problem", "damped_newton", "bump_body", "ellipses", "equivalence"],
+    0: ["symmetry", "arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file"],
+    1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
+    2: [
+        "path_class",
+        "path_samples",
+        "gait_fields",
+        "balance",
+        "problem",
+        "damped_newton",
+        "bump_body",
+        "ellipses",
+        "equivalence",
+    ],
     3: [
         "fixed_point",
         "layout",
         "blocks",
+        "program",
+        "constraint_rows",
+        "path_kernels",
+        "path_geometry",
+        "path_transcription",
         "kernels",
         "velocity_callback",
         "path_replay",
@@ -25,6 +40,7 @@ LEVELS = {
     ],
     4: [
         "nlp",
+        "path_start",
         "solution",
         "problem_file",
         "store",
@@ -69,8 +85,10 @@ LEVELS = {
         "multistart",
         "gap",
         "homotopy",
+        "prolongation",
         "figures",
         "figures_smooth",
+        "figures_classes",
         "figures_bound",
         "solve",
         "figures_style",
@@ -132,6 +150,9 @@ def test_the_numpy_side_never_loads_casadi():
         "nlp",
         "bump_callback",
         "bump_transcription",
+        "path_kernels",
+        "path_geometry",
+        "path_transcription",
     }
 
 

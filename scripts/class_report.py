@@ -1,0 +1,98 @@
+"""The table and figure of `scripts.class_table`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from colloc import Chain, Friction
+from colloc.bound import known_bound
+from colloc.figures_classes import GaitPanel, save_gait_panels
+from colloc.gait_fields import gait_from
+from colloc.infinitesimal import small_gait
+from colloc.json_cache import load_entries
+
+CURATED = Path("results/curated")
+SHOWN = ("harmonics 1", "harmonics 2", "harmonics 4", "curvature 2", "curvature 8", "corners 3", "corners 4 free")
+
+
+def order(row: str) -> tuple[int, int, str]:
+    kind, number, *rest = row.split()
+    return (("harmonics", "curvature", "corners").index(kind), int(number), " ".join(rest))
+
+
+def class_words(row: str) -> str:
+    """A row's class as the table prints it."""
+    kind, number, *rest = row.split()
+    if kind == "harmonics":
+        return f"{number} harmonic{'s' if number != '1' else ''}, bilateral"
+    if kind == "curvature":
+        return f"free path, curvature <= {number}, bilateral"
+    words = {(): "bilateral", ("corner",): "bilateral, axis through a corner", ("side",): "bilateral, axis through a side"}
+    return f"polygon, {number} corners, {'no symmetry' if rest == ['free'] else words[tuple(rest)]}"
+
+
+def best(attempts: dict) -> dict | None:
+    solved = [a for a in attempts.values() if a["status"] == "solved"]
+    return max(solved, key=lambda a: a["efficiency"]) if solved else None
+
+
+def table(friction: str, known: dict) -> list[str]:
+    """Lines of one friction set."""
+    mu = Friction(*(float(value) for value in friction.split(",")))
+    lines = [f"## (mu_t, mu_f, mu_b) = ({friction.replace(',', ', ')})", "", bound_line(mu), ""]
+    lines += [
+        "| class | efficiency | delta -> 0 | d | W | path length | replay gap | starts (certified) | best from |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in sorted(known, key=order):
+        attempts, found = known[row], best(known[row])
+        tally = f"{len(attempts)} ({sum(a['status'] == 'solved' for a in attempts.values())})"
+        if found is None:
+            lines.append(f"| {class_words(row)} | none certified | | | | | | {tally} | |")
+            continue
+        seed = next(name for name, a in attempts.items() if a is found)
+        lines.append(
+            f"| {class_words(row)} | {found['efficiency']:.4f} | {found['at zero delta']:.4f} | {found['distance']:.4f} | "
+            f"{found['work']:.4f} | {found['length']:.2f} | {abs(found['replay gap']):.0e} | {tally} | {seed} |"
+        )
+    return [*lines, ""]
+
+
+def bound_line(friction: Friction) -> str:
+    """What no gait can exceed, as far as it is known here, and what the smallest gaits reach."""
+    bounds = Path("results/bounds.json")
+    known = known_bound(Chain(), friction, cache=bounds) if bounds.exists() and load_entries(bounds) else None
+    upper = f"{known.sampled:.4f} (sampled; --bound)" if known else f"{1 / friction.smallest:.4g} = 1/min(mu)"
+    places = {"(2.2, -2.2)": (2.2, -2.2), "the fold (pi, 0)": (3.1415, 0.0)}
+    at = {name: small_gait(Chain(), friction, np.array(shape)).efficiency for name, shape in places.items()}
+    reached = ", ".join(f"{value:.4f} at {name}" for name, value in at.items())
+    return f"Upper bound on every gait: {upper}. Infinitesimal gaits reach {reached}."
+
+
+def write(known: dict) -> None:
+    """Writes results/curated/gait_classes.md and .png/.pdf from the attempts kept so far."""
+    lines = [
+        "# Efficiency against class of gaits, three equal links",
+        "",
+        "`python -m scripts.class_table` (`--friction mu_t,mu_f,mu_b --short` for the shorter tables). Joint limit pi; path",
+        "length at least 0.628 rad; sides of polygons at least 0.02 rad; delta = 1e-4 at unit shape speed. Every efficiency is",
+        "that of an independent replay whose certificate holds (replay gap at most 1e-4); the class is explained in",
+        "docs/gait_classes.md. Local optima of few starts: a class may hold better ones.",
+        "",
+    ]
+    for friction in known:
+        lines += table(friction, known[friction])
+    CURATED.mkdir(parents=True, exist_ok=True)
+    (CURATED / "gait_classes.md").write_text("\n".join(lines), encoding="utf-8")
+    panels = []
+    for row in SHOWN:
+        found = best(known.get("1,1,1", {}).get(row, {}))
+        if found is not None:
+            title = (
+                f"{class_words(row).replace(', bilateral', '')}\nd/W = {found['efficiency']:.4f}, d = {found['distance']:.3f}"
+            )
+            panels.append(GaitPanel(title, gait_from(found["gait"])))
+    if panels:
+        save_gait_panels(panels, CURATED / "gait_classes.png")
