@@ -5,7 +5,18 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file"],
+    0: [
+        "arrays",
+        "errors",
+        "schemes",
+        "parallel",
+        "json_cache",
+        "spline",
+        "replaced_file",
+        "markup",
+        "progress",
+        "interruption",
+    ],
     1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
     2: ["balance", "problem", "damped_newton", "bump_body", "ellipses", "equivalence"],
     3: [
@@ -72,6 +83,8 @@ LEVELS = {
         "figures",
         "figures_smooth",
         "figures_bound",
+        "command_options",
+        "command",
         "solve",
         "figures_style",
         "figures_bodies",
