@@ -12,15 +12,15 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from colloc.balance import instant
-from colloc.body import Chain
 from colloc.contact import crossing_depth
+from colloc.motion_frames import link_ends
 from colloc.problem import Problem
 from colloc.solution import Solution
 
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#777777"
 """Okabe-Ito colours, distinguishable with any colour vision."""
 
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -30,13 +30,6 @@ _STYLE: Any = {
     "pdf.fonttype": 42,
     "savefig.dpi": 160,
 }
-
-
-def link_ends(body: Chain, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
-    """Lab positions of the ends of all links, ``(2, n_link + 1, n_time)``."""
-    x, y = body.joints(angles)
-    c, s = np.cos(theta), np.sin(theta)
-    return np.stack([tail[0] + c * x - s * y, tail[1] + s * x + c * y])
 
 
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
@@ -82,7 +75,9 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     axes.legend(loc="upper right", fontsize=7, handlelength=1.2)
 
 
-def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
+def draw_shape_path(
+    axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1, *, legend: bool = True
+) -> None:
     """The gait in the plane of two joint angles, over the shapes that joint limits and links allow."""
     if problem.body.n_joint == 2:
         grid = np.linspace(-np.pi, np.pi, 181)
@@ -107,7 +102,8 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
     axes.set_yticks(ticks, labels)
     axes.set(xlim=(-np.pi * 1.02, np.pi * 1.02), ylim=(-np.pi * 1.02, np.pi * 1.02), aspect="equal")
     axes.set(xlabel=f"joint angle {first + 1}  [rad]", ylabel=f"joint angle {second + 1}  [rad]")
-    axes.legend(loc="lower left", handletextpad=0.2)
+    if legend:
+        axes.legend(loc="lower left", handletextpad=0.2)
 
 
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
@@ -135,7 +131,7 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
 
 def solution_figure(solution: Solution) -> Figure:
     """Filmstrip, lab paths, path in the joint plane, speeds and power of a solution."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11, 8.2), layout="constrained")
         grid = figure.add_gridspec(3, 3, height_ratios=(0.75, 1.25, 0.9))
         t = np.linspace(0.0, 1.0, 1201)
@@ -167,6 +163,6 @@ def solution_figure(solution: Solution) -> Figure:
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Save as PNG and PDF beside each other, whatever suffix `path` has."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         for suffix in (".png", ".pdf"):
             figure.savefig(path.with_suffix(suffix))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 VOID = {"meta", "br", "hr", "input", "img", "link"}
@@ -46,14 +47,14 @@ def element(tag: str, *children: object, **attributes: object) -> Markup:
     return Markup("".join([*parts, ">", *(text(child) for child in children), f"</{tag}>"]))
 
 
-def table(rows: list[list[object]], header: list[object] | None = None, class_: str | None = None) -> Markup:
+def table(rows: Sequence[Sequence[object]], header: Sequence[object] = ()) -> Markup:
     """A table; the first cell of a row heads it."""
     body = [
         element("tr", element("th", row[0], scope="row"), [cell if _is_cell(cell) else element("td", cell) for cell in row[1:]])
         for row in rows
     ]
     head = element("thead", element("tr", [element("th", name, scope="col") for name in header])) if header else None
-    return element("table", head, element("tbody", body), class_=class_)
+    return element("table", head, element("tbody", body))
 
 
 def _is_cell(value: object) -> bool:

@@ -17,7 +17,7 @@ LEVELS = {
         "progress",
         "interruption",
     ],
-    1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
+    1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: ["balance", "problem", "damped_newton", "bump_body", "ellipses", "equivalence"],
     3: [
         "fixed_point",
@@ -37,6 +37,7 @@ LEVELS = {
     4: [
         "nlp",
         "solution",
+        "solution_card",
         "problem_file",
         "store",
         "refinement",
@@ -74,6 +75,7 @@ LEVELS = {
         "store_archive",
         "delta_limit",
         "trajectory",
+        "motion_frames",
     ],
     6: [
         "optimise",
@@ -89,6 +91,12 @@ LEVELS = {
         "recheck",
         "compare",
         "export",
+        "report_charts",
+        "report_page",
+        "report",
+        "figures_publication",
+        "figures_animation",
+        "animate",
         "solve",
         "figures_style",
         "figures_bodies",
