@@ -67,17 +67,17 @@ def frames(solution: Solution, count: int = 241, per_link: int | None = None, pe
         How many periods to show where the body does not turn.
     """
     problem = solution.problem
-    body = problem.body
+    body, delta = problem.body, solution.delta_per_period
     motion = solution.sample(np.linspace(0.0, 1.0, count))
     ends = link_ends(body, motion.angles, motion.theta, motion.tail)
-    velocity = instant(body, problem.friction, motion.angles, motion.rates, motion.z, solution.last.delta).velocity
+    velocity = instant(body, problem.friction, motion.angles, motion.rates, motion.z, delta).velocity
     many = per_link or max(2, 12 // body.n_link)
     share = (np.arange(many) + 0.5) / many
     heading = body.tangent_angles(motion.angles) + motion.theta
     bases, arrows = [], []
     for at in share:
         normal = velocity.vn + (at - 0.5) * body.length_column() * velocity.w
-        along, across = force_density(velocity.vs, normal, solution.last.delta, problem.friction)
+        along, across = force_density(velocity.vs, normal, delta, problem.friction)
         cos, sin = np.cos(heading), np.sin(heading)
         arrows.append(np.stack([along * cos - across * sin, along * sin + across * cos]))
         bases.append((1 - at) * ends[:, :-1] + at * ends[:, 1:])

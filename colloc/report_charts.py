@@ -76,7 +76,7 @@ def angles_chart(t: np.ndarray, angles: np.ndarray) -> Markup:
 
 def speeds_chart(solution: Solution, t: np.ndarray) -> Markup:
     """Speeds of the link midpoints, on a logarithmic scale that shows where links stick."""
-    problem, motion, delta = solution.problem, solution.sample(t), solution.last.delta
+    problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
     link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, delta).velocity
     speed = np.hypot(link.vs, link.vn)
     low = 10.0 ** np.floor(np.log10(0.3 * delta))

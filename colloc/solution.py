@@ -211,6 +211,11 @@ class Solution:
         parameters = self.last.x[self.layout.parameters[:, 0]]
         return self.problem.gait.fourier(parameters, self.problem.body.n_joint)
 
+    @property
+    def delta_per_period(self) -> float:
+        """Regularisation speed of the last level in body lengths per period."""
+        return self.last.delta
+
     def at_points(self) -> tuple[np.ndarray, Instant]:
         """Phases of the collocation points and the body there, from the variables of the last level (per period)."""
         x, layout, problem = self.last.x, self.layout, self.problem

@@ -1,4 +1,4 @@
-"""Animations: pictures that move with the body, files that other programs can play, and a clear word where ffmpeg is missing."""
+"""Animations: pictures that move with the body, files others can play, and a clear word where ffmpeg is missing."""
 
 import shutil
 import subprocess
