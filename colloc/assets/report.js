@@ -146,6 +146,9 @@
   document.addEventListener("keydown", event => {
     if (event.target === document.body && event.key === " ") { event.preventDefault(); play(!playing); }
   });
+  // page.html#t=1.25 opens at that phase, at rest
+  const wanted = /^#t=([0-9.]+)$/.exec(window.location.hash);
+  if (wanted) { position = Math.min(Number(wanted[1]) * frames, total); playing = false; }
   draw();
   play(playing);
   document.documentElement.dataset.ready = "yes";
