@@ -8,7 +8,7 @@ the mesh is refined where the gait needs it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,12 +63,25 @@ class _Run:
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
         self.factor, self.next_radius = (PATH_FACTOR, PATH_RADIUS) if problem.has_path else (FIRST_FACTOR, NEXT_RADIUS)
+        self.first_delta = problem.delta_start
         if problem.gait.symmetry == "none" and not problem.has_path:
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
 
     @property
     def gait(self) -> AnyGait:
         return self.solver.transcription.member(self.parameters)
+
+    def take_over(self, levels: Sequence[Level]) -> None:
+        """Go on where an interrupted run stopped: its last optimal level is solved again, from its own result."""
+        optimal = [k for k, level in enumerate(levels) if level.optimal]
+        if not optimal:
+            return
+        last = levels[optimal[-1]]
+        if not np.array_equal(last.edges, self.solver.transcription.mesh.edges):
+            self.remesh(last.edges)
+        self.levels = list(levels[: optimal[-1]])
+        self.parameters = last.x[self.solver.transcription.layout.parameters[:, 0]]
+        self.multipliers, self.radius, self.first_delta = (last.lam_x, last.lam_g), self.next_radius, last.delta
 
     def attempt(self, delta: float) -> NlpResult:
         """Solve at delta from the last converged gait; take the result over if it is optimal."""
@@ -140,7 +153,12 @@ class _Run:
             self.on_level(level)
 
 
-def continue_delta(problem: Problem, on_level: Report | None = None, solver: Solver[GaitProgram] | None = None) -> Solution:
+def continue_delta(
+    problem: Problem,
+    on_level: Report | None = None,
+    solver: Solver[GaitProgram] | None = None,
+    before: Sequence[Level] = (),
+) -> Solution:
     """Solve a problem through falling delta, from ``delta_start`` to ``delta``, then refine its mesh.
 
     Parameters
@@ -150,6 +168,8 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
         Called with each `Level` as it ends, also with failed ones.
     solver : Solver, optional
         Built for the same problem before, to save building it again.
+    before : sequence of Level
+        Levels of an interrupted run of the same problem; it goes on from the last optimal one.
 
     Returns
     -------
@@ -158,6 +178,7 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     """
     begin = time.perf_counter()
     run = _Run(problem, solver or Solver(transcribed(problem)), on_level)
+    run.take_over(before)
     result = _descend(run)
     if result.optimal and problem.mesh_tolerance > 0:
         result = _refine(run, result)
@@ -174,7 +195,7 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
 def _descend(run: _Run) -> NlpResult:
     """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
     target = run.problem.delta
-    delta, factor, reached, failures, meshes = run.problem.delta_start, run.factor, None, 0, 1
+    delta, factor, reached, failures, meshes = run.first_delta, run.factor, None, 0, 1
     while True:
         result = run.attempt(delta)
         if result.optimal:

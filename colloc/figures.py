@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from colloc.balance import instant
 from colloc.body import Chain
 from colloc.contact import crossing_depth
+from colloc.motion_frames import link_ends
 from colloc.problem import Problem
 from colloc.solution import Solution
 
@@ -30,13 +31,6 @@ STYLE: Any = {
     "pdf.fonttype": 42,
     "savefig.dpi": 160,
 }
-
-
-def link_ends(body: Chain, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
-    """Lab positions of the ends of all links, ``(2, n_link + 1, n_time)``."""
-    x, y = body.joints(angles)
-    c, s = np.cos(theta), np.sin(theta)
-    return np.stack([tail[0] + c * x - s * y, tail[1] + s * x + c * y])
 
 
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
@@ -92,7 +86,9 @@ def draw_allowed(axes: Axes, body: Chain, joint_limit: float) -> None:
     axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
 
 
-def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
+def draw_shape_path(
+    axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1, *, legend: bool = True
+) -> None:
     """The gait in the plane of two joint angles, over the shapes that joint limits and links allow."""
     if problem.body.n_joint == 2:
         draw_allowed(axes, problem.body, problem.joint_limit)
@@ -112,7 +108,8 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
     axes.set_yticks(ticks, labels)
     axes.set(xlim=(-np.pi * 1.02, np.pi * 1.02), ylim=(-np.pi * 1.02, np.pi * 1.02), aspect="equal")
     axes.set(xlabel=f"joint angle {first + 1}  [rad]", ylabel=f"joint angle {second + 1}  [rad]")
-    axes.legend(loc="lower left", handletextpad=0.2)
+    if legend:
+        axes.legend(loc="lower left", handletextpad=0.2)
 
 
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:

@@ -7,48 +7,57 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.basins import CRASHED, ERROR, STATUSES, TIME_LIMIT, Basin, Outcome, basins, counts
-from colloc.errors import CollocError, ProblemError
+from colloc.command_options import (
+    NONE_FOUND,
+    OK,
+    add_bound,
+    add_printing,
+    add_problem,
+    changed,
+    exit_code,
+    new_parser,
+    output_path,
+)
+from colloc.errors import ProblemError
 from colloc.problem import Problem
 from colloc.problem_file import read_problem_file
+from colloc.progress import StatusLine
 from colloc.sampling import LATIN_HYPERCUBE, SAMPLERS
 from colloc.solution import SOLVED
-from colloc.solve import BAD_PROBLEM, INTERRUPTED, Parser
 
-NONE_FOUND = 3
 _SAVE_EVERY = 5.0
 _MOST_BASINS_SHOWN = 12
 _RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 
 
+_EPILOG = """\
+Exit codes: 0 at least one certified optimum; 2 bad problem or option; 3 none found; 130 interrupted.
+
+Start k is the same gait whatever --starts and --workers are. What an archive holds already is not solved again, so the
+same command goes on after Ctrl-C, and a larger --starts adds to it.
+
+  colloc multistart problems/three_link.py --starts 100 --workers 2"""
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="python -m colloc.multistart",
-        description="Solve a problem from many seeded random starts and list the distinct certified optima.",
-        epilog="Exit codes: 0 at least one certified optimum; 2 bad problem or option; 3 none found; 130 interrupted. "
-        "Start k is the same gait whatever --starts and --workers are. What an archive holds already is not solved again.",
-    )
-    parser.add_argument("problem", help="a Python file that states PROBLEM, for example problems/three_link.py")
+    what = "Solve a problem from many seeded random starts and list the distinct certified optima."
+    parser = new_parser("multistart", what, _EPILOG)
+    add_problem(parser)
     parser.add_argument("--starts", type=int, default=20, metavar="N", help="starts 0 to N-1 (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="of the sampler (default: 0)")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes, one BLAS thread each (default: 1)")
     parser.add_argument("--sampler", choices=SAMPLERS, default=LATIN_HYPERCUBE, help="perturbed: near the problem's guess")
-    parser.add_argument("--delta", type=float, metavar="SPEED", help="final regularisation speed of friction")
-    parser.add_argument("--delta-start", type=float, metavar="SPEED", help="where the continuation in delta begins")
     parser.add_argument("--time-limit", type=float, default=300.0, metavar="S", help="seconds for one start (default: 300)")
     parser.add_argument("--retry", action="store_true", help="solve again what ended in an error, a crash or the time limit")
-    parser.add_argument(
-        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.json)"
-    )
-    parser.add_argument("--output", metavar="PATH", default="results", help="folder, or .h5 (default: results/NAME.starts.h5)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")
-    parser.add_argument("--quiet", action="store_true", help="print the final summary only")
+    add_bound(parser)
+    parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.starts.h5)")
+    add_printing(parser)
     return parser
 
 
@@ -58,18 +67,6 @@ def _checked(options: argparse.Namespace) -> None:
             raise ProblemError(f"--{name} must be at least {least}, not {getattr(options, name)}.")
     if not options.time_limit > 0:
         raise ProblemError(f"--time-limit must be positive, not {options.time_limit:g}.")
-
-
-def _target(output: str, problem: Problem) -> Path:
-    path = Path(output)
-    path = path if path.suffix == ".h5" else path / f"{problem.name}.starts.h5"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ProblemError(f"cannot make the folder {path.parent}: {error.strerror or error}.") from None
-    if not os.access(path.parent, os.W_OK) or path.is_dir():
-        raise ProblemError(f"cannot write {path}; choose another --output.")
-    return path
 
 
 def outcome_line(outcome: Outcome) -> str:
@@ -118,27 +115,21 @@ def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     options = _parser().parse_args(arguments)
-    try:
-        _checked(options)
-        problem = read_problem_file(options.problem).problem
-        changes = {"delta": options.delta, "delta_start": options.delta_start}
-        changes = {name: value for name, value in changes.items() if value is not None}
-        problem = problem.with_(**changes) if changes else problem
-        path = _target(options.output, problem)
-        command = " ".join(["python -m colloc.multistart", *(sys.argv[1:] if arguments is None else arguments)])
-        return _run(problem, path, options, command)
-    except CollocError as error:
-        print(f"colloc: {error}", file=sys.stderr)
-        return BAD_PROBLEM
+    command = " ".join(["colloc multistart", *(sys.argv[1:] if arguments is None else arguments)])
+    return exit_code(lambda: _run(options, command))
 
 
-def _run(problem: Problem, path: Path, options: argparse.Namespace, command: str) -> int:
+def _run(options: argparse.Namespace, command: str) -> int:
+    _checked(options)
+    problem = changed(read_problem_file(options.problem).problem, options)
+    path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.campaign import run_starts
     from colloc.gap import gap_line, upper_bound
     from colloc.store_archive import Archive, load_archive, save_archive
 
     quiet = options.quiet or options.json
+    table = not quiet and sys.stdout.isatty()
     archive = Archive(problem, options.sampler, options.seed, command)
     if path.exists():
         before = load_archive(path)
@@ -148,19 +139,25 @@ def _run(problem: Problem, path: Path, options: argparse.Namespace, command: str
     done = {k for k, o in archive.outcomes.items() if not (options.retry and o.status in _RETRIED)}
     todo = [k for k in range(options.starts) if k not in done]
     if not quiet:
-        print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go\n{OUTCOME_HEADER}", flush=True)
+        print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go", flush=True)
+    if table:
+        print(OUTCOME_HEADER, flush=True)
     begin = saved = time.perf_counter()
     interrupted = False
     settings = {"sampler": options.sampler, "seed": options.seed, "workers": options.workers, "time_limit": options.time_limit}
     try:
-        for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
-            archive.outcomes[outcome.start] = outcome
-            if not quiet:
+        with StatusLine(enabled=not quiet) as line:
+            line.say(f"{problem.name}: 0 of {len(todo)} starts")
+            for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
+                archive.outcomes[outcome.start] = outcome
+                if table:
+                    line.clear()
+                    print(outcome_line(outcome), flush=True)
                 left = (time.perf_counter() - begin) / count * (len(todo) - count)
-                print(f"{outcome_line(outcome)}   ({count} of {len(todo)}, {left:.0f} s left)", flush=True)
-            if time.perf_counter() - saved > _SAVE_EVERY:
-                save_archive(archive, path)
-                saved = time.perf_counter()
+                line.say(f"{problem.name}: {count} of {len(todo)} starts", left)
+                if time.perf_counter() - saved > _SAVE_EVERY:
+                    save_archive(archive, path)
+                    saved = time.perf_counter()
     except KeyboardInterrupt:
         interrupted = True
     save_archive(archive, path)
@@ -175,9 +172,8 @@ def _run(problem: Problem, path: Path, options: argparse.Namespace, command: str
             lines.append(gap_line(problem, best, upper_bound(problem, path.parent, compute=options.bound)))
         print("\n".join([*lines, f"  saved {path}"]))
     if interrupted:
-        print("colloc: interrupted; run the same command again to go on.", file=sys.stderr)
-        return INTERRUPTED
-    return 0 if found else NONE_FOUND
+        raise KeyboardInterrupt("run the same command again to go on.")
+    return OK if found else NONE_FOUND
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from colloc.blocks import Oracles, oracles
+from colloc.interruption import interruptible
 from colloc.program import Program
 
 IPOPT_OPTIONS: dict[str, object] = {
@@ -149,7 +150,8 @@ class Solver(Generic[AnyProgram]):
         lam_x, lam_g = multipliers or (np.zeros_like(x), self._estimated_multipliers(x, parameters))
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
-        solution = self._solver(x0=x, p=parameters, **bounds, **duals)
+        with interruptible():
+            solution = self._solver(x0=x, p=parameters, **bounds, **duals)
         seconds = time.perf_counter() - start
         stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 from colloc.continuation import TRIVIAL, Report, continue_delta
 from colloc.errors import NotConvergedError
 from colloc.problem import Problem
-from colloc.solution import Solution
+from colloc.solution import Level, Solution
 from colloc.verify import certify
 
 FINER = "more intervals or a smaller mesh_tolerance"
@@ -25,7 +26,7 @@ def is_trivial(solution: Solution) -> bool:
     return solution.last.status == TRIVIAL
 
 
-def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Solution:
+def maximise_efficiency(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
     """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
 
     Parameters
@@ -33,6 +34,8 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Sol
     problem : Problem
     on_level : callable, optional
         Called with every `colloc.solution.Level` as it ends.
+    before : sequence of Level
+        Levels of an interrupted run of the same problem; it goes on from the last optimal one.
 
     Returns
     -------
@@ -40,7 +43,7 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Sol
         With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
     """
     begin = time.perf_counter()
-    solution = continue_delta(problem, on_level)
+    solution = continue_delta(problem, on_level, before=before)
     if is_trivial(solution):
         solution.message = (
             "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "

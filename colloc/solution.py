@@ -15,6 +15,7 @@ from colloc.gait_fields import AnyGait
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
 from colloc.problem import Problem
+from colloc.solution_card import solution_card
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
 
@@ -75,6 +76,12 @@ class Check:
     @property
     def passed(self) -> bool:
         return bool(np.isfinite(self.value) and abs(self.value) <= self.threshold)
+
+    def line(self) -> str:
+        """For a terminal."""
+        return (
+            f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= {self.threshold:.0e})  {self.meaning}"
+        )
 
 
 @dataclass(frozen=True)
@@ -289,6 +296,31 @@ class Solution:
         problem = self.problem
         now = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, self.delta_per_period)
         return total_power(now.velocity, now.force)[0]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: verdict, numbers, checks and the path in shape space."""
+        return solution_card(self.problem.name, self.status, self.message, self._facts(), self._checks(), self._thumbnail())
+
+    def _facts(self) -> list[tuple[str, str]]:
+        if not self.levels:
+            return []
+        certificate = self.certificate
+        if certificate is None:
+            return [("efficiency (not replayed)", f"{self.efficiency:.5f}"), ("δ", f"{self.last.delta:.0e}")]
+        return [
+            ("efficiency d/W", f"{certificate.efficiency:.5f} ± {certificate.efficiency_error:.0e}"),
+            ("for δ → 0", f"{certificate.efficiency_at_zero_delta:.5f}"),
+            ("distance d", f"{certificate.distance:.5f}"),
+            ("work W", f"{certificate.work:.5f}"),
+            ("δ", f"{self.last.delta:.0e}"),
+        ]
+
+    def _checks(self) -> list[tuple[str, bool, str]]:
+        checks = self.certificate.checks if self.certificate is not None else ()
+        return [(check.name, check.passed, f"{check.value:.1e} (≤ {check.threshold:.0e})") for check in checks]
+
+    def _thumbnail(self) -> np.ndarray | None:
+        return self.sample(np.linspace(0.0, 1.0, 181)).angles if self.levels else None
 
 
 def versions() -> dict[str, str]:

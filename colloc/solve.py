@@ -7,88 +7,61 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
+import math
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colloc.errors import CollocError, ProblemError
+from colloc.command_options import (
+    FAILED,
+    NONE_FOUND,
+    OK,
+    add_bound,
+    add_printing,
+    add_problem,
+    changed,
+    exit_code,
+    new_parser,
+    output_path,
+)
 from colloc.gait import Fourier
 from colloc.gait_fields import fields
 from colloc.path_gait import ArcPath
 from colloc.problem import Problem, Reference
 from colloc.problem_file import read_problem_file
+from colloc.progress import StatusLine
 from colloc.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Level, Solution
 
 if TYPE_CHECKING:
     from colloc.bound import Bound
 
-EXIT = {SOLVED: 0, NOT_CONVERGED: 3, CERTIFICATE_FAILED: 4}
-BAD_PROBLEM, INTERRUPTED = 2, 130
+EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED}
+_EPILOG = """\
+Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
 
+A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. Levels are kept in NAME.partial.h5 as they
+end; after Ctrl-C or a crash the same command goes on from there.
 
-class Parser(argparse.ArgumentParser):
-    """Refuses bad options in one sentence, with the exit code of a bad problem."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(BAD_PROBLEM, f"colloc: {message}; see {self.prog} --help.\n")
+  colloc solve problems/three_link.py
+  colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
+  colloc solve mine.py --start results/three_link.h5      begin with the gait of another result"""
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="python -m colloc.solve",
-        description="Find the gait of largest efficiency d/W for a problem file, and certify it by an independent replay.",
-        epilog="Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed. "
-        "A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5.",
-    )
-    parser.add_argument("problem", help="a Python file that states PROBLEM, for example problems/three_link.py")
-    parser.add_argument("--delta", type=float, metavar="SPEED", help="final regularisation speed of friction")
-    parser.add_argument("--mesh", type=int, metavar="N", help="intervals of the first mesh")
-    parser.add_argument("--mesh-tolerance", type=float, metavar="TOL", help="relative efficiency error to refine to; 0: never")
-    parser.add_argument("--scheme", metavar="NAME", help="trapezoid, hermite-simpson, gauss-N or radau-N")
-    parser.add_argument("--formulation", choices=("map", "lifted"), help="how the balance becomes constraints")
+    what = "Find the gait of largest efficiency d/W for a problem file, and certify it by an independent replay."
+    parser = new_parser("solve", what, _EPILOG)
+    add_problem(parser)
     parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
-    parser.add_argument("--output", metavar="PATH", default="results", help="folder, or .h5 file (default: results/NAME.h5)")
-    parser.add_argument(
-        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.json)"
-    )
+    parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
+    parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
+    add_bound(parser)
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")
-    parser.add_argument("--quiet", action="store_true", help="print the final summary only")
+    add_printing(parser)
     return parser
-
-
-def _changed(problem: Problem, options: argparse.Namespace) -> Problem:
-    """The problem with the command line's changes."""
-    wanted = {
-        "delta": options.delta,
-        "intervals": options.mesh,
-        "mesh_tolerance": options.mesh_tolerance,
-        "scheme": options.scheme,
-        "formulation": options.formulation,
-    }
-    changes: dict[str, object] = {name: value for name, value in wanted.items() if value is not None}
-    if options.start is not None:
-        from colloc.store import load
-
-        changes["guess"] = load(options.start).gait
-    return problem.with_(**changes) if changes else problem
-
-
-def _target(output: str, problem: Problem) -> Path:
-    """The file to write, in a folder that exists and can be written."""
-    path = Path(output)
-    path = path if path.suffix == ".h5" else path / f"{problem.name}.h5"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ProblemError(f"cannot make the folder {path.parent}: {error.strerror or error}.") from None
-    if not os.access(path.parent, os.W_OK) or path.is_dir():
-        raise ProblemError(f"cannot write {path}; choose another --output.")
-    return path
 
 
 def level_line(level: Level) -> str:
@@ -111,12 +84,11 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
         lines += [
             f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
             f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} for delta -> 0",
-            f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}",
+            f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}      "
+            f"at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  gait            {text}" for text in _gait_lines(solution)]
-        for check in certificate.checks:
-            mark = "ok " if check.passed else "NO "
-            lines.append(f"  {mark} {check.name:<21s} {check.value:9.1e}  (<= {check.threshold:.0e})  {check.meaning}")
+        lines += [f"  {check.line()}" for check in certificate.checks]
         if reference is not None:
             difference = certificate.efficiency - reference.efficiency
             agree = "agrees with" if abs(difference) <= reference.tolerance else "DIFFERS from"
@@ -183,55 +155,89 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     options = _parser().parse_args(arguments)
-    quiet = options.quiet or options.json
-    try:
-        stated = read_problem_file(options.problem)
-        problem = _changed(stated.problem, options)
-        path = _target(options.output, problem)
-        return _solve(problem, stated.source, stated.reference, path, options, quiet)
-    except CollocError as error:
-        print(f"colloc: {error}", file=sys.stderr)
-        return BAD_PROBLEM
-    except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  the reader of a pipe left; the result is saved
-        return BAD_PROBLEM
-    except KeyboardInterrupt:
-        print("colloc: interrupted; nothing was written.", file=sys.stderr)
-        return INTERRUPTED
+    return exit_code(lambda: _solve(options))
 
 
-def _solve(
-    problem: Problem, source: str, reference: Reference | None, path: Path, options: argparse.Namespace, quiet: bool
-) -> int:
+def _solve(options: argparse.Namespace) -> int:
+    stated = read_problem_file(options.problem)
+    problem = changed(stated.problem, options)
+    path = output_path(options.output, Path("results") / f"{problem.name}.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.gap import gap_line, upper_bound
-    from colloc.optimise import maximise_efficiency
     from colloc.store import save
 
-    if not quiet:
-        print(LEVEL_HEADER, flush=True)
-
-    def show(level: Level) -> None:
-        if not quiet:
-            print(level_line(level), flush=True)
-
-    solution = maximise_efficiency(problem, show)
-    solution.source = source
+    quiet = options.quiet or options.json
+    solution = _solved(problem, stated.source, path, options.fresh, quiet)
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")
     save(solution, path)
-    bound = upper_bound(problem, path.parent, compute=options.bound)
-    efficiency = solution.efficiency if solution.certificate is None else solution.certificate.efficiency
-    if not options.no_figure:
-        from colloc.figures import save_figure, solution_figure
+    _partial(path).unlink(missing_ok=True)
+    with StatusLine(enabled=not quiet) as line:
+        line.say("computing an upper bound on every gait" if options.bound else "drawing")
+        bound = upper_bound(problem, path.parent, compute=options.bound)
+        if not options.no_figure:
+            from colloc.figures import save_figure, solution_figure
 
-        save_figure(solution_figure(solution), path)
+            save_figure(solution_figure(solution), path)
     if options.json:
-        print(json.dumps(summary_dict(solution, path, reference, bound)))
+        print(json.dumps(summary_dict(solution, path, stated.reference, bound)))
     else:
-        print("\n".join([*summary_lines(solution, reference), gap_line(problem, efficiency, bound)]))
+        efficiency = solution.efficiency if solution.certificate is None else solution.certificate.efficiency
+        print("\n".join([*summary_lines(solution, stated.reference), gap_line(problem, efficiency, bound)]))
         print(f"  saved {path}" + ("" if options.no_figure else f", {path.with_suffix('.png')}"))
     return EXIT[solution.status]
+
+
+def _partial(path: Path) -> Path:
+    """Where the levels of a run are kept while it is under way."""
+    return path.with_name(f"{path.name.removesuffix('.h5').removesuffix('.failed')}.partial.h5")
+
+
+def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool) -> Solution:
+    """The solution, from the levels that an interrupted run left if there are any; each level is kept as it ends."""
+    from colloc.optimise import maximise_efficiency
+    from colloc.store import load, save
+
+    partial = _partial(path)
+    levels: list[Level] = []
+    if partial.exists() and not fresh:
+        before = load(partial)
+        if before.problem.hash == problem.hash:
+            levels = list(before.levels)
+    table = not quiet and sys.stdout.isatty()
+    if levels and not quiet:
+        print(f"going on from {partial}: {len(levels)} levels, the last at delta = {levels[-1].delta:.1e}", flush=True)
+    if table:
+        print(LEVEL_HEADER, flush=True)
+    begin = time.monotonic()
+    before_levels = tuple(levels)
+    try:
+        with StatusLine(enabled=not quiet) as line:
+            line.say(f"{problem.name}: building")
+
+            def ended(level: Level) -> None:
+                levels.append(level)
+                save(Solution(problem, levels, source=source, message="interrupted."), partial)
+                if table:
+                    line.clear()
+                    print(level_line(level), flush=True)
+                left = levels_left(problem, level) * (time.monotonic() - begin) / (len(levels) - len(before_levels))
+                line.say(f"{problem.name}: solving, delta {level.delta:.0e} done", left)
+
+            solution = maximise_efficiency(problem, ended, before_levels)
+    except KeyboardInterrupt:
+        if not levels:
+            raise
+        raise KeyboardInterrupt(f"{len(levels)} levels are kept in {partial}; the same command goes on from there.") from None
+    solution.source = source
+    return solution
+
+
+def levels_left(problem: Problem, level: Level) -> int:
+    """Levels a solve will probably still take after this one: one a decade of delta, and one on a refined mesh."""
+    if level.delta <= problem.delta:
+        return 1
+    return math.ceil(math.log10(level.delta / problem.delta) - 1e-9) + (problem.mesh_tolerance > 0)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,9 @@ COMMANDS = {
     "paper/*.png": "python -m scripts.reproduce_paper",
 }
 KEPT = {
+    "report.png": "python -m scripts.report_screenshot",
+    "gallery.json": "python -m scripts.gallery",
+    "gallery": "python -m scripts.gallery",
     "mesh_tolerance.md": "python -m benchmarks.mesh_tolerance",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",

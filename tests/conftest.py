@@ -4,6 +4,7 @@ from functools import cache
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 import pytest
 
 matplotlib.use("Agg")
@@ -30,3 +31,26 @@ def solved():
 @pytest.fixture(scope="session")
 def three_link(solved):
     return solved("three_link")[0]
+
+
+@pytest.fixture(scope="session")
+def unsolved():
+    """A function from a problem to a solution whose one level is the guess, in balance but not optimal."""
+    return guess_in_balance
+
+
+def guess_in_balance(problem):
+    from colloc.replay import replay
+
+    from colloc.solution import Level, Solution
+    from colloc.transcription import transcribe
+    from colloc.warm_start import feasible_point
+
+    transcription = transcribe(problem)
+    x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
+    gait = problem.guess
+    fine = replay(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta, instants=200)
+    zero = np.zeros(transcription.assembly.m)
+    edges, measured = transcription.mesh.edges, (fine.efficiency, fine.distance, fine.work)
+    level = Level(problem.delta, edges, x, 0 * x, zero, *measured, 1.0, 1.0, 0.0, "guess", False, 0, 0.0, 0.0)
+    return Solution(problem, [level], message="only a guess.")

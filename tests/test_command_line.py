@@ -32,7 +32,7 @@ def test_a_good_problem_is_solved_saved_and_drawn(problem, tmp_path, capsys):
     name = "quick" if code == 0 else "quick.failed"
     assert {p.name for p in (tmp_path / "out").iterdir()} == {f"{name}.h5", f"{name}.png", f"{name}.pdf"}
     assert "efficiency d/W" in printed
-    assert "3.0e-01" in printed
+    assert "delta 3e-01" in printed
 
 
 def test_json_is_one_object_on_standard_output(problem, tmp_path, capsys):

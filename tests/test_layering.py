@@ -5,8 +5,20 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["symmetry", "arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file"],
-    1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
+    0: [
+        "symmetry",
+        "arrays",
+        "errors",
+        "schemes",
+        "parallel",
+        "json_cache",
+        "spline",
+        "replaced_file",
+        "markup",
+        "progress",
+        "interruption",
+    ],
+    1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: [
         "path_class",
         "path_samples",
@@ -59,6 +71,7 @@ LEVELS = {
         "bound_sampling",
         "infinitesimal",
         "closure",
+        "solution_card",
     ],
     5: [
         "verify",
@@ -78,6 +91,8 @@ LEVELS = {
         "basins",
         "store_archive",
         "delta_limit",
+        "trajectory",
+        "motion_frames",
     ],
     6: [
         "optimise",
@@ -96,6 +111,17 @@ LEVELS = {
         "figures_maps",
         "figures_crawlers",
         "figures_paper",
+        "command_options",
+        "command",
+        "recheck",
+        "compare",
+        "export",
+        "report_charts",
+        "report_page",
+        "report",
+        "figures_publication",
+        "figures_animation",
+        "animate",
     ],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
@@ -144,15 +170,15 @@ def test_the_numpy_side_never_loads_casadi():
     assert set(numpy_side) <= {
         "arrays",
         "blocks",
-        "kernels",
-        "velocity_callback",
-        "transcription",
-        "nlp",
         "bump_callback",
         "bump_transcription",
-        "path_kernels",
+        "kernels",
+        "nlp",
         "path_geometry",
+        "path_kernels",
         "path_transcription",
+        "transcription",
+        "velocity_callback",
     }
 
 

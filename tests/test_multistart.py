@@ -236,7 +236,7 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     path.write_text(FILE, encoding="utf-8")
     multistart.main([str(path), "--starts", "2", "--output", str(out)])
     printed = capsys.readouterr().out
-    assert "(2 of 2, 0 s left)" in printed
+    assert "0 starts done already, 2 to go" in printed
     archive = load_archive(out / "quick.starts.h5")
     assert sorted(archive.outcomes) == [0, 1]
     asked = []

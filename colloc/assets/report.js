@@ -1,0 +1,155 @@
+"use strict";
+// Draws the body in the lab frame and moves the cursors of the charts. All numbers come from the JSON block "motion".
+(function () {
+  const data = JSON.parse(document.getElementById("motion").textContent);
+  const canvas = document.getElementById("stage");
+  const slider = document.getElementById("phase");
+  const button = document.getElementById("play");
+  const shown = document.getElementById("phase-shown");
+  const rate = document.getElementById("rate");
+  const arrows = document.getElementById("arrows");
+  const trails = document.getElementById("trails");
+  const context = canvas.getContext("2d");
+  const frames = data.t.length - 1, total = frames * data.periods;
+  const scale = Math.max(1, Math.min(3, window.devicePixelRatio || 1));
+  const width = canvas.width, height = canvas.height;
+  canvas.width = width * scale;
+  canvas.height = height * scale;
+  const box = data.window, unit = Math.min(width / (box[1] - box[0]), height / (box[3] - box[2]));
+  const left = (width - unit * (box[1] - box[0])) / 2, low = (height - unit * (box[3] - box[2])) / 2;
+  const px = x => left + unit * (x - box[0]), py = y => height - low - unit * (y - box[2]);
+  const blue = "#0072B2", red = "#D55E00", ink = "#1d2329";
+  let position = 0, playing = !window.matchMedia("(prefers-reduced-motion: reduce)").matches, before = null;
+
+  // a value between two frames; column k of the period it falls in
+  function at(rows, frame, axis) {
+    const period = Math.min(Math.floor(frame / frames), data.periods - 1), inside = frame - period * frames;
+    const k = Math.min(Math.floor(inside), frames - 1), part = inside - k, shift = axis < 0 ? 0 : period * data.step[axis];
+    return rows.map(row => (1 - part) * row[k] + part * row[k + 1] + shift);
+  }
+
+  function line(x, y, colour, thickness) {
+    context.strokeStyle = colour;
+    context.lineWidth = thickness;
+    context.beginPath();
+    x.forEach((value, k) => k ? context.lineTo(px(value), py(y[k])) : context.moveTo(px(value), py(y[k])));
+    context.stroke();
+  }
+
+  function disc(x, y, radius, fill, edge) {
+    context.beginPath();
+    context.arc(px(x), py(y), radius, 0, 2 * Math.PI);
+    context.fillStyle = fill;
+    context.fill();
+    if (edge) { context.strokeStyle = edge; context.lineWidth = 1.5; context.stroke(); }
+  }
+
+  function arrow(x, y, dx, dy) {
+    const length = Math.hypot(dx, dy) * unit;
+    if (length < 2) return;
+    const a = px(x), b = py(y), c = px(x + dx), d = py(y + dy), head = Math.min(6, 0.5 * length), angle = Math.atan2(d - b, c - a);
+    context.strokeStyle = context.fillStyle = red;
+    context.lineWidth = 1.4;
+    context.beginPath();
+    context.moveTo(a, b);
+    context.lineTo(c, d);
+    context.stroke();
+    context.beginPath();
+    context.moveTo(c, d);
+    context.lineTo(c - head * Math.cos(angle - 0.45), d - head * Math.sin(angle - 0.45));
+    context.lineTo(c - head * Math.cos(angle + 0.45), d - head * Math.sin(angle + 0.45));
+    context.fill();
+  }
+
+  function grid() {
+    const step = data.grid;
+    context.strokeStyle = "#eef1f4";
+    context.lineWidth = 1;
+    context.beginPath();
+    for (let x = Math.ceil((box[0] - left / unit) / step) * step; px(x) < width; x += step) { context.moveTo(px(x), 0); context.lineTo(px(x), height); }
+    for (let y = Math.ceil((box[2] - low / unit) / step) * step; py(y) > 0; y += step) { context.moveTo(0, py(y)); context.lineTo(width, py(y)); }
+    context.stroke();
+    context.strokeStyle = context.fillStyle = "#5b6670";
+    context.lineWidth = 2;
+    context.beginPath();
+    context.moveTo(14, height - 14);
+    context.lineTo(14 + unit * step, height - 14);
+    context.stroke();
+    context.font = "12px system-ui, sans-serif";
+    context.fillText(step + " body length" + (step === 1 ? "" : "s"), 14, height - 20);
+  }
+
+  function trail(row, colour, thickness) {
+    const count = Math.ceil(position);
+    const x = [], y = [];
+    for (let f = 0; f <= count; f++) {
+      const frame = Math.min(f, position);
+      x.push(at([row[0]], frame, 0)[0]);
+      y.push(at([row[1]], frame, 1)[0]);
+    }
+    line(x, y, colour, thickness);
+  }
+
+  function draw() {
+    context.setTransform(scale, 0, 0, scale, 0, 0);
+    context.clearRect(0, 0, width, height);
+    context.lineCap = context.lineJoin = "round";
+    grid();
+    const x = at(data.x, position, 0), y = at(data.y, position, 1), last = x.length - 1;
+    if (trails.checked) {
+      trail([data.x[0], data.y[0]], "#9cc7e2", 1);
+      trail([data.x[last], data.y[last]], "#f0cf8e", 1);
+      trail(data.centre, red, 1.5);
+    }
+    line(x, y, ink, 5);
+    for (let k = 1; k < last; k++) disc(x[k], y[k], 3.2, "white", ink);
+    disc(x[last], y[last], 6, ink);
+    disc(at([data.centre[0]], position, 0)[0], at([data.centre[1]], position, 1)[0], 3.5, red);
+    if (arrows.checked) {
+      const ax = at(data.arrowX, position, 0), ay = at(data.arrowY, position, 1);
+      const fx = at(data.forceX, position, -1), fy = at(data.forceY, position, -1);
+      ax.forEach((value, k) => arrow(value, ay[k], data.arrowScale * fx[k], data.arrowScale * fy[k]));
+    }
+    const phase = position / frames % 1;
+    shown.textContent = "t = " + (position / frames).toFixed(3);
+    slider.value = Math.round(1000 * position / total);
+    document.querySelectorAll(".cursor").forEach(mark => {
+      const value = Number(mark.dataset.low) + phase * (Number(mark.dataset.high) - Number(mark.dataset.low));
+      mark.setAttribute("x1", value);
+      mark.setAttribute("x2", value);
+    });
+    const angles = at(data.angles, position, -1);
+    document.querySelectorAll(".dot").forEach(mark => {
+      const ends = mark.dataset.box.split(",").map(Number), share = k => (angles[Number(k)] + Math.PI) / (2 * Math.PI);
+      mark.setAttribute("cx", ends[0] + share(mark.dataset.first) * (ends[1] - ends[0]));
+      mark.setAttribute("cy", ends[2] + share(mark.dataset.second) * (ends[3] - ends[2]));
+    });
+  }
+
+  function tick(now) {
+    if (!playing) { before = null; return; }
+    if (before !== null) position = (position + (now - before) / 1000 * frames * Number(rate.value) / 4) % total;
+    before = now;
+    draw();
+    window.requestAnimationFrame(tick);
+  }
+
+  function play(wanted) {
+    playing = wanted;
+    button.textContent = playing ? "❚❚ pause" : "▶ play";
+    if (playing) window.requestAnimationFrame(tick);
+  }
+
+  button.addEventListener("click", () => play(!playing));
+  slider.addEventListener("input", () => { play(false); position = total * Number(slider.value) / 1000; draw(); });
+  [arrows, trails].forEach(mark => mark.addEventListener("change", draw));
+  document.addEventListener("keydown", event => {
+    if (event.target === document.body && event.key === " ") { event.preventDefault(); play(!playing); }
+  });
+  // page.html#t=1.25 opens at that phase, at rest
+  const wanted = /^#t=([0-9.]+)$/.exec(window.location.hash);
+  if (wanted) { position = Math.min(Number(wanted[1]) * frames, total); playing = false; }
+  draw();
+  play(playing);
+  document.documentElement.dataset.ready = "yes";
+})();

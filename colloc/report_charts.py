@@ -1,0 +1,135 @@
+"""The charts of a report: shape space, angles, speeds, power, convergence, mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.balance import instant
+from colloc.chart import BLUE, COLOURS, ORANGE, VERMILION, Chart
+from colloc.contact import crossing_depth
+from colloc.markup import Markup, element
+from colloc.problem import Problem
+from colloc.refinement import interval_errors
+from colloc.solution import Solution
+
+_PI_TICKS = [(-np.pi, "−π"), (-np.pi / 2, "−π/2"), (0.0, "0"), (np.pi / 2, "π/2"), (np.pi, "π")]
+_CELLS = 120
+_FORBIDDEN = "#dcdcdc"
+
+
+def plane_chart(problem: Problem, angles: np.ndarray, first: int, second: int, size: int = 320) -> Markup:
+    """The gait in the plane of two joint angles; grey shapes are not allowed. A dot follows the animation."""
+    limit = 1.03 * np.pi
+    chart = Chart(
+        (-limit, limit),
+        (-limit, limit),
+        f"joints {first + 1} and {second + 1}",
+        f"joint angle {first + 1} [rad]",
+        f"joint angle {second + 1} [rad]",
+        width=size,
+        height=round(0.98 * size),
+    )
+    for x, y in forbidden_rectangles(problem):
+        chart.rectangle(x, y, _FORBIDDEN)
+    path = angles[[first, second]]
+    chart.line(path[0], path[1], BLUE, width=2)
+    chart.marks(path[0, :1], path[1, :1], BLUE, hollow=True)
+    chart.parts.append(_dot(chart, first, second))
+    return chart.svg(_PI_TICKS, _PI_TICKS)
+
+
+def _dot(chart: Chart, first: int, second: int) -> Markup:
+    ends = np.array([-np.pi, np.pi])
+    box = ",".join(f"{value:.2f}" for value in [*chart.px(ends), *chart.py(ends)])
+    return element("circle", class_="dot", r=5, fill=VERMILION, data_box=box, data_first=first, data_second=second)
+
+
+def forbidden_rectangles(problem: Problem) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Rectangles that cover the shapes of a plane of two joint angles beyond the joint limit, or with crossing links.
+
+    Contact is only shown for bodies of two joints: with more, it depends on the others.
+    """
+    limit = problem.joint_limit
+    edges = np.linspace(-np.pi, np.pi, _CELLS + 1)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    a, b = np.meshgrid(middle, middle)
+    bad = np.maximum(abs(a), abs(b)) > limit
+    if problem.body.n_joint == 2:
+        bad |= (crossing_depth(problem.body, np.stack([a.ravel(), b.ravel()])) > 1e-9).reshape(a.shape)
+    result = []
+    for row in range(_CELLS):
+        change = np.flatnonzero(np.diff(np.concatenate([[False], bad[row], [False]]).astype(int)))
+        for start, stop in change.reshape(-1, 2):
+            result.append(((edges[start], edges[stop]), (edges[row], edges[row + 1])))
+    return result
+
+
+def angles_chart(t: np.ndarray, angles: np.ndarray) -> Markup:
+    """Joint angles over a period."""
+    reach = 1.05 * max(float(np.abs(angles).max()), 0.1)
+    chart = Chart((0.0, 1.0), (-reach, reach), "joint angles [rad]", "phase t")
+    for j, colour in zip(range(len(angles)), COLOURS, strict=False):
+        chart.line(t, angles[j], colour, f"{j + 1}")
+    chart.cursor()
+    return chart.svg()
+
+
+def speeds_chart(solution: Solution, t: np.ndarray) -> Markup:
+    """Speeds of the link midpoints, on a logarithmic scale that shows where links stick."""
+    problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
+    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, delta).velocity
+    speed = np.hypot(link.vs, link.vn)
+    low = 10.0 ** np.floor(np.log10(0.3 * delta))
+    chart = Chart(
+        (0.0, 1.0), (low, 10 ** np.ceil(np.log10(speed.max()))), "speeds of the links [1/period]", "phase t", log_y=True
+    )
+    for i, colour in zip(range(len(speed)), COLOURS, strict=False):
+        chart.line(t, np.maximum(speed[i], low), colour, f"{i + 1}")
+    chart.level(delta, "δ: below it links stick")
+    chart.cursor()
+    return chart.svg()
+
+
+def power_chart(solution: Solution, t: np.ndarray) -> Markup:
+    """Power against friction, with the mesh on the axis."""
+    power = solution.power(solution.sample(t))
+    chart = Chart((0.0, 1.0), (0.0, 1.08 * float(power.max())), "power against friction [weight·length/period]", "phase t")
+    chart.line(t, power, BLUE)
+    chart.ticks_below(solution.last.edges)
+    chart.cursor()
+    return chart.svg()
+
+
+def convergence_chart(solution: Solution) -> Markup:
+    """Efficiency at every level against its delta; hollow marks did not converge."""
+    levels = solution.levels
+    delta = np.array([level.delta for level in levels])
+    value = np.array([level.efficiency for level in levels])
+    good = np.array([level.optimal for level in levels])
+    shown = value[good] if good.any() else value[np.isfinite(value)]
+    middle = float(np.median(shown)) if shown.size else 0.0
+    spread = max(float(np.abs(shown - middle).max()) if shown.size else 0.0, 1e-3 * abs(middle), 1e-9)
+    y = (middle - 1.2 * spread, middle + 1.2 * spread)
+    x = (delta.min() / 2, delta.max() * 2)
+    chart = Chart(x, y, "efficiency at each level", "δ", log_x=True)
+    chart.line(delta[good], value[good], BLUE)
+    chart.marks(delta[good], value[good], BLUE)
+    outside = ~good & np.isfinite(value)
+    chart.marks(delta[outside], np.clip(value[outside], *y), VERMILION, hollow=True)
+    return chart.svg()
+
+
+def mesh_chart(solution: Solution) -> tuple[Markup, float]:
+    """Estimated error of each mesh interval against phase, and the sum of their magnitudes."""
+    problem, mesh = solution.problem, solution.mesh
+    errors = np.maximum(np.abs(interval_errors(problem, mesh, solution.gait, solution.last.delta)), 1e-12)
+    tolerance = problem.mesh_tolerance
+    high = 10.0 ** np.ceil(np.log10(max(float(errors.max()), tolerance) * 1.01))
+    low = max(10.0 ** np.floor(np.log10(float(errors.min()))), high * 1e-10)
+    title = f"mesh: error of {mesh.n} intervals"
+    chart = Chart((0.0, float(mesh.edges[-1])), (low, high), title, "phase t", log_y=True)
+    chart.line(np.repeat(mesh.edges, 2)[1:-1], np.repeat(errors, 2), ORANGE)
+    chart.ticks_below(mesh.edges)
+    if tolerance > 0:
+        chart.level(tolerance, "allowed in all")
+    return chart.svg(), float(errors.sum())

@@ -1,0 +1,162 @@
+"""Hooks of the documentation (mkdocs.yml): the order of pages, generated pages, formulas, links out of docs/.
+
+- Pages that `ORDER` does not name are appended under "Further reading", so a new file in docs/ needs no other change.
+- Generated: the gallery (problems/ with results/curated/gallery.json), the commands (their own --help), the API.
+- Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
+- Links to files of the repository outside docs/ become their names; pictures of results/curated are copied.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import importlib
+import io
+import json
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from latex2mathml.converter import convert
+from mkdocs.structure.files import File
+
+ROOT = Path(__file__).resolve().parents[1]
+ORDER = (
+    ("Start", ("index.md", "tutorial.md", "gallery.md", "troubleshooting.md")),
+    ("How to", ("howto/report.md", "howto/robot.md", "howto/scripts.md", "howto/starts.md", "howto/check.md")),
+    ("Theory", ("theory.md", "bound.md", "gait_classes.md", "bodies.md")),
+    ("Reference", ("commands.md", "api.md", "modules.md", "cite.md")),
+)
+GENERATED = ("gallery.md", "commands.md", "api.md", "modules.md")
+_MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_MATH_INLINE = re.compile(r"\$`([^`\n]+)`\$")
+_OUTSIDE = re.compile(r"(!?)\[([^\]]*)\]\(((?:\.\./)+)([^)#\s]+)(#[^)]*)?\)")
+
+
+def on_config(config: Any) -> Any:
+    """The navigation: named pages in their order, then all others."""
+    present = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")} | set(GENERATED)
+    named = {page for _, pages in ORDER for page in pages}
+    nav: list[Any] = [{title: [page for page in pages if page in present]} for title, pages in ORDER]
+    rest = sorted(present - named)
+    if rest:
+        nav.insert(3, {"Further reading": rest})
+    config["nav"] = nav
+    return config
+
+
+def on_files(files: Any, config: Any) -> Any:
+    """Add the generated pages and the curated pictures."""
+    makers = {"gallery.md": gallery_page, "commands.md": commands_page, "api.md": api_page, "modules.md": modules_page}
+    for name, make in makers.items():
+        files.append(File.generated(config, name, content=make()))
+    for picture in sorted((ROOT / "results/curated").rglob("*.png")):
+        name = f"curated/{picture.relative_to(ROOT / 'results/curated').as_posix()}"
+        files.append(File.generated(config, name, content=picture.read_bytes()))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
+    """Formulas become marks that `on_page_content` replaces, since Markdown would read underscores in them."""
+    formulas: list[str] = []
+
+    def mark(display: str) -> Any:
+        def replaced(match: re.Match[str]) -> str:
+            formulas.append(convert(match[1].strip(), display=display))
+            return f"\n\nFORMULA{len(formulas) - 1}END\n\n" if display == "block" else f"FORMULA{len(formulas) - 1}END"
+
+        return replaced
+
+    depth = page.file.src_uri.count("/")
+    markdown = _MATH_INLINE.sub(mark("inline"), _MATH_BLOCK.sub(mark("block"), markdown))
+    page.meta["formulas"] = formulas
+    return _OUTSIDE.sub(lambda match: outside(match, depth), markdown)
+
+
+def outside(match: re.Match[str], depth: int) -> str:
+    """A link to a file outside docs/: pictures of results/curated stay, others become the file's name."""
+    picture, text, up, target = match[1], match[2], match[3], match[4]
+    if up.count("../") <= depth:
+        return match[0]
+    if target.startswith("results/curated/") and target.endswith(".png"):
+        return f"{picture}[{text}]({'../' * depth}curated/{target.removeprefix('results/curated/')})"
+    return f"`{target}`" if text.strip("`") in (target, Path(target).name) else f"{text} (`{target}`)"
+
+
+def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
+    """Put the formulas in."""
+    return re.sub(r"FORMULA(\d+)END", lambda match: page.meta["formulas"][int(match[1])], html)
+
+
+def gallery_page() -> str:
+    """One section a problem file: picture, numbers, docstring, source."""
+    table = json.loads((ROOT / "results/curated/gallery.json").read_text())
+    parts = [
+        "# Gallery",
+        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest tests/test_gallery.py` solves them again "
+        "and holds them against these numbers.",
+    ]
+    for path in sorted((ROOT / "problems").glob("[!_]*.py")):
+        source = path.read_text(encoding="utf-8")
+        title, _, rest = (ast.get_docstring(ast.parse(source)) or path.stem).partition("\n")
+        parts.append(f"## {path.stem}\n\n{title}")
+        if (ROOT / f"results/curated/gallery/{path.stem}.png").exists():
+            parts.append(f"![{path.stem}](curated/gallery/{path.stem}.png)")
+        row = table.get(path.stem)
+        if row and "efficiency" in row:
+            numbers = f"Efficiency **{row['efficiency']:.6f}** ± {row['error']:.0e}, d = {row['distance']:.5f}"
+            parts.append(
+                f"{numbers}, W = {row['work']:.5f} at δ = {row['delta']:.0e}; {row['status']}, "
+                f"{row['cpu_seconds']:g} s of processor time."
+            )
+        if "from colloc import" in source and "Problem(" in source:
+            parts.append(f"```sh\ncolloc solve problems/{path.name}\n```")
+        quoted = "\n".join(f"    {line}" for line in source.splitlines())
+        body = f"    ```text\n{_indented(rest.strip())}\n    ```\n\n" if rest.strip() else ""
+        parts.append(f'??? note "source and notes"\n\n{body}    ```python\n{quoted}\n    ```')
+    return "\n\n".join(parts) + "\n"
+
+
+def _indented(text: str) -> str:
+    return "\n".join(f"    {line}" for line in text.splitlines())
+
+
+def commands_page() -> str:
+    """What every subcommand says about itself."""
+    sys.path.insert(0, str(ROOT))
+    os.environ["COLUMNS"] = "100"
+    from colloc.command import SUBCOMMANDS, help_text
+
+    parts = ["# Commands", f"```text\n{help_text()}\n```"]
+    for name, (module, summary) in SUBCOMMANDS.items():
+        text = io.StringIO()
+        with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
+            importlib.import_module(module).main(["--help"])
+        parts.append(f"## colloc {name}\n\n{summary[:1].upper()}{summary[1:]}.\n\n```text\n{text.getvalue().rstrip()}\n```")
+    return "\n\n".join(parts) + "\n"
+
+
+def api_page() -> str:
+    """The public names, each from its module's docstrings."""
+    source = ast.parse((ROOT / "colloc/__init__.py").read_text(encoding="utf-8"))
+    home = next(
+        ast.literal_eval(node.value)
+        for node in source.body
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "_HOME"
+    )
+    parts = ["# Programming interface", "All of these are names of the package: `import colloc`, then `colloc.Problem`, ..."]
+    for module, names in home.items():
+        parts += [f"::: colloc.{module}.{name}" for name in names]
+    return "\n\n".join(parts) + "\n"
+
+
+def modules_page() -> str:
+    """First lines of all modules."""
+    rows = ["| module | holds |", "|---|---|"]
+    for path in sorted((ROOT / "colloc").glob("[!_]*.py")):
+        first = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
+        rows.append(f"| `{path.stem}` | {first.replace('|', chr(92) + '|')} |")
+    text = "Imports point down from level to level; `tests/test_layering.py` holds the levels."
+    return "# Modules\n\n" + text + "\n\n" + "\n".join(rows) + "\n"

@@ -1,0 +1,140 @@
+"""Solve every problem file for the gallery of the documentation: python -m scripts.gallery [NAME ...]
+
+Writes results/curated/gallery.json (numbers) and results/curated/gallery/NAME.png (a picture each). The test
+tests/test_gallery.py solves the same files and holds them against these numbers and their own REFERENCE.
+"""
+
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from colloc.concertina import Concertina
+from colloc.figures import STYLE, draw_filmstrip, draw_shape_path
+from colloc.optimise import maximise_efficiency
+from colloc.problem import Problem, Reference
+from colloc.smooth_period import measured_period
+from colloc.smooth_record import snapshots
+from colloc.solution import Solution, versions
+
+ROOT = Path(__file__).resolve().parents[1]
+TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
+_SIZE, _RESOLUTION = (7.2, 2.1), 75
+
+
+@dataclass(frozen=True)
+class Example:
+    """A problem file: its name, what it states, and how to run it."""
+
+    name: str
+    stated: dict[str, Any]
+
+    @property
+    def reference(self) -> Reference | None:
+        return self.stated.get("REFERENCE")
+
+    @property
+    def optimised(self) -> bool:
+        """A gait is sought; otherwise a motion is prescribed."""
+        return isinstance(self.stated.get("PROBLEM"), Problem)
+
+
+def examples() -> list[Example]:
+    """All files in problems/."""
+    paths = sorted((ROOT / "problems").glob("[!_]*.py"))
+    return [Example(path.stem, runpy.run_path(str(path))) for path in paths]
+
+
+def prescribed_row(example: Example) -> dict[str, Any]:
+    """Numbers of a file that prescribes a motion."""
+    stated = example.stated
+    if isinstance(stated.get("PROBLEM"), Concertina):
+        p, delta = stated["PROBLEM"].measured_period(intervals=2), stated["PROBLEM"].delta
+    else:
+        p, delta = measured_period(stated["MOTION"], stated["FRICTION"], stated["DELTA"]), stated["DELTA"]
+    return {
+        "status": "computed",
+        "efficiency": p.efficiency,
+        "error": p.errors["efficiency"],
+        "distance": p.d,
+        "work": p.W,
+        "delta": delta,
+    }
+
+
+def solved_row(solution: Solution) -> dict[str, Any]:
+    """Numbers of a solved problem, by its certificate."""
+    certificate = solution.certificate
+    if certificate is None:
+        return {"status": solution.status, "delta": solution.last.delta}
+    return {
+        "status": solution.status,
+        "efficiency": certificate.efficiency,
+        "error": certificate.efficiency_error,
+        "distance": certificate.distance,
+        "work": certificate.work,
+        "delta": solution.last.delta,
+    }
+
+
+def _picture(example: Example, solution: Solution | None) -> None:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=_SIZE, layout="constrained")
+        if solution is not None:
+            grid = figure.add_gridspec(1, 2, width_ratios=(2.6, 1))
+            draw_filmstrip(figure.add_subplot(grid[0]), solution, count=6)
+            t = np.linspace(0.0, 1.0, 801)
+            if solution.problem.body.n_joint > 1:
+                draw_shape_path(figure.add_subplot(grid[1]), solution.problem, solution.sample(t).angles, legend=False)
+        else:
+            _draw_snapshots(figure, example.stated)
+        figure.savefig(PICTURES / f"{example.name}.png", dpi=_RESOLUTION)
+
+
+def _draw_snapshots(figure: Figure, stated: dict[str, Any]) -> None:
+    crawler = stated.get("PROBLEM")
+    if isinstance(crawler, Concertina):
+        motion, friction, delta = crawler.motion(), crawler.friction, crawler.delta
+    else:
+        motion, friction, delta = stated["MOTION"], stated["FRICTION"], stated["DELTA"]
+    shown = snapshots(motion, friction, delta, count=6)
+    axes = figure.add_subplot()
+    spacing, low = max(1.15 * float(np.ptp(shown.x, axis=0).max()), 0.6), float(shown.y.min()) - 0.1
+    for k, t in enumerate(shown.t):
+        middle = 0.5 * (shown.x[:, k].min() + shown.x[:, k].max())
+        colour = matplotlib.colormaps["cividis_r"](0.15 + 0.85 * k / shown.t.size)
+        axes.plot(shown.x[:, k] - middle + k * spacing, shown.y[:, k], color=colour, lw=1.8)
+        axes.text(k * spacing, low, f"t = {t:.2f}", ha="center", va="top", fontsize=7)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_ylim(low - 0.12, max(0.2, float(shown.y.max()) + 0.05))
+
+
+def main(names: list[str]) -> None:
+    table = json.loads(TABLE.read_text()) if TABLE.exists() else {}
+    for example in examples():
+        if names and example.name not in names:
+            continue
+        begin = time.process_time()
+        solution = maximise_efficiency(example.stated["PROBLEM"]) if example.optimised else None
+        row = solved_row(solution) if solution is not None else prescribed_row(example)
+        row["cpu_seconds"] = round(time.process_time() - begin, 1)
+        table[example.name] = row
+        _picture(example, solution)
+        print(f"{example.name:28} {row['status']:20} {row.get('efficiency', float('nan')):10.6f} {row['cpu_seconds']:7.1f} s")
+    table["versions"] = versions()
+    TABLE.write_text(json.dumps(table, indent=1, sort_keys=True) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

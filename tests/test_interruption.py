@@ -1,0 +1,75 @@
+"""Ctrl-C: what was reached is kept, the same command goes on from there, and compiled code does not swallow it."""
+
+import contextlib
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from colloc.interruption import interruptible
+from colloc.store import load
+
+PROBLEM = """
+from colloc import *
+PROBLEM = Problem(name="long", gait=Harmonic(1, "bilateral"), guess=ellipse(0.3, 1.0, 0.5), intervals=80,
+                  mesh_tolerance=1e-5)
+"""
+
+
+def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
+    (tmp_path / "long.py").write_text(PROBLEM, encoding="utf-8")
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "colloc", "solve", str(tmp_path / "long.py"), "--output", str(out), "--no-figure"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    limit = time.monotonic() + 60
+    while not (out / "long.partial.h5").exists() and time.monotonic() < limit:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    printed, complaint = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert printed == ""
+    assert "levels are kept in" in complaint
+    assert "Traceback" not in complaint
+    assert not (out / "long.h5").exists()
+    partial = load(out / "long.partial.h5")
+    assert partial.status == "not converged"
+    assert partial.levels[0].optimal
+
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert f"going on from {out / 'long.partial.h5'}" in again.stdout
+    assert {path.name for path in out.iterdir()} == {"long.h5"}
+    solution = load(out / "long.h5")
+    assert solution.status == "solved"
+    # the last level kept is solved again from its own result, which is quick; those before it are not touched
+    kept = len(partial.levels) - 1
+    for old, new in zip(partial.levels[:kept], solution.levels[:kept], strict=True):
+        assert new.seconds == old.seconds
+        np.testing.assert_array_equal(new.x, old.x)
+    assert solution.levels[kept].delta == partial.levels[kept].delta
+    assert solution.levels[kept].iterations < 0.5 * partial.levels[kept].iterations
+    assert solution.certificate.efficiency == pytest.approx(0.26003, abs=2e-5)
+
+
+def swallow():
+    with interruptible(), contextlib.suppress(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_a_swallowed_interrupt_is_raised_at_the_end_of_the_block():
+    with pytest.raises(KeyboardInterrupt):
+        swallow()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_handler_of_somebody_else_is_left_alone():
+    heard = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    try:
+        with interruptible():
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert heard == [signal.SIGINT]
