@@ -5,7 +5,6 @@ import json
 
 import numpy as np
 import pytest
-from colloc.replay import replay
 from scipy.interpolate import CubicSpline
 
 from colloc.body import Chain
@@ -13,6 +12,7 @@ from colloc.errors import ProblemError
 from colloc.export import main
 from colloc.friction import Friction
 from colloc.gait import Fourier, ellipse
+from colloc.path_replay import replay
 from colloc.store import save
 from colloc.trajectory import timed
 
