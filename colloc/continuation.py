@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.closure import closed_parameters
 from colloc.diagnosis import explanation, redundant_equations
+from colloc.far_contact import Pairs, crossing_pairs, last_free
 from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
 from colloc.problem import Problem
@@ -57,6 +58,7 @@ class _Run:
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
+        self.far: Pairs = ()
         if problem.gait.symmetry == "none":
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
 
@@ -66,7 +68,7 @@ class _Run:
 
     def attempt(self, delta: float) -> NlpResult:
         """Solve at delta from the last converged gait; take the result over if it is optimal."""
-        result = self._solve(delta)
+        result = self._solve_apart(delta)
         if delta == self.problem.delta:
             # move the checks between nodes to the new gait's worst instants until none is exceeded
             for _ in range(_EXCHANGES):
@@ -85,10 +87,24 @@ class _Run:
             self.radius = NEXT_RADIUS
         return result
 
-    def _solve(self, delta: float) -> NlpResult:
-        """One solve; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
+    def _solve_apart(self, delta: float) -> NlpResult:
+        """Solve, constraining pairs of links more than two apart as they turn out to cross each other."""
+        result = self._solve(delta)
+        while np.isfinite(result.x).all():
+            found = result.x[self.solver.transcription.layout.parameters[:, 0]]
+            new = tuple(p for p in crossing_pairs(self.problem, found) if p not in self.far)
+            if not new:
+                break
+            self.far += new
+            self.remesh(self.solver.transcription.mesh.edges, self.radius)
+            again = self._solve(delta, last_free(self.problem, self.parameters, found))
+            result = again.accumulated(result)
+        return result
+
+    def _solve(self, delta: float, start: np.ndarray | None = None) -> NlpResult:
+        """One solve, by default from the last converged gait; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
-        x = feasible_point(transcription, self.parameters, delta)
+        x = feasible_point(transcription, self.parameters if start is None else start, delta)
         result = self.solver.solve(x, delta, multipliers, radius)
         stuck = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
         for _ in range(_RETRIES if stuck else 0):
@@ -100,11 +116,11 @@ class _Run:
             result = self.solver.solve(x, delta, None, radius).accumulated(result)
         return result
 
-    def remesh(self, edges: np.ndarray) -> None:
-        """Go on with another mesh; multipliers do not carry over."""
-        self.solver = Solver(transcribe(self.problem, edges))
+    def remesh(self, edges: np.ndarray, radius: float = REMESH_RADIUS) -> None:
+        """Go on with another mesh, or more pairs of links kept apart; multipliers do not carry over."""
+        self.solver = Solver(transcribe(self.problem, edges, self.far))
         self.multipliers = None
-        self.radius = REMESH_RADIUS
+        self.radius = radius
 
     def _record(self, delta: float, result: NlpResult) -> None:
         transcription = self.solver.transcription

@@ -133,6 +133,12 @@ class Problem:
         if self.gait.symmetry == "bilateral" and not self.body.symmetric:
             raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
 
+        if self.body.n_joint == 1 and self.friction.mu_f == self.friction.mu_b:
+            raise ProblemError(
+                "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
+                "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
+            )
+
     def _check_guess(self) -> None:
         if self.guess.n_joint != self.body.n_joint:
             raise ProblemError(

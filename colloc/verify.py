@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.balance import net_force
-from colloc.contact import crossing_depth
+from colloc.contact import crossing_depth, passing_depth
 from colloc.replay import Path, Replay, replay
 from colloc.solution import Certificate, Check, Solution
 
@@ -64,9 +64,9 @@ def _optimality(solution: Solution) -> list[Check]:
 def _motion(solution: Solution, fine: Replay, path: Path) -> list[Check]:
     problem, level = solution.problem, solution.last
     ends, _ = path(np.array([0.0, 1.0]))
-    angles, _ = path(np.arange(_FINE_PHASES) / _FINE_PHASES)
+    angles, _ = path(np.linspace(0.0, 1.0, _FINE_PHASES + 1))
     beyond = max(float(np.abs(angles).max()) - problem.joint_limit, 0.0)
-    depth = float(crossing_depth(problem.body, angles).max())
+    depth = max(float(crossing_depth(problem.body, angles).max()), passing_depth(problem.body, angles))
     return [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
         Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),

@@ -22,6 +22,7 @@ LEVELS = {
         "bump_callback",
         "bump_transcription",
         "sampling",
+        "far_contact",
     ],
     4: [
         "nlp",

@@ -1,0 +1,35 @@
+"""Self-contact of links that are more than two apart: which pairs an optimisation has to constrain.
+
+A chain of n links has (n - 2)(n - 3)/2 such pairs and few of them ever come near each other. So a problem is solved
+without them, the gait found is checked between the nodes against every pair, the pairs that cross are constrained from
+then on, and the problem is solved again (a cutting-plane method). It ends after at most as many rounds as there are pairs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.contact import clearance, far_pairs
+from colloc.problem import Problem
+
+Pairs = tuple[tuple[int, int], ...]
+PHASES = 1000
+"""Phases of the solved part of the period at which all pairs are checked; the certificate checks 20000 a period."""
+_FRACTIONS = np.linspace(1.0, 0.0, 21)
+
+
+def crossing_pairs(problem: Problem, parameters: np.ndarray, tolerance: float = 1e-8) -> Pairs:
+    """Pairs of links more than two apart that cross, or come nearer than `tolerance` [body lengths] to it, in a gait."""
+    t = np.linspace(0.0, problem.gait.fraction, PHASES)
+    angles = problem.gait.fourier(parameters, problem.body.n_joint).angles(t)
+    body = problem.body
+    return tuple((i, j) for i, j in far_pairs(body) if clearance(body, angles, i, j).min() < -tolerance)
+
+
+def last_free(problem: Problem, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
+    """Gait parameters on the way from those of a free gait to those of one with crossing links, as far as links stay apart."""
+    for fraction in _FRACTIONS:
+        between = free + fraction * (crossing - free)
+        if not crossing_pairs(problem, between):
+            return between
+    return free
