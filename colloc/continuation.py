@@ -17,9 +17,10 @@ from colloc.closure import closed_parameters
 from colloc.diagnosis import explanation, redundant_equations
 from colloc.far_contact import Pairs, crossing_pairs, last_free
 from colloc.gait import Fourier
+from colloc.mesh_error import mesh_error
 from colloc.nlp import NlpResult, Solver
 from colloc.problem import Problem
-from colloc.refinement import refined_edges
+from colloc.refinement import MOST_POINTS, planned_mesh
 from colloc.solution import Level, Solution
 from colloc.transcription import transcribe
 from colloc.warm_start import feasible_point
@@ -102,7 +103,7 @@ class _Run:
         return result
 
     def _solve(self, delta: float, start: np.ndarray | None = None) -> NlpResult:
-        """One solve, by default from the last converged gait; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
+        """One solve, by default from the last converged gait; repeated from where it stopped if no smaller step can follow."""
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
         x = feasible_point(transcription, self.parameters if start is None else start, delta)
         result = self.solver.solve(x, delta, multipliers, radius)
@@ -116,9 +117,10 @@ class _Run:
             result = self.solver.solve(x, delta, None, radius).accumulated(result)
         return result
 
-    def remesh(self, edges: np.ndarray, radius: float = REMESH_RADIUS) -> None:
-        """Go on with another mesh, or more pairs of links kept apart; multipliers do not carry over."""
-        self.solver = Solver(transcribe(self.problem, edges, self.far))
+    def remesh(self, edges: np.ndarray, radius: float = REMESH_RADIUS, scheme: str | None = None) -> None:
+        """Go on with another mesh or scheme, or more pairs of links kept apart; multipliers do not carry over."""
+        scheme = scheme or self.solver.transcription.mesh.scheme.name
+        self.solver = Solver(transcribe(self.problem.with_(scheme=scheme), edges, self.far))
         self.multipliers = None
         self.radius = radius
 
@@ -142,6 +144,7 @@ class _Run:
             result.iterations,
             result.seconds,
             result.evaluation_seconds,
+            transcription.mesh.scheme.name,
         )
         self.levels.append(level)
         if self.on_level is not None:
@@ -167,9 +170,10 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     begin = time.perf_counter()
     run = _Run(problem, solver or Solver(transcribe(problem)), on_level)
     result = _descend(run)
+    shortfall = ""
     if result.optimal and problem.mesh_tolerance > 0:
-        result = _refine(run, result)
-    solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin)
+        result, shortfall = _refine(run, result)
+    solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin, message=shortfall)
     if not result.optimal:
         delta = run.levels[-1].delta
         solution.message = explanation(run.solver.transcription, result, delta)
@@ -209,16 +213,26 @@ def _descend(run: _Run) -> NlpResult:
         delta = reached * factor if reached * factor > 1.2 * target else target
 
 
-def _refine(run: _Run, result: NlpResult) -> NlpResult:
-    """Solve again on refined meshes until the gait found needs no further refinement."""
-    problem = run.problem
+def _refine(run: _Run, result: NlpResult) -> tuple[NlpResult, str]:
+    """Solve again on planned meshes until the gait found needs no other; the last result, and what was not reached."""
+    problem, kept = run.problem, np.empty(0)
     for _ in range(_REFINEMENTS):
         mesh = run.solver.transcription.mesh
-        edges = refined_edges(problem, mesh, run.gait, problem.delta, problem.mesh_tolerance)
-        if edges is None:
-            break
-        run.remesh(edges)
+        plan = planned_mesh(problem, mesh, run.gait, problem.delta, problem.mesh_tolerance, kept=kept)
+        if plan is None:
+            return result, ""
+        kept = np.concatenate([kept, plan.kept])
+        run.remesh(plan.edges, scheme=plan.scheme)
         result = run.attempt(problem.delta)
         if not result.optimal:
+            return result, ""
+        if not plan.reached:
             break
-    return result
+    mesh = run.solver.transcription.mesh
+    error = mesh_error(problem, mesh, run.gait, problem.delta, problem.mesh_tolerance)
+    if error.estimate <= problem.mesh_tolerance:
+        return result, ""
+    return result, (
+        f"refinement ended after {_REFINEMENTS} meshes or {MOST_POINTS} points at an estimated efficiency error of "
+        f"{error.estimate:.1e}, above mesh_tolerance {problem.mesh_tolerance:.0e}."
+    )

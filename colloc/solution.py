@@ -11,9 +11,10 @@ import numpy as np
 
 from colloc.balance import Instant, instant, total_power
 from colloc.gait import Fourier
-from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
+from colloc.layout import RADIANS, Layout, problem_layout
 from colloc.mesh import Mesh
 from colloc.problem import Problem
+from colloc.schemes import scheme
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
 
@@ -42,6 +43,8 @@ class Level:
         Whether the first-order conditions hold.
     iterations : int
     seconds, evaluation_seconds : float
+    scheme : str
+        Collocation scheme, which refinement may have raised in order; "" for the problem's.
     """
 
     delta: float
@@ -60,6 +63,7 @@ class Level:
     iterations: int
     seconds: float
     evaluation_seconds: float
+    scheme: str = ""
 
 
 @dataclass(frozen=True)
@@ -192,7 +196,7 @@ class Solution:
     @property
     def mesh(self) -> Mesh:
         """The mesh of the last level."""
-        return problem_mesh(self.problem, self.last.edges)
+        return Mesh(scheme(self.last.scheme or self.problem.scheme), self.last.edges)
 
     @property
     def layout(self) -> Layout:

@@ -129,9 +129,7 @@ def _check_parameters(problem: Problem, times: np.ndarray) -> np.ndarray:
     return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
 
 
-def transcribe(
-    problem: Problem, edges: np.ndarray | None = None, far: tuple[tuple[int, int], ...] = ()
-) -> Transcription:
+def transcribe(problem: Problem, edges: np.ndarray | None = None, far: tuple[tuple[int, int], ...] = ()) -> Transcription:
     """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges.
 
     Self-contact is constrained between links two apart, and between the pairs `far` of links farther apart: see

@@ -6,6 +6,7 @@ import numpy as np
 
 from colloc.balance import net_force
 from colloc.contact import crossing_depth, passing_depth
+from colloc.mesh_error import mesh_error
 from colloc.replay import Path, Replay, replay
 from colloc.solution import Certificate, Check, Solution
 
@@ -46,7 +47,7 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     at_tenth = replay(problem.body, problem.friction, path, 0.1 * level.delta, instants=fine.instants, tolerance=tolerance)
     # the influence of delta is linear to leading order: the rest is a ninth of the last step
     at_zero = at_tenth.efficiency + (at_tenth.efficiency - fine.efficiency) / 9
-    checks = (*_optimality(solution), *_motion(solution, fine, path), *_delta(solution, fine, at_zero))
+    checks = (*_optimality(solution), *_motion(solution, fine, path), *_mesh(solution), *_delta(solution, fine, at_zero))
     return Certificate(checks, fine.efficiency, fine.distance, fine.work, fine.error * fine.efficiency, at_zero, fine.instants)
 
 
@@ -77,6 +78,16 @@ def _motion(solution: Solution, fine: Replay, path: Path) -> list[Check]:
         Check("replay error", fine.error, GAP, "relative, estimated from half the replay grid"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
     ]
+
+
+def _mesh(solution: Solution) -> list[Check]:
+    """The error estimate from the scheme's own defect; it has to pass only if the problem requests an accuracy."""
+    problem = solution.problem
+    tolerance = problem.mesh_tolerance
+    if tolerance == 0:
+        return []
+    error = mesh_error(problem, solution.mesh, solution.gait, solution.last.delta, tolerance)
+    return [Check("mesh error", error.estimate, tolerance, "of the efficiency, relative, from defects between nodes")]
 
 
 def _delta(solution: Solution, fine: Replay, at_zero: float) -> list[Check]:

@@ -23,6 +23,9 @@ LEVELS = {
         "bump_transcription",
         "sampling",
         "far_contact",
+        "fine_motion",
+        "kinks",
+        "mesh_error",
     ],
     4: [
         "nlp",
