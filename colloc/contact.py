@@ -5,6 +5,8 @@ iff, with a and b the two joint angles, ``min(b + chi(a; l_i), a + chi(b; l_i+2)
 ``chi(a; l) = atan2(l sin a, m + l cos a)`` and m is the length between; for equal lengths chi = a/2 and the condition is
 ``min(2 a + b, a + 2 b) > 2 pi``. (Base m, base angles pi - a and pi - b: the tip of one link lies beyond the line of the
 other on both sides.)
+
+Links farther apart cross iff each has its ends on both sides of the other's line (`clearance`).
 """
 
 from __future__ import annotations
@@ -14,8 +16,12 @@ import numpy as np
 from colloc.arrays import Array, namespace
 from colloc.body import Chain
 
+Pairs = tuple[tuple[int, int], ...]
+"""Pairs of links."""
+
 SMOOTHING = 1e-3
-"""Width [rad] of the smoothed minimum; it errs to the safe side, by at most half of this."""
+"""Width [rad], or [body lengths] for links farther apart, of smoothed minima and maxima; they err to the safe side, by
+at most half of this for angles and 1.5 times this for lengths."""
 
 
 def _subtended(angle: Array, link: float, middle: float) -> Array:
@@ -46,25 +52,93 @@ def crossing_bounds(body: Chain, angles: Array) -> Array | None:
     return xp.stack(rows)
 
 
+def far_pairs(body: Chain) -> list[tuple[int, int]]:
+    """All pairs of links that are more than two apart; `crossing_bounds` has those that are two apart."""
+    return [(i, j) for i in range(body.n_link) for j in range(i + 3, body.n_link)]
+
+
+def clearance(body: Chain, angles: Array, first: int, second: int) -> Array:
+    """A smooth function that is >= 0 only where links `first` < `second` do not cross [body lengths], ``(1, n_time)``.
+
+    With m and d the mean and half the difference of the distances of one link's ends from the other's line, that link
+    lies on one side iff ``|m| - |d| >= 0``. Two segments cross iff neither lies on one side of the other: the larger of
+    the two values is the clearance. Smoothing also closes the gap through which parallel links would slip through each
+    other at one instant, when both ends pass at once.
+    """
+    xp = namespace(angles)
+    one = _side(body, angles, first, second)
+    other = _side(body, angles, second, first)
+    return 0.5 * (one + other) + 0.5 * _smooth_abs(xp, one - other)
+
+
+def _smooth_abs(xp, value: Array) -> Array:
+    """Never above the absolute value, and below it by at most 0.3 `SMOOTHING`."""
+    square = value * value
+    return square / xp.sqrt(square + SMOOTHING * SMOOTHING)
+
+
+def _side(body: Chain, angles: Array, line: int, link: int) -> Array:
+    """How far `link` stays on one side of the line through the link `line`; negative if its ends are on both sides."""
+    xp = namespace(angles)
+    step = 1 if link > line else -1
+    height, turn = 0.0, 0.0
+    # walk along the chain, in the frame of `line`, to the near end of `link`
+    for k in range(line + step, link + step, step):
+        joint = k - 1 if step > 0 else k
+        turn = turn + angles[joint : joint + 1, :]
+        rise = body.lengths[k] * xp.sin(turn)
+        near, height = height, height + rise
+    mean, spread = 0.5 * (near + height), 0.5 * (height - near)
+    return _smooth_abs(xp, mean) - xp.sqrt(spread * spread + SMOOTHING * SMOOTHING)
+
+
 def crossing_depth(body: Chain, angles: np.ndarray) -> np.ndarray:
     """How far links penetrate each other, ``(n_time,)``; 0 where no two of them cross.
 
     Plain segment intersection of all pairs that are not neighbours, independent of `crossing_bounds`: the depth is the
     smallest distance from an end of one of two crossing segments to the other segment.
     """
-    x, y = body.joints(angles)
+    ends = np.stack(body.joints(angles))
     depth = np.zeros(angles.shape[1])
     for i in range(body.n_link):
         for j in range(i + 2, body.n_link):
-            p, r = np.stack([x[i], y[i]]), np.stack([x[i + 1] - x[i], y[i + 1] - y[i]])
-            q, s = np.stack([x[j], y[j]]), np.stack([x[j + 1] - x[j], y[j + 1] - y[j]])
-            d1, d2 = _cross(r, q - p), _cross(r, q + s - p)
-            d3, d4 = _cross(s, p - q), _cross(s, p + r - q)
+            (d1, d2), (d3, d4), _ = _end_distances(ends, i, j)
             crossing = (d1 * d2 < 0) & (d3 * d4 < 0)
-            lr, ls = body.lengths[i], body.lengths[j]
-            distance = np.min([np.abs(d1) / lr, np.abs(d2) / lr, np.abs(d3) / ls, np.abs(d4) / ls], axis=0)
+            distance = np.min(np.abs([d1, d2, d3, d4]), axis=0)
             depth = np.maximum(depth, np.where(crossing, distance, 0.0))
     return depth
+
+
+def passing_depth(body: Chain, angles: np.ndarray) -> float:
+    """How far links pass through each other between successive instants of a path [body lengths]; 0 if none does.
+
+    A link cannot cross another without one of its ends passing through it. That shows even where two samples hold no
+    crossing (parallel links that slip through each other): an end that is beside the other link changes its side. The
+    value is the smaller of the end's distances before and after.
+    """
+    ends = np.stack(body.joints(angles))
+    deepest = 0.0
+    for i in range(body.n_link):
+        for j in range(i + 2, body.n_link):
+            first, second, beside = _end_distances(ends, i, j)
+            for distance, along in zip((*first, *second), beside, strict=True):
+                through = (distance[1:] * distance[:-1] < 0) & along[1:] & along[:-1]
+                passed = np.minimum(np.abs(distance[1:]), np.abs(distance[:-1]))[through]
+                deepest = max(deepest, float(passed.max(initial=0.0)))
+    return deepest
+
+
+def _end_distances(ends: np.ndarray, i: int, j: int) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    """Signed distances of the ends of link j from the line of link i, the other way round, and which ends lie beside."""
+    result: list[list[np.ndarray]] = []
+    beside = []
+    for line, link in ((i, j), (j, i)):
+        along = ends[:, line + 1] - ends[:, line]
+        length = np.hypot(*along)
+        seen = [ends[:, link] - ends[:, line], ends[:, link + 1] - ends[:, line]]
+        result.append([_cross(along, p) / length for p in seen])
+        beside += [np.abs((along * p).sum(axis=0) / length - 0.5 * length) < 0.5 * length for p in seen]
+    return result[0], result[1], beside
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -14,13 +14,16 @@ from dataclasses import replace
 import numpy as np
 
 from colloc.closure import closed_parameters
+from colloc.contact import Pairs
 from colloc.diagnosis import explanation, redundant_equations
+from colloc.far_contact import crossing_pairs, last_free
 from colloc.gait_fields import AnyGait
+from colloc.mesh_error import mesh_error
 from colloc.nlp import NlpResult, Solver
 from colloc.path_start import nearest_parameters, transcribed
 from colloc.problem import Problem
 from colloc.program import GaitProgram
-from colloc.refinement import refined_edges
+from colloc.refinement import MOST_POINTS, planned_mesh
 from colloc.solution import Level, Solution
 from colloc.warm_start import feasible_point
 
@@ -64,6 +67,7 @@ class _Run:
         self.radius = FIRST_RADIUS
         self.factor, self.next_radius = (PATH_FACTOR, PATH_RADIUS) if problem.has_path else (FIRST_FACTOR, NEXT_RADIUS)
         self.first_delta = problem.delta_start
+        self.far: Pairs = ()
         if problem.gait.symmetry == "none" and not problem.has_path:
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
 
@@ -85,7 +89,7 @@ class _Run:
 
     def attempt(self, delta: float) -> NlpResult:
         """Solve at delta from the last converged gait; take the result over if it is optimal."""
-        result = self._solve(delta)
+        result = self._solve_apart(delta)
         if delta == self.problem.delta:
             # move the checks between nodes to the new gait's worst instants until none is exceeded
             for _ in range(_EXCHANGES):
@@ -104,10 +108,24 @@ class _Run:
             self.radius = self.next_radius
         return result
 
-    def _solve(self, delta: float) -> NlpResult:
-        """One solve; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
+    def _solve_apart(self, delta: float) -> NlpResult:
+        """Solve, constraining pairs of links more than two apart as they turn out to cross each other."""
+        result = self._solve(delta)
+        while np.isfinite(result.x).all():
+            found = result.x[self.solver.transcription.layout.parameters[:, 0]]
+            new = tuple(p for p in crossing_pairs(self.solver.transcription, found) if p not in self.far)
+            if not new:
+                break
+            self.far += new
+            self.remesh(self.solver.transcription.mesh.edges, self.radius)
+            again = self._solve(delta, last_free(self.solver.transcription, self.parameters, found))
+            result = again.accumulated(result)
+        return result
+
+    def _solve(self, delta: float, start: np.ndarray | None = None) -> NlpResult:
+        """One solve, by default from the last converged gait; repeated from where it stopped if no smaller step can follow."""
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
-        x = feasible_point(transcription, self.parameters, delta)
+        x = feasible_point(transcription, self.parameters if start is None else start, delta)
         result = self.solver.solve(x, delta, multipliers, radius)
         stuck = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
         for _ in range(_RETRIES if stuck else 0):
@@ -119,13 +137,13 @@ class _Run:
             result = self.solver.solve(x, delta, None, radius).accumulated(result)
         return result
 
-    def remesh(self, edges: np.ndarray) -> None:
-        """Go on with another mesh; multipliers do not carry over."""
-        gait = self.gait
-        self.solver = Solver(transcribed(self.problem, gait, edges))
+    def remesh(self, edges: np.ndarray, radius: float = REMESH_RADIUS, scheme: str | None = None) -> None:
+        """Go on with another mesh or scheme, or more pairs of links kept apart; multipliers do not carry over."""
+        scheme, gait = scheme or self.solver.transcription.mesh.scheme.name, self.gait
+        self.solver = Solver(transcribed(self.problem.with_(scheme=scheme), gait, edges, self.far))
         self.parameters = nearest_parameters(self.solver.transcription, gait)
         self.multipliers = None
-        self.radius = REMESH_RADIUS
+        self.radius = radius
 
     def _record(self, delta: float, result: NlpResult) -> None:
         transcription = self.solver.transcription
@@ -147,6 +165,7 @@ class _Run:
             result.iterations,
             result.seconds,
             result.evaluation_seconds,
+            transcription.mesh.scheme.name,
         )
         self.levels.append(level)
         if self.on_level is not None:
@@ -180,9 +199,10 @@ def continue_delta(
     run = _Run(problem, solver or Solver(transcribed(problem)), on_level)
     run.take_over(before)
     result = _descend(run)
+    shortfall = ""
     if result.optimal and problem.mesh_tolerance > 0:
-        result = _refine(run, result)
-    solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin)
+        result, shortfall = _refine(run, result)
+    solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin, message=shortfall)
     if not result.optimal:
         delta = run.levels[-1].delta
         solution.message = explanation(run.solver.transcription, result, delta)
@@ -222,17 +242,28 @@ def _descend(run: _Run) -> NlpResult:
         delta = reached * factor if reached * factor > 1.2 * target else target
 
 
-def _refine(run: _Run, result: NlpResult) -> NlpResult:
-    """Solve again on refined meshes until the gait found needs no further refinement."""
-    problem = run.problem
+def _refine(run: _Run, result: NlpResult) -> tuple[NlpResult, str]:
+    """Solve again on planned meshes until the gait found needs no other; the last result, and what was not reached."""
+    problem, kept = run.problem, np.empty(0)
     for _ in range(_REFINEMENTS):
         gait = run.gait
         mesh = run.solver.transcription.phase_mesh(gait)
-        edges = refined_edges(problem, mesh, gait, problem.delta, problem.mesh_tolerance)
-        if edges is None:
-            break
-        run.remesh(edges)
+        plan = planned_mesh(problem, mesh, gait, problem.delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
+        if plan is None:
+            return result, ""
+        kept = np.concatenate([kept, plan.kept])
+        run.remesh(plan.edges, scheme=plan.scheme)
         result = run.attempt(problem.delta)
         if not result.optimal:
+            return result, ""
+        if not plan.reached:
             break
-    return result
+    gait = run.gait
+    mesh = run.solver.transcription.phase_mesh(gait)
+    error = mesh_error(problem, mesh, gait, problem.delta * gait.delta_unit, problem.mesh_tolerance)
+    if error.estimate <= problem.mesh_tolerance:
+        return result, ""
+    return result, (
+        f"refinement ended after {_REFINEMENTS} meshes or {MOST_POINTS} points at an estimated efficiency error of "
+        f"{error.estimate:.1e}, above mesh_tolerance {problem.mesh_tolerance:.0e}."
+    )

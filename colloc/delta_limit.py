@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.refinement import interval_errors
+from colloc.mesh_error import mesh_error
 from colloc.solution import Level, Solution
 
 RESOLVED = 1e-4
@@ -52,14 +52,14 @@ def efficiency_at_zero_delta(solution: Solution) -> Limit:
 
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Share of every mesh interval in the relative efficiency error of the last level, magnitudes, ``(n_interval,)``."""
-    return np.abs(interval_errors(solution.problem, solution.mesh, solution.gait, solution.last.delta))
+    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.last.delta).efficiency)
 
 
 def resolution_warning(solution: Solution) -> str | None:
     """One sentence if the last level's mesh does not resolve its delta, None if it does.
 
     Judged by the efficiency error of collocating the gait on its mesh, against a finer quadrature with velocities solved
-    anew (see `colloc.refinement.interval_errors`): stick phases that fall between the nodes show there.
+    anew (see `colloc.mesh_error`): stick phases that fall between the nodes show there.
     """
     mesh, level = solution.mesh, solution.last
     errors = mesh_errors(solution)

@@ -14,12 +14,15 @@ is a step function of the tail velocity as delta goes to 0 and does not converge
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
+import numpy as np
 
 from colloc.balance import instant, net_force, total_power
 from colloc.blocks import LocalFunction, local_function, total_function
 from colloc.body import Chain
-from colloc.contact import crossing_bounds
+from colloc.contact import clearance, crossing_bounds
 from colloc.friction import Friction, LinkForce, link_moments
 from colloc.problem import LIFTED, MAP
 
@@ -108,15 +111,20 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     return total_function("point", local, solved, delta, out, jacobian, hessian, weight)
 
 
-def shape_checks(body: Chain) -> list[tuple[str, ca.Function]]:
-    """Named scalar functions of the joint angles that admissibility bounds: each joint angle, each pair of links."""
+def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[tuple[str, ca.Function]]:
+    """Named scalar functions of the joint angles that admissibility bounds.
+
+    Each joint angle, to be kept within its limits; then functions that must not be positive: for all links two apart, and
+    for the pairs `far` of links farther apart.
+    """
     angles = ca.SX.sym("q", body.n_joint)
     checks = [(f"joint {j + 1}", angles[j]) for j in range(body.n_joint)]
     bounds = crossing_bounds(body, angles)
     if bounds is not None:
         for i in range(body.n_link - 2):
             for side, name in ((0, "left"), (1, "right")):
-                checks.append((f"links {i + 1} and {i + 3} ({name})", bounds[2 * i + side]))
+                checks.append((f"links {i + 1} and {i + 3} ({name})", bounds[2 * i + side] - np.pi))
+    checks += [(f"links {i + 1} and {j + 1}", -clearance(body, angles, i, j)) for i, j in far]
     return [(name, ca.Function("check", [angles], [expression])) for name, expression in checks]
 
 

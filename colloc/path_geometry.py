@@ -10,6 +10,7 @@ from scipy import sparse
 
 from colloc.blocks import Block, LocalFunction
 from colloc.constraint_rows import Group, equalities, selector, stacked
+from colloc.contact import Pairs
 from colloc.kernels import shape_checks
 from colloc.mesh import Mesh
 from colloc.path_class import FreePath, Polygon
@@ -80,7 +81,7 @@ def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
     n_cell = geometry.start.size
     for name, check in geometry.checks:
         joint = name.startswith("joint")
-        limit = problem.joint_limit if joint else np.pi
+        limit = problem.joint_limit if joint else 0.0
         function = placed_check(check, geometry.piece)
         geometry.blocks[name] = (function, geometry.shape, geometry.given(np.full(n_cell, 0.5)))
         lower, upper = np.full(n_cell, -limit if joint else -np.inf), np.full(n_cell, limit)
@@ -88,7 +89,7 @@ def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
         geometry.groups.append(Group(name, lower, upper, rows, {name: sparse.eye(n_cell, format="csr")}))
 
 
-def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath) -> PathGeometry:
+def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath, far: Pairs) -> PathGeometry:
     """Arcs that join, close, keep the bound on curvature and admissible, one a mesh interval.
 
     Parameters
@@ -110,7 +111,7 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     cells = np.arange(mesh.n)
     shape = np.concatenate([shapes[:, :-1], tangents[:, :-1], tangents[:, 1:], np.repeat(length, mesh.n, axis=1)])
     geometry = PathGeometry(
-        piece, shape, cells, np.zeros(mesh.n), np.ones(mesh.n), mesh.h, [], {}, shape_checks(problem.body),
+        piece, shape, cells, np.zeros(mesh.n), np.ones(mesh.n), mesh.h, [], {}, shape_checks(problem.body, far),
         np.full(n, -np.inf), np.full(n, np.inf),
     )  # fmt: skip
     geometry.lower[length], geometry.upper[length] = 2 * np.pi * problem.smallest_shape_speed, _LONGEST
@@ -161,7 +162,7 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     return geometry
 
 
-def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: Corners) -> PathGeometry:
+def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: Corners, far: Pairs) -> PathGeometry:
     """Straight pieces that close and keep admissible; the mesh, in phases of `near`, has an edge at every vertex of it."""
     gait: Polygon = problem.gait
     n_joint, symmetry = problem.body.n_joint, gait.symmetry
@@ -173,7 +174,8 @@ def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, 
     width = mesh.h / span
     geometry = PathGeometry(
         side(n_joint), np.concatenate([vertices[:, on], vertices[:, on + 1]]), on, (mesh.edges[:-1] - phases[on]) / span,
-        width, 1.0 / span, [_ends("closure", end_conditions(symmetry, n_joint), vertices, n)], {}, shape_checks(problem.body),
+        width, 1.0 / span, [_ends("closure", end_conditions(symmetry, n_joint), vertices, n)], {},
+        shape_checks(problem.body, far),
         np.full(n, -np.inf), np.full(n, np.inf),
     )  # fmt: skip
     across = tangent_conditions(BILATERAL, n_joint)[0][: n_joint // 2]

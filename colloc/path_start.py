@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.blocks import oracles
+from colloc.contact import Pairs
 from colloc.errors import NotConvergedError
 from colloc.gait_fields import AnyGait
 from colloc.nlp import Solver
@@ -21,11 +22,14 @@ _ROUNDS = 4
 _FIT_OPTIONS: dict[str, object] = {"max_iter": 200, "mu_init": 1e-2, "bound_push": 1e-2, "bound_frac": 1e-2}
 
 
-def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None) -> GaitProgram:
-    """The nonlinear program of a problem of any class near a gait, by default its guess."""
+def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:
+    """The nonlinear program of a problem of any class near a gait, by default its guess.
+
+    Self-contact is constrained between links two apart, and between the pairs `far` (see `colloc.far_contact`).
+    """
     if problem.has_path:
-        return transcribe_path(problem, problem.guess if gait is None else gait, edges)
-    return transcribe(problem, edges)
+        return transcribe_path(problem, problem.guess if gait is None else gait, edges, far)
+    return transcribe(problem, edges, far)
 
 
 def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:

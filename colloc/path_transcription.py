@@ -17,6 +17,7 @@ from scipy import sparse
 
 from colloc.blocks import Assembly, Block
 from colloc.constraint_rows import Group, equalities, quadrature_group, rotation_groups, selector
+from colloc.contact import Pairs
 from colloc.kernels import minus_efficiency
 from colloc.layout import Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
@@ -98,10 +99,12 @@ class PathTranscription:
         return excess
 
 
-def _geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath | Corners) -> PathGeometry:
+def _geometry(
+    problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath | Corners, far: Pairs
+) -> PathGeometry:
     if isinstance(near, ArcPath):
-        return arc_geometry(problem, mesh, parameters, n, near)
-    return side_geometry(problem, mesh, parameters, n, near)
+        return arc_geometry(problem, mesh, parameters, n, near, far)
+    return side_geometry(problem, mesh, parameters, n, near, far)
 
 
 def path_through(problem: Problem, gait: Gait, edges: np.ndarray | None) -> tuple[ArcPath | Corners, Mesh]:
@@ -129,7 +132,7 @@ def _with_vertices(edges: np.ndarray, phases: np.ndarray) -> np.ndarray:
     return np.concatenate([*parts, phases[-1:]])
 
 
-def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = None) -> PathTranscription:
+def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathTranscription:
     """The nonlinear program of a problem whose class bounds the path.
 
     Parameters
@@ -142,7 +145,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     """
     near, mesh = path_through(problem, gait, edges)
     layout = problem_layout(problem, mesh)
-    geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near)
+    geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near, far)
     point = path_point(problem.body, problem.friction, geometry.piece)
     interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
     tau = np.tile(mesh.scheme.c, mesh.n)
@@ -177,7 +180,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     return _assembled(problem, mesh, layout, geometry, groups, objective, {"point": balanced}, velocity)
 
 
-def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None) -> PathTranscription:
+def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathTranscription:
     """The nonlinear program of the member of a path class nearest to a gait, without friction, x or W.
 
     Nearest means in the sum of the squared distances of edges, or corners, to those of a path laid through the gait.
@@ -186,7 +189,7 @@ def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None
     size = problem_layout(problem, mesh).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
     layout = Layout(own, none, none, none, none, none, none, none, size)
-    geometry = _geometry(problem, mesh, own[:, 0], size, near)
+    geometry = _geometry(problem, mesh, own[:, 0], size, near, far)
     shapes = problem.gait.split(own[:, 0], problem.body.n_joint)
     shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")
     target = problem.gait.parameters(near)[shapes]

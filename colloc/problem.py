@@ -161,6 +161,12 @@ class Problem:
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
             raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
 
+        if self.body.n_joint == 1 and self.friction.mu_f == self.friction.mu_b:
+            raise ProblemError(
+                "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
+                "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
+            )
+
     def _check_guess(self) -> None:
         if self.guess.n_joint != self.body.n_joint:
             raise ProblemError(

@@ -8,8 +8,8 @@ from colloc.balance import instant
 from colloc.chart import BLUE, COLOURS, ORANGE, VERMILION, Chart
 from colloc.contact import crossing_depth
 from colloc.markup import Markup, element
+from colloc.mesh_error import mesh_error
 from colloc.problem import Problem
-from colloc.refinement import interval_errors
 from colloc.solution import Solution
 
 _PI_TICKS = [(-np.pi, "−π"), (-np.pi / 2, "−π/2"), (0.0, "0"), (np.pi / 2, "π/2"), (np.pi, "π")]
@@ -122,7 +122,7 @@ def convergence_chart(solution: Solution) -> Markup:
 def mesh_chart(solution: Solution) -> tuple[Markup, float]:
     """Estimated error of each mesh interval against phase, and the sum of their magnitudes."""
     problem, mesh = solution.problem, solution.mesh
-    errors = np.maximum(np.abs(interval_errors(problem, mesh, solution.gait, solution.last.delta)), 1e-12)
+    errors = np.maximum(np.abs(mesh_error(problem, mesh, solution.gait, solution.delta_per_period).efficiency), 1e-12)
     tolerance = problem.mesh_tolerance
     high = 10.0 ** np.ceil(np.log10(max(float(errors.max()), tolerance) * 1.01))
     low = max(10.0 ** np.floor(np.log10(float(errors.min()))), high * 1e-10)

@@ -12,9 +12,10 @@ import numpy as np
 from colloc.balance import Instant, instant, total_power
 from colloc.fixed_point import solve_balance
 from colloc.gait_fields import AnyGait
-from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
+from colloc.layout import RADIANS, Layout, problem_layout
 from colloc.mesh import Mesh
 from colloc.problem import Problem
+from colloc.schemes import scheme
 from colloc.solution_card import solution_card
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
@@ -44,6 +45,8 @@ class Level:
         Whether the first-order conditions hold.
     iterations : int
     seconds, evaluation_seconds : float
+    scheme : str
+        Collocation scheme, which refinement may have raised in order; "" for the problem's.
     """
 
     delta: float
@@ -62,6 +65,7 @@ class Level:
     iterations: int
     seconds: float
     evaluation_seconds: float
+    scheme: str = ""
 
 
 @dataclass(frozen=True)
@@ -200,7 +204,7 @@ class Solution:
     @property
     def mesh(self) -> Mesh:
         """The mesh of the last level."""
-        return problem_mesh(self.problem, self.last.edges)
+        return Mesh(scheme(self.last.scheme or self.problem.scheme), self.last.edges)
 
     @property
     def layout(self) -> Layout:

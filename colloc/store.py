@@ -155,7 +155,8 @@ def _read(file: h5py.File) -> Solution:
     for name in sorted(file["levels"]) if "levels" in file else []:
         group = file["levels"][name]
         arrays = {key: group[key][()] for key in _LEVEL_ARRAYS}
-        rest = {f.name: group.attrs[f.name] for f in dataclasses.fields(Level) if f.name not in _LEVEL_ARRAYS}
+        # files of format version 1 may lack later fields, which have defaults
+        rest = {f.name: group.attrs[f.name] for f in dataclasses.fields(Level) if f.name in group.attrs}
         level = Level(**arrays, **{key: _plain(value) for key, value in rest.items()})
         levels.append(level)
     certificate = None

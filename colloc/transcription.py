@@ -20,6 +20,7 @@ from scipy import sparse
 
 from colloc.blocks import Assembly, Block
 from colloc.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector, stacked
+from colloc.contact import Pairs
 from colloc.gait import Fourier
 from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function, shape_checks
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
@@ -135,11 +136,15 @@ def _check_parameters(problem: Problem, times: np.ndarray) -> np.ndarray:
     return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
 
 
-def transcribe(problem: Problem, edges: np.ndarray | None = None) -> Transcription:
-    """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges."""
+def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = ()) -> Transcription:
+    """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges.
+
+    Self-contact is constrained between links two apart, and between the pairs `far` of links farther apart: see
+    `colloc.far_contact`.
+    """
     mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)
-    checks = shape_checks(problem.body)
+    checks = shape_checks(problem.body, far)
     point = point_function(problem.formulation, problem.body, problem.friction)
     n_joint = problem.body.n_joint
     n_parameter = layout.parameters.shape[0]
@@ -254,7 +259,7 @@ def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Gr
 
 def _check_group(name: str, problem: Problem, n_cell: int, n: int) -> Group:
     is_joint = name.startswith("joint")
-    limit = problem.joint_limit if is_joint else np.pi
+    limit = problem.joint_limit if is_joint else 0.0
     lower = np.full(n_cell, -limit if is_joint else -np.inf)
     linear = sparse.csr_matrix((n_cell, n))
     return Group(name, lower, np.full(n_cell, limit), linear, {name: sparse.eye(n_cell, format="csr")})

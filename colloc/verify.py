@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.balance import net_force
-from colloc.contact import crossing_depth
+from colloc.contact import crossing_depth, passing_depth
 from colloc.gait_fields import AnyGait
+from colloc.mesh_error import mesh_error
 from colloc.path_gait import ArcPath, Corners
 from colloc.path_replay import Path, Replay, replay
 from colloc.solution import Certificate, Check, Solution
@@ -62,7 +63,13 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     )
     # the influence of delta is linear to leading order: the rest is a ninth of the last step
     at_zero = at_tenth.efficiency + (at_tenth.efficiency - fine.efficiency) / 9
-    checks = (*_optimality(solution), *_motion(solution, fine, path), *_class(solution), *_delta(solution, fine, at_zero))
+    checks = (
+        *_optimality(solution),
+        *_motion(solution, fine, path),
+        *_class(solution),
+        *_mesh(solution),
+        *_delta(solution, fine, at_zero),
+    )
     return Certificate(checks, fine.efficiency, fine.distance, fine.work, fine.error * fine.efficiency, at_zero, fine.instants)
 
 
@@ -80,9 +87,9 @@ def _optimality(solution: Solution) -> list[Check]:
 def _motion(solution: Solution, fine: Replay, path: Path) -> list[Check]:
     problem, level = solution.problem, solution.last
     ends, _ = path(np.array([0.0, 1.0]))
-    angles, _ = path(np.arange(_FINE_PHASES) / _FINE_PHASES)
+    angles, _ = path(np.linspace(0.0, 1.0, _FINE_PHASES + 1))
     beyond = max(float(np.abs(angles).max()) - problem.joint_limit, 0.0)
-    depth = float(crossing_depth(problem.body, angles).max())
+    depth = max(float(crossing_depth(problem.body, angles).max()), passing_depth(problem.body, angles))
     return [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
         Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),
@@ -106,6 +113,16 @@ def _class(solution: Solution) -> list[Check]:
     curvature = float(turn.max()) * _FINE_PHASES / gait.length
     excess = max(curvature / solution.problem.gait.curvature - 1, 0.0)
     return [Check("curvature", excess, CURVATURE, "of the path between nodes, relative excess over its bound")]
+
+
+def _mesh(solution: Solution) -> list[Check]:
+    """The error estimate from the scheme's own defect; it has to pass only if the problem requests an accuracy."""
+    problem = solution.problem
+    tolerance = problem.mesh_tolerance
+    if tolerance == 0:
+        return []
+    error = mesh_error(problem, solution.mesh, solution.gait, solution.delta_per_period, tolerance)
+    return [Check("mesh error", error.estimate, tolerance, "of the efficiency, relative, from defects between nodes")]
 
 
 def _delta(solution: Solution, fine: Replay, at_zero: float) -> list[Check]:

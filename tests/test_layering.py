@@ -49,6 +49,10 @@ LEVELS = {
         "bump_callback",
         "bump_transcription",
         "sampling",
+        "far_contact",
+        "fine_motion",
+        "kinks",
+        "mesh_error",
     ],
     4: [
         "nlp",

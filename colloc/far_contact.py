@@ -1,0 +1,33 @@
+"""Self-contact of links that are more than two apart: which pairs an optimisation has to constrain.
+
+A chain of n links has (n - 2)(n - 3)/2 such pairs and few of them ever come near each other. So a problem is solved
+without them, the gait found is checked between the nodes against every pair, the pairs that cross are constrained from
+then on, and the problem is solved again (a cutting-plane method). It ends after at most as many rounds as there are pairs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.contact import Pairs, clearance, far_pairs
+from colloc.program import GaitProgram
+
+PHASES = 1000
+"""Phases of the solved part of the period at which all pairs are checked; the certificate checks 20000 a period."""
+_FRACTIONS = np.linspace(1.0, 0.0, 21)
+
+
+def crossing_pairs(program: GaitProgram, parameters: np.ndarray, tolerance: float = 1e-8) -> Pairs:
+    """Pairs of links more than two apart that cross, or come nearer than `tolerance` [body lengths] to it, in a gait."""
+    body, t = program.problem.body, np.linspace(0.0, program.problem.gait.fraction, PHASES)
+    angles = program.member(parameters).angles(t)
+    return tuple((i, j) for i, j in far_pairs(body) if clearance(body, angles, i, j).min() < -tolerance)
+
+
+def last_free(program: GaitProgram, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
+    """Gait parameters on the way from those of a free gait to those of one with crossing links, as far as links stay apart."""
+    for fraction in _FRACTIONS:
+        between = free + fraction * (crossing - free)
+        if not crossing_pairs(program, between):
+            return between
+    return free

@@ -1,0 +1,20 @@
+"""The isotropic four-link crawler, one harmonic, bilateral: angle_j(-t) = -angle_(4-j)(t).
+
+    angle 1 =  a0 + a1 cos(2 pi t) + b1 sin(2 pi t)
+    angle 2 =                        b2 sin(2 pi t)
+    angle 3 = -a0 - a1 cos(2 pi t) + b1 sin(2 pi t)
+
+Maximise d/W. Links 1 and 4 are kept apart once a gait is found in which they cross (`colloc.far_contact`).
+"""
+
+from colloc import Chain, Fourier, Friction, Harmonic, Problem
+
+PROBLEM = Problem(
+    name="four_link",
+    body=Chain((1 / 4,) * 4),
+    friction=Friction(mu_t=1, mu_f=1, mu_b=1),
+    gait=Harmonic(harmonics=1, symmetry="bilateral"),
+    guess=Fourier([0.0, 0.0, 0.0], [[1.2], [0.0], [-1.2]], [[0.6], [0.6], [0.6]]),
+    delta=1e-4,
+    intervals=24,
+)
