@@ -54,6 +54,7 @@ class _Run:
     def __init__(self, problem: Problem, solver: Solver, on_level: Report | None) -> None:
         self.problem, self.solver, self.on_level = problem, solver, on_level
         self.levels: list[Level] = []
+        self.path = []
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
@@ -82,13 +83,20 @@ class _Run:
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
+            self.path.append((delta, self.parameters))
             self.radius = NEXT_RADIUS
         return result
+
+    def _predicted(self, delta: float) -> np.ndarray:
+        if len(self.path) < 2:
+            return self.parameters
+        (d0, p0), (d1, p1) = self.path[-2:]
+        return p1 + (p1 - p0) * ((delta - d1) / (d1 - d0)) if delta < d1 < d0 else p1
 
     def _solve(self, delta: float) -> NlpResult:
         """One solve; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
-        x = feasible_point(transcription, self.parameters, delta)
+        x = feasible_point(transcription, self._predicted(delta), delta)
         result = self.solver.solve(x, delta, multipliers, radius)
         stuck = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
         for _ in range(_RETRIES if stuck else 0):

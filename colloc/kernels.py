@@ -10,9 +10,12 @@ is a step function of the tail velocity as delta goes to 0 and does not converge
 ``map``
     The tail velocity is tied to the one that balances the body, z - Z(angles, rates) = 0, with Z from the NumPy solver
     and its derivatives from the implicit function theorem. The velocity map is mild where the balance is not.
+    ("condensed" takes the same point, and then eliminates everything but the gait: see `colloc.condensed`.)
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import casadi as ca
 
@@ -21,18 +24,19 @@ from colloc.blocks import LocalFunction, local_function, total_function
 from colloc.body import Chain
 from colloc.contact import crossing_bounds
 from colloc.friction import Friction, LinkForce, link_moments
-from colloc.problem import LIFTED, MAP
+from colloc.problem import LIFTED
 
 N_RATE = 2
 """The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
 
 
+@lru_cache(maxsize=32)
 def point_function(formulation: str, body: Chain, friction: Friction) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
 
     Locals: theta, joint angles, joint rates, z, and for "lifted" tangential forces, normal forces, couples of the links.
     """
-    return {LIFTED: _lifted_point, MAP: _map_point}[formulation](body, friction)
+    return _lifted_point(body, friction) if formulation == LIFTED else _map_point(body, friction)
 
 
 def _symbols(body: Chain) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:

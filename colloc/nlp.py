@@ -11,8 +11,9 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from colloc.blocks import Oracles, oracles
+from colloc.condensed_program import CondensedProgram
 from colloc.layout import RADIANS
-from colloc.problem import LIFTED
+from colloc.problem import CONDENSED, LIFTED
 from colloc.transcription import Transcription, worst_instants
 
 IPOPT_OPTIONS: dict[str, object] = {
@@ -106,8 +107,10 @@ class Solver:
         chosen = {**IPOPT_OPTIONS, **(LIFTED_OPTIONS if transcription.problem.formulation == LIFTED else {}), **(options or {})}
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
-        settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True, **self.oracles.options}
-        self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
+        settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
+        self._reduced = CondensedProgram(transcription) if transcription.problem.formulation == CONDENSED else None
+        program = self._reduced or self.oracles
+        self._solver = ca.nlpsol("colloc", "ipopt", program.nlp, {**settings, **program.options})
 
     def solve(
         self,
@@ -142,9 +145,12 @@ class Solver:
     ) -> NlpResult:
         t = self.transcription
         own = t.layout.parameters[:, 0]
-        parameters = self.oracles.parameter_vector(delta / RADIANS, t.block_parameters(x[own]))
+        worst = t.block_parameters(x[own])
+        parameters = self.oracles.parameter_vector(delta / RADIANS, worst)
         lower, upper = t.lower.copy(), t.upper.copy()
         lower[own], upper[own] = np.maximum(lower[own], x[own] - radius), np.minimum(upper[own], x[own] + radius)
+        if self._reduced is not None:
+            return self._solve_condensed(x, delta / RADIANS, multipliers, parameters, worst, lower, upper)
         bounds = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
         lam_x, lam_g = multipliers or (np.zeros_like(x), self._estimated_multipliers(x, parameters))
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
@@ -153,6 +159,33 @@ class Solver:
         seconds = time.perf_counter() - start
         stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
+        return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
+
+    def _solve_condensed(
+        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None, parameters: np.ndarray, worst: list, lower: np.ndarray, upper: np.ndarray
+    ) -> NlpResult:
+        """Solve with all equations eliminated; what comes back is measured as a point of the full program."""
+        reduced, own = self._reduced, self.transcription.layout.parameters[:, 0]
+        assert reduced is not None
+        at = reduced.condensed
+        free = np.full(at.n - own.size, np.inf)
+        bounds = {"lbx": np.append(lower[own], -free), "ubx": np.append(upper[own], free), "lbg": reduced.lower, "ubg": reduced.upper}
+        v = at.variables(x)
+        lam_x, lam_g = np.zeros(v.size), reduced.estimated_multipliers(v, delta)
+        if multipliers is not None:
+            lam_x[: own.size], lam_g = multipliers[0][own], multipliers[1][reduced.kept]
+        duals = {"lam_x0": lam_x, "lam_g0": lam_g}
+        start = time.perf_counter()
+        solution = self._solver(x0=v, p=reduced.parameter_vector(delta, worst), **bounds, **duals)
+        seconds = time.perf_counter() - start
+        stats = self._solver.stats()
+        v = np.array(solution["x"]).ravel()
+        x = at.lifted(v, delta)
+        lam_x = np.zeros(x.size)
+        lam_x[own] = np.array(solution["lam_x"]).ravel()[: own.size]
+        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel()
+        jacobian = _scipy(self.oracles.options["jac_g"](x, parameters)[1])
+        lam_g = reduced.multipliers(np.array(solution["lam_g"]).ravel(), gradient, jacobian)
         return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
 
     def _estimated_multipliers(self, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:

@@ -16,7 +16,8 @@ from colloc.friction import Friction
 from colloc.gait import Fourier, Harmonic
 from colloc.schemes import scheme
 
-MAP, LIFTED = "map", "lifted"
+CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
+FORMULATIONS = (CONDENSED, MAP, LIFTED)
 _CHECKED_PHASES = 2000
 _SLACK = 1e-9
 
@@ -66,8 +67,8 @@ class Problem:
         Mesh intervals on the part of the period that is solved.
     scheme : str
         Collocation scheme, see `colloc.schemes.scheme`.
-    formulation : {"map", "lifted"}
-        How the balance becomes constraints, see `colloc.kernels`.
+    formulation : {"condensed", "map", "lifted"}
+        How the balance becomes constraints, see `colloc.kernels`; "condensed" eliminates them, see `colloc.condensed`.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """
@@ -83,7 +84,7 @@ class Problem:
     smallest_shape_speed: float = 0.1
     intervals: int = 30
     scheme: str = "gauss-3"
-    formulation: str = MAP
+    formulation: str = CONDENSED
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
@@ -114,8 +115,8 @@ class Problem:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
-        if self.formulation not in (MAP, LIFTED):
-            raise ProblemError(f"formulation must be {MAP!r} or {LIFTED!r}, not {self.formulation!r}.")
+        if self.formulation not in FORMULATIONS:
+            raise ProblemError(f"formulation must be one of {', '.join(FORMULATIONS)}, not {self.formulation!r}.")
         collocation = scheme(self.scheme)
         if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")

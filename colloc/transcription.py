@@ -23,7 +23,7 @@ from colloc.gait import Fourier
 from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function, shape_checks
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
-from colloc.problem import LIFTED, MAP, Problem
+from colloc.problem import LIFTED, Problem
 from colloc.velocity_callback import VelocityMap
 
 _SAMPLES_PER_CELL = 16
@@ -194,7 +194,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None) -> Transcripti
                     gather,
                     _stacked(groups, name, function.n_out * gather.shape[1]),
                     parameters,
-                    velocity_map if name == "point" and problem.formulation == MAP else None,
+                    velocity_map if name == "point" and problem.formulation != LIFTED else None,
                 )
                 for name, (function, gather, parameters) in blocks.items()
             ),

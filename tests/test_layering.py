@@ -24,6 +24,8 @@ LEVELS = {
         "sampling",
     ],
     4: [
+        "condensed",
+        "condensed_program",
         "nlp",
         "solution",
         "problem_file",
@@ -130,6 +132,8 @@ def test_the_numpy_side_never_loads_casadi():
         "velocity_callback",
         "transcription",
         "nlp",
+        "condensed",
+        "condensed_program",
         "bump_callback",
         "bump_transcription",
     }
