@@ -80,12 +80,15 @@ class Condensed:
         self._hessian = self._function.hessian.map(n)
         self._last: _State | None = None
         self._anchor: _State | None = None
+        self._start: np.ndarray | None = None
         self.solves = 0
 
     def variables(self, x: np.ndarray) -> np.ndarray:
-        """v of a vector x of all variables of the transcription."""
+        """v of a vector x of all variables of the transcription, whose velocities become the next solve's start."""
         layout = self.transcription.layout
         own = x[layout.parameters[:, 0]]
+        self._anchor = None
+        self._start = x[layout.z]
         return own if self._centred else np.append(own, x[layout.theta[0, 0]])
 
     def _orientation(self, omega: np.ndarray) -> np.ndarray:
@@ -106,7 +109,7 @@ class Condensed:
         y = self._shape @ p
         n_joint = self._body.n_joint
         angles, rates = y[:, :n_joint].T, y[:, n_joint:].T
-        start = None
+        start = self._start
         if self._anchor is not None and self._anchor.slopes is not None:
             near = self._anchor
             start = near.velocity + (near.slopes @ (p - near.v[: self._n_parameter])).T

@@ -17,7 +17,7 @@ from colloc.closure import closed_parameters
 from colloc.diagnosis import explanation, redundant_equations
 from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
-from colloc.problem import Problem
+from colloc.problem import CONDENSED, Problem
 from colloc.refinement import refined_edges
 from colloc.solution import Level, Solution
 from colloc.transcription import transcribe
@@ -30,10 +30,11 @@ expected to move. A region that turns out too small is moved, so it costs steps,
 TRIVIAL, TRIVIAL_EFFICIENCY = "trivial gait", 1e-4
 """Status of a level whose gait goes nowhere: efficiency times the smallest friction coefficient (at most 1) below this."""
 _SMALLEST_STEP = 0.8
-_RETRIES = 2
-"""A solve that has not converged after a few dozen iterations follows a kink of stick-slip in tiny steps. Hundreds more
-rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does. Between two
-levels a smaller step in delta is better still, so only solves on refined meshes are retried."""
+NEXT_ITERATIONS = 20
+"""Iterations a condensed level may take that starts from a converged one. Near the optimum 4 to 12 do; a solve that needs
+more follows a kink of stick-slip in tiny steps, and a smaller step in delta is cheaper than its end."""
+_BACK_UP = 4.0
+"""A refined mesh has kinks of its own. Where it does not converge at once, delta is raised by this factor and lowered again."""
 _FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
 """After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
 direction of sliding at a node, mu_b and mu_f give the collocated efficiency a kink, and an optimum may sit right on it:
@@ -54,7 +55,7 @@ class _Run:
     def __init__(self, problem: Problem, solver: Solver, on_level: Report | None) -> None:
         self.problem, self.solver, self.on_level = problem, solver, on_level
         self.levels: list[Level] = []
-        self.path = []
+        self.reached: list[tuple[float, np.ndarray]] = []
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
@@ -83,30 +84,22 @@ class _Run:
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
-            self.path.append((delta, self.parameters))
+            self.reached.append((delta, self.parameters))
             self.radius = NEXT_RADIUS
         return result
 
     def _predicted(self, delta: float) -> np.ndarray:
-        if len(self.path) < 2:
+        """The gait expected at delta: on the line through the last two levels, if delta goes on falling."""
+        if len(self.reached) < 2:
             return self.parameters
-        (d0, p0), (d1, p1) = self.path[-2:]
-        return p1 + (p1 - p0) * ((delta - d1) / (d1 - d0)) if delta < d1 < d0 else p1
+        (d0, p0), (d1, p1) = self.reached[-2:]
+        move = (p1 - p0) * ((delta - d1) / (d1 - d0)) if delta < d1 < d0 else 0.0 * p1
+        return p1 + move if np.abs(move).max() < NEXT_RADIUS else p1
 
     def _solve(self, delta: float) -> NlpResult:
-        """One solve; where no smaller step in delta can follow, repeated from where it stopped if it fails."""
-        transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
-        x = feasible_point(transcription, self._predicted(delta), delta)
-        result = self.solver.solve(x, delta, multipliers, radius)
-        stuck = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
-        for _ in range(_RETRIES if stuck else 0):
-            if result.optimal or not np.isfinite(result.x).all():
-                break
-            radius *= 0.5
-            own = transcription.layout.parameters[:, 0]
-            x = feasible_point(transcription, result.x[own], delta)
-            result = self.solver.solve(x, delta, None, radius).accumulated(result)
-        return result
+        x = feasible_point(self.solver.transcription, self._predicted(delta), delta)
+        iterations = NEXT_ITERATIONS if self.reached and self.problem.formulation == CONDENSED else None
+        return self.solver.solve(x, delta, self.multipliers, self.radius, iterations)
 
     def remesh(self, edges: np.ndarray) -> None:
         """Go on with another mesh; multipliers do not carry over."""
@@ -158,7 +151,7 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     """
     begin = time.perf_counter()
     run = _Run(problem, solver or Solver(transcribe(problem)), on_level)
-    result = _descend(run)
+    result = _descend(run, problem.delta_start)
     if result.optimal and problem.mesh_tolerance > 0:
         result = _refine(run, result)
     solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin)
@@ -171,10 +164,10 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     return solution
 
 
-def _descend(run: _Run) -> NlpResult:
-    """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
+def _descend(run: _Run, delta: float) -> NlpResult:
+    """Levels from delta down to the problem's own, with smaller steps after a failure; the last result."""
     target = run.problem.delta
-    delta, factor, reached, failures, meshes = run.problem.delta_start, FIRST_FACTOR, None, 0, 1
+    factor, reached, failures, meshes = FIRST_FACTOR, None, 0, 1
     while True:
         result = run.attempt(delta)
         if result.optimal:
@@ -211,6 +204,8 @@ def _refine(run: _Run, result: NlpResult) -> NlpResult:
             break
         run.remesh(edges)
         result = run.attempt(problem.delta)
+        if not result.optimal:
+            result = _descend(run, _BACK_UP * problem.delta)
         if not result.optimal:
             break
     return result

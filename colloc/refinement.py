@@ -7,6 +7,8 @@ interval's share of the efficiency error follows. Intervals with too large a sha
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from colloc.balance import instant, total_power
@@ -18,6 +20,61 @@ from colloc.problem import Problem
 _PANELS, _NODES = 4, 4
 _SPLIT_SHARE = 0.3
 _MOST_INTERVALS = 4000
+_TOLERANCE = 1e-8
+"""Residual of the balance here: far below the mesh errors that are measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Complex displacement in an interval's own initial frame, work and rotation, each ``(n,)``: by the scheme, by panels."""
+
+    coarse: np.ndarray
+    fine: np.ndarray
+
+    def merged(self, other: _Pieces, order: np.ndarray) -> _Pieces:
+        """These intervals and other ones, in the given order."""
+        both = (np.concatenate([getattr(self, k), getattr(other, k)], axis=1)[:, order] for k in ("coarse", "fine"))
+        return _Pieces(*both)
+
+    def __getitem__(self, chosen: np.ndarray) -> _Pieces:
+        return _Pieces(self.coarse[:, chosen], self.fine[:, chosen])
+
+
+def _pieces(problem: Problem, mesh: Mesh, gait: Fourier, delta: float, left: np.ndarray, h: np.ndarray) -> _Pieces:
+    """The motion over the intervals that begin at `left` and last `h`, solved anew at all their nodes."""
+    n, s = left.size, mesh.scheme.s
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    panel_nodes = (np.arange(_PANELS)[:, None] + 0.5 * (nodes + 1)).ravel() / _PANELS
+    panel_weights = np.tile(0.5 * weights / _PANELS, _PANELS)
+    # the body at the fine nodes and at the scheme's nodes, interval by interval
+    tau = np.concatenate([mesh.scheme.c, panel_nodes])
+    t = (left[:, None] + h[:, None] * tau).ravel()
+    angles, rates = gait.angles(t), gait.rates(t)
+    solved = solve_balance(problem.body, problem.friction, angles, rates, delta, tolerance=_TOLERANCE)
+    now = instant(problem.body, problem.friction, angles, rates, solved.z, delta)
+    cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
+    power = total_power(now.velocity, now.force)
+    omega, cx, cy, power = (a.reshape(n, tau.size) for a in (solved.z[2], cx[0], cy[0], power[0]))
+
+    def states(rows: slice, within: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        turn = np.exp(1j * h[:, None] * (omega[:, rows] @ within.T))
+        move = (turn * (cx[:, rows] + 1j * cy[:, rows])) @ weight * h
+        return np.stack([move, power[:, rows] @ weight * h, omega[:, rows] @ weight * h])
+
+    return _Pieces(states(slice(0, s), mesh.scheme.A, mesh.scheme.b), states(slice(s, None), _panel_integrals(nodes), panel_weights))
+
+
+def _errors(problem: Problem, pieces: _Pieces) -> np.ndarray:
+    """Each interval's contribution to the relative efficiency error, signed, ``(n,)``."""
+    coarse, fine = pieces.coarse, pieces.fine
+    heading = np.concatenate([[0.0], np.cumsum(fine[2].real)[:-1]])
+    path = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading) * fine[0])])
+    # an error of rotation turns everything after it
+    later = path[-1] - path[1:]
+    error = np.exp(1j * heading) * (coarse[0] - fine[0]) + 1j * (coarse[2] - fine[2]).real * later
+    direction = _direction(problem, path[-1], heading[-1] + fine[2, -1].real)
+    distance = float((path[-1] * np.conj(direction)).real)
+    return (error * np.conj(direction)).real / distance - (coarse[1] - fine[1]).real / fine[1].real.sum()
 
 
 def interval_errors(problem: Problem, mesh: Mesh, gait: Fourier, delta: float) -> np.ndarray:
@@ -31,36 +88,7 @@ def interval_errors(problem: Problem, mesh: Mesh, gait: Fourier, delta: float) -
     delta : float
         Regularisation speed, per period.
     """
-    n, s = mesh.n, mesh.scheme.s
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    panel_nodes = (np.arange(_PANELS)[:, None] + 0.5 * (nodes + 1)).ravel() / _PANELS
-    panel_weights = np.tile(0.5 * weights / _PANELS, _PANELS)
-    # the body at the fine nodes and at the scheme's nodes, interval by interval
-    tau = np.concatenate([mesh.scheme.c, panel_nodes])
-    t = (mesh.edges[:-1, None] + mesh.h[:, None] * tau).ravel()
-    angles, rates = gait.angles(t), gait.rates(t)
-    solved = solve_balance(problem.body, problem.friction, angles, rates, delta)
-    now = instant(problem.body, problem.friction, angles, rates, solved.z, delta)
-    cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
-    power = total_power(now.velocity, now.force)
-    omega, cx, cy, power = (a.reshape(n, tau.size) for a in (solved.z[2], cx[0], cy[0], power[0]))
-
-    def states(rows: slice, within: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Complex displacement in the interval's own initial frame, work and rotation of every interval."""
-        turn = np.exp(1j * mesh.h[:, None] * (omega[:, rows] @ within.T))
-        move = (turn * (cx[:, rows] + 1j * cy[:, rows])) @ weight * mesh.h
-        return move, power[:, rows] @ weight * mesh.h, omega[:, rows] @ weight * mesh.h
-
-    coarse = states(slice(0, s), mesh.scheme.A, mesh.scheme.b)
-    fine = states(slice(s, None), _panel_integrals(nodes), panel_weights)
-    heading = np.concatenate([[0.0], np.cumsum(fine[2])[:-1]])
-    path = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading) * fine[0])])
-    # an error of rotation turns everything after it
-    later = path[-1] - path[1:]
-    error = np.exp(1j * heading) * (coarse[0] - fine[0]) + 1j * (coarse[2] - fine[2]) * later
-    direction = _direction(problem, path[-1], heading[-1] + fine[2][-1])
-    distance = float((path[-1] * np.conj(direction)).real)
-    return (error * np.conj(direction)).real / distance - (coarse[1] - fine[1]) / fine[1].sum()
+    return _errors(problem, _pieces(problem, mesh, gait, delta, mesh.edges[:-1], mesh.h))
 
 
 def _direction(problem: Problem, end: complex, rotation: float) -> complex:
@@ -91,14 +119,20 @@ def refined_edges(problem: Problem, mesh: Mesh, gait: Fourier, delta: float, tol
     Intervals are halved, largest errors first and several times in one call, since the gait can be tried on any mesh.
     The estimate is the sum of the intervals' magnitudes: errors of opposite sign are not allowed to cancel.
     """
-    edges, current = mesh.edges, mesh
+    edges = mesh.edges
+    pieces = _pieces(problem, mesh, gait, delta, edges[:-1], mesh.h)
     while True:
-        errors = np.abs(interval_errors(problem, current, gait, delta))
+        errors = np.abs(_errors(problem, pieces))
         if errors.sum() <= tolerance or edges.size > _MOST_INTERVALS:
-            return None if current is mesh else edges
+            return None if edges is mesh.edges else edges
         order = np.argsort(errors)[::-1]
         # split those that hold the excess over the tolerance
         excess = np.cumsum(errors[order]) < errors.sum() - _SPLIT_SHARE * tolerance
-        chosen = order[: max(1, int(excess.sum()) // 2)]
-        edges = np.sort(np.concatenate([edges, 0.5 * (edges[chosen] + edges[chosen + 1])]))
-        current = Mesh(mesh.scheme, edges)
+        chosen = np.zeros(errors.size, dtype=bool)
+        chosen[order[: max(1, int(excess.sum()) // 2)]] = True
+        middle = 0.5 * (edges[:-1] + edges[1:])[chosen]
+        left = np.concatenate([edges[:-1][chosen], middle])
+        halves = _pieces(problem, mesh, gait, delta, left, np.concatenate([middle, edges[1:][chosen]]) - left)
+        order = np.argsort(np.concatenate([edges[:-1][~chosen], left]))
+        pieces = pieces[~chosen].merged(halves, order)
+        edges = np.sort(np.concatenate([edges, middle]))
