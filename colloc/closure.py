@@ -15,11 +15,11 @@ from colloc.gait import Fourier
 from colloc.problem import Problem
 from colloc.sampling import largest_amplitude
 
-_INSTANTS = 120
+_INSTANTS = 60
 _STEPS = 30
 _DIFFERENCE = 1e-5
 _LONGEST_STEP = 0.3
-_CLOSED = 1e-6
+_CLOSED = 1e-4
 
 
 def enclosed_area(gait: Fourier) -> float:

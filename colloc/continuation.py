@@ -7,6 +7,7 @@ the mesh is refined where the gait needs it.
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,24 +18,26 @@ from colloc.closure import closed_parameters
 from colloc.diagnosis import explanation, redundant_equations
 from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
+from colloc.prediction import Track
 from colloc.problem import CONDENSED, Problem
 from colloc.refinement import refined_edges
 from colloc.solution import Level, Solution
 from colloc.transcription import transcribe
 from colloc.warm_start import feasible_point
 
-FIRST_FACTOR = 0.1
+FIRST_FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.1
 """Trust region of the gait parameters [rad] at the first level, at later ones, and on a refined mesh: how far an optimum is
 expected to move. A region that turns out too small is moved, so it costs steps, not optima."""
 TRIVIAL, TRIVIAL_EFFICIENCY = "trivial gait", 1e-4
 """Status of a level whose gait goes nowhere: efficiency times the smallest friction coefficient (at most 1) below this."""
 _SMALLEST_STEP = 0.8
-NEXT_ITERATIONS = 20
+NEXT_ITERATIONS = 15
 """Iterations a condensed level may take that starts from a converged one. Near the optimum 4 to 12 do; a solve that needs
 more follows a kink of stick-slip in tiny steps, and a smaller step in delta is cheaper than its end."""
 _BACK_UP = 4.0
-"""A refined mesh has kinks of its own. Where it does not converge at once, delta is raised by this factor and lowered again."""
+"""A refined mesh has kinks of its own, which a little more regularisation passes: delta is raised by this factor for the first
+solve there and lowered again."""
 _FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
 """After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
 direction of sliding at a node, mu_b and mu_f give the collocated efficiency a kink, and an optimum may sit right on it:
@@ -46,6 +49,9 @@ _EXCHANGES = 4
 _REFINEMENTS = 4
 _ADMISSIBLE = 1e-8
 
+_MOST_KEPT = 4
+_kept = threading.local()
+
 Report = Callable[[Level], None]
 
 
@@ -55,7 +61,7 @@ class _Run:
     def __init__(self, problem: Problem, solver: Solver, on_level: Report | None) -> None:
         self.problem, self.solver, self.on_level = problem, solver, on_level
         self.levels: list[Level] = []
-        self.reached: list[tuple[float, np.ndarray]] = []
+        self.track = Track()
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
@@ -84,21 +90,13 @@ class _Run:
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
-            self.reached.append((delta, self.parameters))
+            self.track.record(delta, self.parameters)
             self.radius = NEXT_RADIUS
         return result
 
-    def _predicted(self, delta: float) -> np.ndarray:
-        """The gait expected at delta: on the line through the last two levels, if delta goes on falling."""
-        if len(self.reached) < 2:
-            return self.parameters
-        (d0, p0), (d1, p1) = self.reached[-2:]
-        move = (p1 - p0) * ((delta - d1) / (d1 - d0)) if delta < d1 < d0 else 0.0 * p1
-        return p1 + move if np.abs(move).max() < NEXT_RADIUS else p1
-
     def _solve(self, delta: float) -> NlpResult:
-        x = feasible_point(self.solver.transcription, self._predicted(delta), delta)
-        iterations = NEXT_ITERATIONS if self.reached and self.problem.formulation == CONDENSED else None
+        x = feasible_point(self.solver.transcription, self.parameters + self.track.move(delta), delta)
+        iterations = NEXT_ITERATIONS if self.track and self.problem.formulation == CONDENSED else None
         return self.solver.solve(x, delta, self.multipliers, self.radius, iterations)
 
     def remesh(self, edges: np.ndarray) -> None:
@@ -106,6 +104,7 @@ class _Run:
         self.solver = Solver(transcribe(self.problem, edges))
         self.multipliers = None
         self.radius = REMESH_RADIUS
+        self.track.remeshed()
 
     def _record(self, delta: float, result: NlpResult) -> None:
         transcription = self.solver.transcription
@@ -150,7 +149,7 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
         Without a certificate; the last level is one at ``problem.delta`` only if all went well.
     """
     begin = time.perf_counter()
-    run = _Run(problem, solver or Solver(transcribe(problem)), on_level)
+    run = _Run(problem, solver or _kept_solver(problem), on_level)
     result = _descend(run, problem.delta_start)
     if result.optimal and problem.mesh_tolerance > 0:
         result = _refine(run, result)
@@ -162,6 +161,18 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
         if redundant:
             solution.message += f" Redundant equations, which no optimiser bears: {', '.join(redundant)}."
     return solution
+
+
+def _kept_solver(problem: Problem) -> Solver:
+    """The solver of a problem's uniform mesh, built once a thread: guess and delta are no part of it."""
+    key = (problem.body, problem.friction, problem.gait, problem.joint_limit, problem.smallest_shape_speed)
+    key += (problem.intervals, problem.scheme, problem.formulation)
+    kept = _kept.__dict__.setdefault("solvers", {})
+    if key not in kept:
+        while len(kept) >= _MOST_KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = Solver(transcribe(problem))
+    return kept[key]
 
 
 def _descend(run: _Run, delta: float) -> NlpResult:
@@ -203,9 +214,7 @@ def _refine(run: _Run, result: NlpResult) -> NlpResult:
         if edges is None:
             break
         run.remesh(edges)
-        result = run.attempt(problem.delta)
-        if not result.optimal:
-            result = _descend(run, _BACK_UP * problem.delta)
+        result = _descend(run, _BACK_UP * problem.delta)
         if not result.optimal:
             break
     return result

@@ -19,6 +19,8 @@ from colloc.problem import Problem
 
 _PANELS, _NODES = 4, 4
 _SPLIT_SHARE = 0.3
+_MARGIN = 0.6
+"""A mesh that has to be refined is refined to this share of the tolerance, so that the gait found on it is good too."""
 _MOST_INTERVALS = 4000
 _TOLERANCE = 1e-8
 """Residual of the balance here: far below the mesh errors that are measured."""
@@ -120,14 +122,16 @@ def refined_edges(problem: Problem, mesh: Mesh, gait: Fourier, delta: float, tol
     The estimate is the sum of the intervals' magnitudes: errors of opposite sign are not allowed to cancel.
     """
     edges = mesh.edges
+    target = tolerance
     pieces = _pieces(problem, mesh, gait, delta, edges[:-1], mesh.h)
     while True:
         errors = np.abs(_errors(problem, pieces))
-        if errors.sum() <= tolerance or edges.size > _MOST_INTERVALS:
+        if errors.sum() <= target or edges.size > _MOST_INTERVALS:
             return None if edges is mesh.edges else edges
+        target = _MARGIN * tolerance
         order = np.argsort(errors)[::-1]
         # split those that hold the excess over the tolerance
-        excess = np.cumsum(errors[order]) < errors.sum() - _SPLIT_SHARE * tolerance
+        excess = np.cumsum(errors[order]) < errors.sum() - _SPLIT_SHARE * target
         chosen = np.zeros(errors.size, dtype=bool)
         chosen[order[: max(1, int(excess.sum()) // 2)]] = True
         middle = 0.5 * (edges[:-1] + edges[1:])[chosen]

@@ -45,6 +45,7 @@ LEVELS = {
         "bound_sampling",
         "infinitesimal",
         "closure",
+        "prediction",
     ],
     5: [
         "verify",
