@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.closure import closed_parameters
+from colloc.closure import closed_parameters, opened_parameters
 from colloc.diagnosis import explanation, redundant_equations
 from colloc.gait import Fourier
 from colloc.nlp import NlpResult, Solver
@@ -35,16 +35,18 @@ _SMALLEST_STEP = 0.8
 NEXT_ITERATIONS = 15
 """Iterations a condensed level may take that starts from a converged one. Near the optimum 4 to 12 do; a solve that needs
 more follows a kink of stick-slip in tiny steps, and a smaller step in delta is cheaper than its end."""
-_BACK_UP = 4.0
-"""A refined mesh has kinks of its own, which a little more regularisation passes: delta is raised by this factor for the first
-solve there and lowered again."""
+REFINE_DELTA = 1e-3
+"""The mesh is refined on the way, at the first level below this delta, and checked again at the end. A refined mesh displaces
+the kinks that small deltas sharpen: entered at a smaller delta, most solves on it fail."""
 _FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
 """After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
 direction of sliding at a node, mu_b and mu_f give the collocated efficiency a kink, and an optimum may sit right on it:
 there first-order conditions never hold. Another mesh has its kinks elsewhere."""
-_FIRST_DELTAS = 4
+_FIRST_DELTAS = 5
 _LOWER_START = 0.3
 """Where the first level fails, the next lower delta is tried, this factor below, up to so many first levels in all."""
+_FEASIBLE = 1e-6
+"""A first level that fails with all equations satisfied to this has stalled on a kink; one that does not has lost its way."""
 _EXCHANGES = 4
 _REFINEMENTS = 4
 _ADMISSIBLE = 1e-8
@@ -83,9 +85,10 @@ class _Run:
                 again = self.solver.solve(result.x, delta, (result.lam_x, result.lam_g), self.radius)
                 result = again.accumulated(result)
         if result.optimal and abs(result.objective) * self.problem.friction.smallest < TRIVIAL_EFFICIENCY:
-            # a critical point, but no optimum: step out less far the next time
+            # a critical point, but no optimum: begin further away from it the next time
             result = replace(result, complementarity=np.inf, status=TRIVIAL)
-            self.radius *= _LOWER_START
+            if not self.track:
+                self.parameters = opened_parameters(self.problem, self.parameters, delta)
         self._record(delta, result)
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
@@ -105,6 +108,17 @@ class _Run:
         self.multipliers = None
         self.radius = REMESH_RADIUS
         self.track.remeshed()
+
+    def other_mesh(self) -> None:
+        """Go on with a uniform mesh of a few more intervals, whose kinks lie elsewhere."""
+        edges = self.solver.transcription.mesh.edges
+        self.remesh(np.linspace(0.0, edges[-1], 1 + round(_OTHER_MESH * (edges.size - 1)) | 1))
+
+    def leave_kink(self, result: NlpResult) -> None:
+        """Go on from where a feasible solve stalled, with another mesh."""
+        self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
+        self.other_mesh()
+        self.radius = NEXT_RADIUS
 
     def _record(self, delta: float, result: NlpResult) -> None:
         transcription = self.solver.transcription
@@ -150,9 +164,17 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     """
     begin = time.perf_counter()
     run = _Run(problem, solver or _kept_solver(problem), on_level)
-    result = _descend(run, problem.delta_start)
-    if result.optimal and problem.mesh_tolerance > 0:
-        result = _refine(run, result)
+    result = _descend(run, problem.delta_start, max(problem.delta, min(REFINE_DELTA, problem.delta_start)))
+    for _ in range(_REFINEMENTS):
+        at = run.levels[-1].delta
+        edges = _refined(run) if result.optimal and problem.mesh_tolerance > 0 else None
+        if edges is not None:
+            run.remesh(edges)
+        elif not result.optimal or at <= problem.delta:
+            break
+        # a mesh refined at the end is entered where its kinks are mild
+        begin = min(max(at, REFINE_DELTA), problem.delta_start) if edges is not None else FIRST_FACTOR * at
+        result = _descend(run, max(begin, problem.delta), problem.delta)
     solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin)
     if not result.optimal:
         delta = run.levels[-1].delta
@@ -175,9 +197,8 @@ def _kept_solver(problem: Problem) -> Solver:
     return kept[key]
 
 
-def _descend(run: _Run, delta: float) -> NlpResult:
-    """Levels from delta down to the problem's own, with smaller steps after a failure; the last result."""
-    target = run.problem.delta
+def _descend(run: _Run, delta: float, target: float) -> NlpResult:
+    """Levels from delta down to the target, with smaller steps after a failure; the last result."""
     factor, reached, failures, meshes = FIRST_FACTOR, None, 0, 1
     while True:
         result = run.attempt(delta)
@@ -188,15 +209,22 @@ def _descend(run: _Run, delta: float) -> NlpResult:
             factor, failures = max(FIRST_FACTOR, factor**2), 0
         elif reached is None:
             failures += 1
-            if failures == _FIRST_DELTAS or delta <= target:
+            if failures == _FIRST_DELTAS:
                 return result
-            delta = max(_LOWER_START * delta, target)
+            if result.status == TRIVIAL:
+                continue
+            if result.violation < _FEASIBLE and meshes < _MESHES:
+                run.leave_kink(result)
+                meshes += 1
+            elif delta > target:
+                delta = max(_LOWER_START * delta, target)
+            else:
+                return result
             continue
         else:
             failures += 1
             if failures >= _FAILURES_PER_MESH and meshes < _MESHES:
-                edges = run.solver.transcription.mesh.edges
-                run.remesh(np.linspace(0.0, edges[-1], 1 + round(_OTHER_MESH * (edges.size - 1)) | 1))
+                run.other_mesh()
                 failures, meshes = 0, meshes + 1
             elif factor > _SMALLEST_STEP:
                 return result
@@ -205,16 +233,7 @@ def _descend(run: _Run, delta: float) -> NlpResult:
         delta = reached * factor if reached * factor > 1.2 * target else target
 
 
-def _refine(run: _Run, result: NlpResult) -> NlpResult:
-    """Solve again on refined meshes until the gait found needs no further refinement."""
-    problem = run.problem
-    for _ in range(_REFINEMENTS):
-        mesh = run.solver.transcription.mesh
-        edges = refined_edges(problem, mesh, run.gait, problem.delta, problem.mesh_tolerance)
-        if edges is None:
-            break
-        run.remesh(edges)
-        result = _descend(run, _BACK_UP * problem.delta)
-        if not result.optimal:
-            break
-    return result
+def _refined(run: _Run) -> np.ndarray | None:
+    """Edges of a mesh on which the gait found is accurate; None if the present one will do."""
+    mesh = run.solver.transcription.mesh
+    return refined_edges(run.problem, mesh, run.gait, run.problem.delta, run.problem.mesh_tolerance)

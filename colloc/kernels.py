@@ -112,6 +112,19 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     return total_function("point", local, solved, delta, out, jacobian, hessian, weight)
 
 
+@lru_cache(maxsize=32)
+def newton_step(body: Chain, friction: Friction) -> ca.Function:
+    """One Newton step on the balance, (angles, rates, z, delta) to (z, largest residual before the step).
+
+    Undamped, and in the tail's velocity: to finish what starts close by. `colloc.fixed_point` converges from anywhere.
+    """
+    _, angles, rates, z, delta = _symbols(body)
+    now = instant(body, friction, angles, rates, z, delta)
+    balance = net_force(now.posture, now.force) / friction.largest
+    step = ca.solve(ca.jacobian(balance, z), balance)
+    return ca.Function("newton", [angles, rates, z, delta], [z - step, ca.norm_inf(balance)], {"cse": True})
+
+
 def shape_checks(body: Chain) -> list[tuple[str, ca.Function]]:
     """Named scalar functions of the joint angles that admissibility bounds: each joint angle, each pair of links."""
     angles = ca.SX.sym("q", body.n_joint)

@@ -20,6 +20,7 @@ CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
 FORMULATIONS = (CONDENSED, MAP, LIFTED)
 _CHECKED_PHASES = 2000
 _SLACK = 1e-9
+_FLOOR_SLACK = 1e-6
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ class Problem:
         parameters = self.gait.parameters(self.guess)
         guess = self.gait.fourier(parameters, self.body.n_joint)
         rms = np.sqrt(0.5 * np.sum(np.arange(1, guess.n_harmonic + 1) ** 2 * (guess.cos**2 + guess.sin**2)))
-        if rms < self.smallest_shape_speed:
+        if rms < self.smallest_shape_speed * (1 - _FLOOR_SLACK):
             raise ProblemError(
                 f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
