@@ -6,7 +6,7 @@ import contextlib
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from dataclasses import replace
 
@@ -29,10 +29,12 @@ class _TimeLimit(Exception):
     pass
 
 
-def run_start(problem: Problem, sampler: str, seed: int, start: int, time_limit: float) -> Outcome:
+def run_start(
+    problem: Problem, sampler: str, seed: int, start: int, time_limit: float, known: Fourier | None = None
+) -> Outcome:
     """Solve and certify one start. Whatever goes wrong becomes the outcome's status and message; nothing is raised.
 
-    The time limit [s] is checked between the levels of the continuation.
+    The time limit [s] is checked between the levels of the continuation. A `known` gait takes the place of the sample.
     """
     begin, cpu = time.perf_counter(), time.process_time()
     guess = fourier_through(problem.guess, seed_class(problem))
@@ -45,7 +47,7 @@ def run_start(problem: Problem, sampler: str, seed: int, start: int, time_limit:
             raise _TimeLimit
 
     try:
-        guess = start_gait(problem, sampler, seed, start)
+        guess = known or start_gait(problem, sampler, seed, start)
         outcome = Outcome(start, ERROR, "", guess, guess)
         solution = maximise_efficiency(problem.with_(guess=guess), watch)
         outcome = _outcome(start, guess, solution)
@@ -105,6 +107,7 @@ def run_starts(
     workers: int = 1,
     time_limit: float = 300.0,
     executor: Callable[[int], Executor] = process_pool,
+    known: Mapping[int, Fourier] | None = None,
 ) -> Iterator[Outcome]:
     """Outcomes of the given starts, each as soon as it is there.
 
@@ -123,6 +126,8 @@ def run_starts(
         Makes an executor for a number of workers: processes by default; threads, or the one a Dask client gives
         (``lambda n: client.get_executor()``), will do. When a worker dies (killed, out of memory) a new one is made, the
         starts under way are tried again one by one, and one that kills its worker again is recorded as crashed.
+    known : mapping of int to Fourier, optional
+        Gaits from which starts of these numbers begin instead of a sample: results of an earlier run to go on from.
     """
     waiting = list(starts)[::-1]
     suspects: list[int] = []
@@ -137,7 +142,9 @@ def run_starts(
                 while queue or pending:
                     while queue and len(pending) < (1 if alone else workers):
                         start = queue[-1]
-                        pending[pool.submit(run_start, problem, sampler, seed, start, time_limit)] = start
+                        pending[pool.submit(run_start, problem, sampler, seed, start, time_limit, (known or {}).get(start))] = (
+                            start
+                        )
                         queue.pop()
                         submitted = True
                     for future in wait(pending, return_when=FIRST_COMPLETED).done:

@@ -15,11 +15,12 @@ from colloc.gait import Fourier
 from colloc.problem import Problem
 from colloc.sampling import largest_amplitude
 
-_INSTANTS = 120
+_INSTANTS = 60
 _STEPS = 30
 _DIFFERENCE = 1e-5
 _LONGEST_STEP = 0.3
-_CLOSED = 1e-6
+_CLOSED = 1e-4
+_WIDER, _WIDE = 5.0, 0.3
 
 
 def enclosed_area(gait: Fourier) -> float:
@@ -75,6 +76,30 @@ def closed_parameters(problem: Problem, parameters: np.ndarray, delta: float) ->
         if reached[best] >= abs(rotation):
             break
         parameters = trials[best]
+    return parameters
+
+
+def opened_parameters(problem: Problem, parameters: np.ndarray, delta: float) -> np.ndarray:
+    """Parameters of a gait near the given one that encloses several times the area, and closes its rotation.
+
+    A nearly retraced gait lies between the retraced ones, which go nowhere, and searches that begin at it end there.
+    """
+    n_joint, n = problem.body.n_joint, parameters.size
+
+    def area(p: np.ndarray) -> float:
+        return enclosed_area(problem.gait.fourier(p, n_joint))
+
+    target = max(_WIDER * abs(area(parameters)), _WIDE)
+    for _ in range(_STEPS):
+        now = area(parameters)
+        # the area is a quadratic form of the parameters: central differences are exact
+        slope = np.array([0.5 * (area(parameters + e) - area(parameters - e)) for e in np.eye(n)])
+        if abs(now) >= target or not slope.any():
+            break
+        outward = (slope if now >= 0 else -slope) / np.linalg.norm(slope)
+        parameters = _admissible(problem, parameters + _LONGEST_STEP * outward)
+    if problem.gait.symmetry == "none":
+        parameters = closed_parameters(problem, parameters, delta)
     return parameters
 
 

@@ -7,13 +7,14 @@ the mesh is refined where the gait needs it.
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from colloc.closure import closed_parameters
+from colloc.closure import closed_parameters, opened_parameters
 from colloc.contact import Pairs
 from colloc.diagnosis import explanation, redundant_equations
 from colloc.far_contact import crossing_pairs, last_free
@@ -21,13 +22,14 @@ from colloc.gait_fields import AnyGait
 from colloc.mesh_error import mesh_error
 from colloc.nlp import NlpResult, Solver
 from colloc.path_start import nearest_parameters, transcribed
-from colloc.problem import Problem
+from colloc.prediction import Track
+from colloc.problem import CONDENSED, Problem
 from colloc.program import GaitProgram
-from colloc.refinement import MOST_POINTS, planned_mesh
+from colloc.refinement import MOST_POINTS, MeshPlan, planned_mesh
 from colloc.solution import Level, Solution
 from colloc.warm_start import feasible_point
 
-FIRST_FACTOR = 0.1
+FIRST_FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.1
 """Trust region of the gait parameters [rad] at the first level, at later ones, and on a refined mesh: how far an optimum is
 expected to move. A region that turns out too small is moved, so it costs steps, not optima."""
@@ -38,20 +40,30 @@ delta = 0.01 to 1e-5 at curvature 8)."""
 TRIVIAL, TRIVIAL_EFFICIENCY = "trivial gait", 1e-4
 """Status of a level whose gait goes nowhere: efficiency times the smallest friction coefficient (at most 1) below this."""
 _SMALLEST_STEP = 0.8
+NEXT_ITERATIONS = 15
+"""Iterations a condensed level may take that starts from a converged one. Near the optimum 4 to 12 do; a solve that needs
+more follows a kink of stick-slip in tiny steps, and a smaller step in delta is cheaper than its end."""
+REFINE_DELTA = 1e-3
+"""The mesh of harmonic gaits is refined on the way, at the first level below this delta, and checked again at the end. A
+refined mesh displaces the kinks that small deltas sharpen: entered at a smaller delta, most solves on it fail."""
 _RETRIES = 2
-"""A solve that has not converged after a few dozen iterations follows a kink of stick-slip in tiny steps. Hundreds more
-rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does. Between two
-levels a smaller step in delta is better still, so only solves on refined meshes are retried."""
+"""A path on a refined mesh that has not converged after a few dozen iterations follows a kink in tiny steps. Hundreds more
+rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does."""
 _FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
 """After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
 direction of sliding at a node, mu_b and mu_f give the collocated efficiency a kink, and an optimum may sit right on it:
 there first-order conditions never hold. Another mesh has its kinks elsewhere."""
-_FIRST_DELTAS = 4
+_FIRST_DELTAS = 5
 _LOWER_START = 0.3
 """Where the first level fails, the next lower delta is tried, this factor below, up to so many first levels in all."""
+_FEASIBLE = 1e-6
+"""A first level that fails with all equations satisfied to this has stalled on a kink; one that does not has lost its way."""
 _EXCHANGES = 4
-_REFINEMENTS = 4
+_REFINEMENTS = 5
 _ADMISSIBLE = 1e-8
+
+_MOST_KEPT = 4
+_kept = threading.local()
 
 Report = Callable[[Level], None]
 
@@ -62,6 +74,7 @@ class _Run:
     def __init__(self, problem: Problem, solver: Solver[GaitProgram], on_level: Report | None) -> None:
         self.problem, self.solver, self.on_level = problem, solver, on_level
         self.levels: list[Level] = []
+        self.track = Track()
         self.parameters = nearest_parameters(solver.transcription, problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
@@ -98,14 +111,19 @@ class _Run:
                 again = self.solver.solve(result.x, delta, (result.lam_x, result.lam_g), self.radius)
                 result = again.accumulated(result)
         if result.optimal and abs(result.objective) * self.problem.friction.smallest < TRIVIAL_EFFICIENCY:
-            # a critical point, but no optimum: step out less far the next time
+            # a critical point, but no optimum: begin further away from it, or step out less far, the next time
             result = replace(result, complementarity=np.inf, status=TRIVIAL)
-            self.radius *= _LOWER_START
+            if self.problem.has_path:
+                self.radius *= _LOWER_START
+            elif not self.track:
+                self.parameters = opened_parameters(self.problem, self.parameters, delta)
         self._record(delta, result)
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
             self.radius = self.next_radius
+            if not self.problem.has_path:
+                self.track.record(delta, self.parameters)
         return result
 
     def _solve_apart(self, delta: float) -> NlpResult:
@@ -123,11 +141,12 @@ class _Run:
         return result
 
     def _solve(self, delta: float, start: np.ndarray | None = None) -> NlpResult:
-        """One solve, by default from the last converged gait; repeated from where it stopped if no smaller step can follow."""
+        """One solve, by default from where the optimum is expected."""
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
-        x = feasible_point(transcription, self.parameters if start is None else start, delta)
-        result = self.solver.solve(x, delta, multipliers, radius)
-        stuck = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
+        x = feasible_point(transcription, self.parameters + self.track.move(delta) if start is None else start, delta)
+        iterations = NEXT_ITERATIONS if self.track and self.problem.formulation == CONDENSED else None
+        result = self.solver.solve(x, delta, multipliers, radius, iterations)
+        stuck = self.problem.has_path and bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
         for _ in range(_RETRIES if stuck else 0):
             if result.optimal or not np.isfinite(result.x).all():
                 break
@@ -144,6 +163,18 @@ class _Run:
         self.parameters = nearest_parameters(self.solver.transcription, gait)
         self.multipliers = None
         self.radius = radius
+        self.track.remeshed()
+
+    def other_mesh(self) -> None:
+        """Go on with a uniform mesh of a few more intervals, whose kinks lie elsewhere."""
+        edges = self.solver.transcription.mesh.edges
+        self.remesh(np.linspace(0.0, edges[-1], 1 + round(_OTHER_MESH * (edges.size - 1)) | 1))
+
+    def leave_kink(self, result: NlpResult) -> None:
+        """Go on from where a feasible solve stalled, with another mesh."""
+        self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
+        self.other_mesh()
+        self.radius = self.next_radius
 
     def _record(self, delta: float, result: NlpResult) -> None:
         transcription = self.solver.transcription
@@ -196,12 +227,9 @@ def continue_delta(
         Without a certificate; the last level is one at ``problem.delta`` only if all went well.
     """
     begin = time.perf_counter()
-    run = _Run(problem, solver or Solver(transcribed(problem)), on_level)
+    run = _Run(problem, solver or _kept_solver(problem), on_level)
     run.take_over(before)
-    result = _descend(run)
-    shortfall = ""
-    if result.optimal and problem.mesh_tolerance > 0:
-        result, shortfall = _refine(run, result)
+    result, shortfall = _refine(run)
     solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin, message=shortfall)
     if not result.optimal:
         delta = run.levels[-1].delta
@@ -212,10 +240,23 @@ def continue_delta(
     return solution
 
 
-def _descend(run: _Run) -> NlpResult:
-    """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
-    target = run.problem.delta
-    delta, factor, reached, failures, meshes = run.first_delta, run.factor, None, 0, 1
+def _kept_solver(problem: Problem) -> Solver[GaitProgram]:
+    """The solver of a problem's uniform mesh, built once a thread: guess and delta are no part of it, save for paths."""
+    if problem.has_path:
+        return Solver(transcribed(problem))
+    model = (problem.body, problem.friction, problem.gait, problem.joint_limit, problem.smallest_shape_speed)
+    key = (model, problem.intervals, problem.scheme, problem.formulation)
+    kept = _kept.__dict__.setdefault("solvers", {})
+    if key not in kept:
+        while len(kept) >= _MOST_KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = Solver(transcribed(problem))
+    return kept[key]
+
+
+def _descend(run: _Run, delta: float, target: float) -> NlpResult:
+    """Levels from delta down to the target, with smaller steps after a failure; the last result."""
+    factor, reached, failures, meshes = run.factor, None, 0, 1
     while True:
         result = run.attempt(delta)
         if result.optimal:
@@ -225,15 +266,22 @@ def _descend(run: _Run) -> NlpResult:
             factor, failures = max(run.factor, factor**2), 0
         elif reached is None:
             failures += 1
-            if failures == _FIRST_DELTAS or delta <= target:
+            if failures == _FIRST_DELTAS:
                 return result
-            delta = max(_LOWER_START * delta, target)
+            if result.status == TRIVIAL and not run.problem.has_path:
+                continue
+            if result.violation < _FEASIBLE and meshes < _MESHES and not run.problem.has_path:
+                run.leave_kink(result)
+                meshes += 1
+            elif delta > target:
+                delta = max(_LOWER_START * delta, target)
+            else:
+                return result
             continue
         else:
             failures += 1
             if failures >= _FAILURES_PER_MESH and meshes < _MESHES:
-                edges = run.solver.transcription.mesh.edges
-                run.remesh(np.linspace(0.0, edges[-1], 1 + round(_OTHER_MESH * (edges.size - 1)) | 1))
+                run.other_mesh()
                 failures, meshes = 0, meshes + 1
             elif factor > _SMALLEST_STEP:
                 return result
@@ -242,22 +290,28 @@ def _descend(run: _Run) -> NlpResult:
         delta = reached * factor if reached * factor > 1.2 * target else target
 
 
-def _refine(run: _Run, result: NlpResult) -> tuple[NlpResult, str]:
-    """Solve again on planned meshes until the gait found needs no other; the last result, and what was not reached."""
+def _refine(run: _Run) -> tuple[NlpResult, str]:
+    """Levels down to the problem's delta, on planned meshes until the gait needs no other; the last result, what it lacks."""
     problem, kept = run.problem, np.empty(0)
+    first = run.first_delta
+    result = _descend(run, first, problem.delta if problem.has_path else max(problem.delta, min(REFINE_DELTA, first)))
     for _ in range(_REFINEMENTS):
-        gait = run.gait
-        mesh = run.solver.transcription.phase_mesh(gait)
-        plan = planned_mesh(problem, mesh, gait, problem.delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
-        if plan is None:
+        at = run.levels[-1].delta
+        plan = _plan(run, kept) if result.optimal and problem.mesh_tolerance > 0 else None
+        if plan is not None:
+            kept = np.concatenate([kept, plan.kept])
+            run.remesh(plan.edges, scheme=plan.scheme)
+            # a mesh refined at the end is entered where its kinks are mild
+            begin = at if problem.has_path else min(max(at, REFINE_DELTA), first)
+        elif not result.optimal or at <= problem.delta:
             return result, ""
-        kept = np.concatenate([kept, plan.kept])
-        run.remesh(plan.edges, scheme=plan.scheme)
-        result = run.attempt(problem.delta)
-        if not result.optimal:
-            return result, ""
-        if not plan.reached:
+        else:
+            begin = run.factor * at
+        result = _descend(run, max(begin, problem.delta), problem.delta)
+        if plan is not None and not plan.reached:
             break
+    if not result.optimal or problem.mesh_tolerance == 0:
+        return result, ""
     gait = run.gait
     mesh = run.solver.transcription.phase_mesh(gait)
     error = mesh_error(problem, mesh, gait, problem.delta * gait.delta_unit, problem.mesh_tolerance)
@@ -267,3 +321,10 @@ def _refine(run: _Run, result: NlpResult) -> tuple[NlpResult, str]:
         f"refinement ended after {_REFINEMENTS} meshes or {MOST_POINTS} points at an estimated efficiency error of "
         f"{error.estimate:.1e}, above mesh_tolerance {problem.mesh_tolerance:.0e}."
     )
+
+
+def _plan(run: _Run, kept: np.ndarray) -> MeshPlan | None:
+    """A mesh on which the gait found is accurate at the problem's delta; None if the present one will do."""
+    problem, gait = run.problem, run.gait
+    mesh = run.solver.transcription.phase_mesh(gait)
+    return planned_mesh(problem, mesh, gait, problem.delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)

@@ -10,11 +10,13 @@ is a step function of the tail velocity as delta goes to 0 and does not converge
 ``map``
     The tail velocity is tied to the one that balances the body, z - Z(angles, rates) = 0, with Z from the NumPy solver
     and its derivatives from the implicit function theorem. The velocity map is mild where the balance is not.
+    ("condensed" takes the same point, and then eliminates everything but the gait: see `colloc.condensed`.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -24,18 +26,19 @@ from colloc.blocks import LocalFunction, local_function, total_function
 from colloc.body import Chain
 from colloc.contact import clearance, crossing_bounds
 from colloc.friction import Friction, LinkForce, link_moments
-from colloc.problem import LIFTED, MAP
+from colloc.problem import LIFTED
 
 N_RATE = 2
 """The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
 
 
+@lru_cache(maxsize=32)
 def point_function(formulation: str, body: Chain, friction: Friction) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
 
     Locals: theta, joint angles, joint rates, z, and for "lifted" tangential forces, normal forces, couples of the links.
     """
-    return {LIFTED: _lifted_point, MAP: _map_point}[formulation](body, friction)
+    return _lifted_point(body, friction) if formulation == LIFTED else _map_point(body, friction)
 
 
 def _symbols(body: Chain) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -109,6 +112,19 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     hessian = ca.hessian(weight[3] * advance, local)[0]
     hessian[1 : 1 + n_y, 1 : 1 + n_y] += frame.T @ inner @ frame
     return total_function("point", local, solved, delta, out, jacobian, hessian, weight)
+
+
+@lru_cache(maxsize=32)
+def newton_step(body: Chain, friction: Friction) -> ca.Function:
+    """One Newton step on the balance, (angles, rates, z, delta) to (z, largest residual before the step).
+
+    Undamped, and in the tail's velocity: to finish what starts close by. `colloc.fixed_point` converges from anywhere.
+    """
+    _, angles, rates, z, delta = _symbols(body)
+    now = instant(body, friction, angles, rates, z, delta)
+    balance = net_force(now.posture, now.force) / friction.largest
+    step = ca.solve(ca.jacobian(balance, z), balance)
+    return ca.Function("newton", [angles, rates, z, delta], [z - step, ca.norm_inf(balance)], {"cse": True})
 
 
 def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[tuple[str, ca.Function]]:

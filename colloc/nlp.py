@@ -12,8 +12,11 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from colloc.blocks import Oracles, oracles
+from colloc.condensed_program import CondensedProgram
 from colloc.interruption import interruptible
+from colloc.problem import CONDENSED
 from colloc.program import Program
+from colloc.transcription import Transcription
 
 IPOPT_OPTIONS: dict[str, object] = {
     "print_level": 0,
@@ -107,8 +110,19 @@ class Solver(Generic[AnyProgram]):
         chosen = {**IPOPT_OPTIONS, **(LIFTED_OPTIONS if transcription.lifted else {}), **(options or {})}
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
-        settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True, **self.oracles.options}
-        self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
+        settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
+        self._reduced: CondensedProgram | None = None
+        if isinstance(transcription, Transcription) and transcription.problem.formulation == CONDENSED:
+            self._reduced = CondensedProgram(transcription)
+        program = self._reduced or self.oracles
+        self._nlp, self._settings = program.nlp, {**settings, **program.options}
+        self._solvers: dict[int | None, ca.Function] = {}
+
+    def _solver(self, iterations: int | None) -> ca.Function:
+        if iterations not in self._solvers:
+            limit = {} if iterations is None else {"ipopt.max_iter": iterations}
+            self._solvers[iterations] = ca.nlpsol("colloc", "ipopt", self._nlp, {**self._settings, **limit})
+        return self._solvers[iterations]
 
     def solve(
         self,
@@ -116,6 +130,7 @@ class Solver(Generic[AnyProgram]):
         delta: float,
         multipliers: tuple[np.ndarray, np.ndarray] | None = None,
         radius: float = np.inf,
+        iterations: int | None = None,
     ) -> NlpResult:
         """Maximise efficiency from x.
 
@@ -128,34 +143,81 @@ class Solver(Generic[AnyProgram]):
             By default those of the equations that come closest to stationarity at x.
         radius : float
             Trust region: how far each gait parameter may move [rad]. A result on its edge is solved again from there.
+        iterations : int, optional
+            Give up after so many in each region; by default after the number in the options.
         """
-        result = self._solve_within(x, delta, multipliers, radius)
+        result = self._solve_within(x, delta, multipliers, radius, iterations)
         own = self.transcription.layout.parameters[:, 0]
         for _ in range(_REGIONS):
             if not result.optimal or np.abs(result.x[own] - x[own]).max() < radius * (1 - 1e-6):
                 return result
             x = result.x
-            result = self._solve_within(x, delta, None, radius).accumulated(result)
+            result = self._solve_within(x, delta, None, radius, iterations).accumulated(result)
         return replace(result, complementarity=np.inf, status="still moving")
 
     def _solve_within(
-        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None, radius: float
+        self,
+        x: np.ndarray,
+        delta: float,
+        multipliers: tuple[np.ndarray, np.ndarray] | None,
+        radius: float,
+        iterations: int | None,
     ) -> NlpResult:
         t = self.transcription
         own = t.layout.parameters[:, 0]
-        parameters = self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[own]))
+        worst = t.block_parameters(x[own])
+        parameters = self.oracles.parameter_vector(delta / t.speed_unit, worst)
         lower, upper = t.lower.copy(), t.upper.copy()
         lower[own], upper[own] = np.maximum(lower[own], x[own] - radius), np.minimum(upper[own], x[own] + radius)
-        bounds = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
+        solver = self._solver(iterations)
+        if self._reduced is not None:
+            return self._solve_condensed(solver, x, delta / t.speed_unit, multipliers, parameters, worst, (lower, upper))
+        limits = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
         lam_x, lam_g = multipliers or (np.zeros_like(x), self._estimated_multipliers(x, parameters))
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
         with interruptible():
-            solution = self._solver(x0=x, p=parameters, **bounds, **duals)
+            solution = solver(x0=x, p=parameters, **limits, **duals)
         seconds = time.perf_counter() - start
-        stats = self._solver.stats()
+        stats = solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
         return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
+
+    def _solve_condensed(
+        self,
+        solver: ca.Function,
+        x: np.ndarray,
+        delta: float,
+        multipliers: tuple[np.ndarray, np.ndarray] | None,
+        parameters: np.ndarray,
+        worst: list[np.ndarray],
+        bounds: tuple[np.ndarray, np.ndarray],
+    ) -> NlpResult:
+        """Solve with all equations eliminated; what comes back is measured as a point of the full program."""
+        reduced, own = self._reduced, self.transcription.layout.parameters[:, 0]
+        assert reduced is not None
+        at = reduced.condensed
+        free = np.full(at.n - own.size, np.inf)
+        limits = {"lbx": np.append(bounds[0][own], -free), "ubx": np.append(bounds[1][own], free)}
+        limits |= {"lbg": reduced.lower, "ubg": reduced.upper}
+        v = at.variables(x)
+        lam_x, lam_g = np.zeros(v.size), reduced.estimated_multipliers(v, delta)
+        if multipliers is not None:
+            lam_x[: own.size], lam_g = multipliers[0][own], multipliers[1][reduced.kept]
+        duals = {"lam_x0": lam_x, "lam_g0": lam_g}
+        start = time.perf_counter()
+        with interruptible():
+            solution = solver(x0=v, p=reduced.parameter_vector(delta, worst), **limits, **duals)
+        seconds = time.perf_counter() - start
+        stats = solver.stats()
+        v = np.array(solution["x"]).ravel()
+        x = at.lifted(v, delta)
+        lam_x = np.zeros(x.size)
+        lam_x[own] = np.array(solution["lam_x"]).ravel()[: own.size]
+        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel()
+        jacobian = _scipy(self.oracles.options["jac_g"](x, parameters)[1])
+        lam_g = reduced.multipliers(np.array(solution["lam_g"]).ravel(), gradient, jacobian)
+        return self._measured(x, lam_x, lam_g, parameters, bounds, stats, seconds)
 
     def _estimated_multipliers(self, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Multipliers of the equality rows that minimise the Lagrangian's gradient at x; zero for inequalities."""

@@ -19,10 +19,12 @@ from colloc.path_class import FreePath, Polygon
 from colloc.path_samples import fourier_through, symmetric_samples
 from colloc.schemes import scheme
 
-MAP, LIFTED = "map", "lifted"
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
+CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
+FORMULATIONS = (CONDENSED, MAP, LIFTED)
 _CHECKED_PHASES = 2000
 _SLACK = 1e-9
+_FLOOR_SLACK = 1e-6
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,8 @@ class Problem:
         Mesh intervals on the part of the period that is solved.
     scheme : str
         Collocation scheme, see `colloc.schemes.scheme`.
-    formulation : {"map", "lifted"}
-        How the balance becomes constraints, see `colloc.kernels`.
+    formulation : {"condensed", "map", "lifted"}
+        How the balance becomes constraints, see `colloc.kernels`; "condensed" eliminates them, see `colloc.condensed`.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """
@@ -89,7 +91,7 @@ class Problem:
     smallest_shape_speed: float = 0.1
     intervals: int = 30
     scheme: str = "gauss-3"
-    formulation: str = MAP
+    formulation: str = CONDENSED
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
@@ -128,8 +130,8 @@ class Problem:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
-        if self.formulation not in (MAP, LIFTED):
-            raise ProblemError(f"formulation must be {MAP!r} or {LIFTED!r}, not {self.formulation!r}.")
+        if self.formulation not in FORMULATIONS:
+            raise ProblemError(f"formulation must be one of {', '.join(FORMULATIONS)}, not {self.formulation!r}.")
         if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
         self._check_resolution()
@@ -142,8 +144,8 @@ class Problem:
             per_interval = collocation.s - collocation.left
             fewest, what = max(2, -(-4 * self.gait.harmonics // per_interval)), f"{self.gait.harmonics} harmonics"
         else:
-            if self.formulation != MAP:
-                raise ProblemError(f"the class {kind} is solved in the formulation {MAP!r} only.")
+            if self.formulation == LIFTED:
+                raise ProblemError(f"the class {kind} has no formulation {LIFTED!r}: its balance is always eliminated.")
             if collocation.left:
                 raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
             fewest, what = (2 * self.gait.pieces, "the sides") if isinstance(self.gait, Polygon) else (4, "a path")
@@ -180,7 +182,7 @@ class Problem:
             guess = self.guess
             points = symmetric_samples(guess, self.gait.symmetry)
             rms = np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.gait.fraction)
-        if rms < self.smallest_shape_speed:
+        if rms < self.smallest_shape_speed * (1 - _FLOOR_SLACK):
             raise ProblemError(
                 f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"

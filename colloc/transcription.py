@@ -26,7 +26,7 @@ from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, po
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
 from colloc.path_samples import Gait
-from colloc.problem import LIFTED, MAP, Problem
+from colloc.problem import LIFTED, Problem
 from colloc.velocity_callback import VelocityMap
 
 _SAMPLES_PER_CELL = 16
@@ -205,7 +205,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
                     gather,
                     stacked(groups, name, function.n_out * gather.shape[1]),
                     parameters,
-                    velocity_map if name == "point" and problem.formulation == MAP else None,
+                    velocity_map if name == "point" and problem.formulation != LIFTED else None,
                 )
                 for name, (function, gather, parameters) in blocks.items()
             ),

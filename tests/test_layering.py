@@ -76,6 +76,9 @@ LEVELS = {
         "infinitesimal",
         "closure",
         "solution_card",
+        "condensed",
+        "condensed_program",
+        "prediction",
     ],
     5: [
         "verify",
@@ -176,6 +179,8 @@ def test_the_numpy_side_never_loads_casadi():
         "blocks",
         "bump_callback",
         "bump_transcription",
+        "condensed",
+        "condensed_program",
         "kernels",
         "nlp",
         "path_geometry",
