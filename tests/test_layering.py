@@ -5,7 +5,18 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file"],
+    0: [
+        "arrays",
+        "errors",
+        "schemes",
+        "parallel",
+        "json_cache",
+        "spline",
+        "replaced_file",
+        "task_pool",
+        "sealed_file",
+        "file_lock",
+    ],
     1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
     2: ["balance", "problem", "damped_newton", "bump_body", "ellipses", "equivalence"],
     3: [
@@ -27,6 +38,7 @@ LEVELS = {
         "nlp",
         "solution",
         "problem_file",
+        "problem_study",
         "store",
         "refinement",
         "smooth_period",
@@ -43,6 +55,8 @@ LEVELS = {
         "bound_sampling",
         "infinitesimal",
         "closure",
+        "store_file",
+        "gait_class",
     ],
     5: [
         "verify",
@@ -79,6 +93,7 @@ LEVELS = {
         "figures_crawlers",
         "figures_paper",
     ],
+    7: ["study_cell", "study_journal", "study_run", "study_table", "store_study", "sweep_study"],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
 ONLY = {"matplotlib": "figures", "h5py": "store"}
