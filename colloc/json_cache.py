@@ -12,7 +12,6 @@ from colloc.errors import ProblemError
 from colloc.file_lock import locked
 from colloc.replaced_file import replaced_file
 
-
 _LARGEST = 2**28
 
 

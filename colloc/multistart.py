@@ -22,7 +22,6 @@ from colloc.solution import SOLVED
 from colloc.solve import BAD_PROBLEM, INTERRUPTED, Parser
 
 NONE_FOUND = 3
-_SAVE_EVERY = 5.0
 _MOST_BASINS_SHOWN = 12
 _RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 
@@ -149,18 +148,16 @@ def _run(problem: Problem, path: Path, options: argparse.Namespace, command: str
     todo = [k for k in range(options.starts) if k not in done]
     if not quiet:
         print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go\n{OUTCOME_HEADER}", flush=True)
-    begin = saved = time.perf_counter()
+    begin = time.perf_counter()
     interrupted = False
     settings = {"sampler": options.sampler, "seed": options.seed, "workers": options.workers, "time_limit": options.time_limit}
     try:
         for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
             archive.outcomes[outcome.start] = outcome
+            save_archive(archive, path)  # on the disk before it is reported
             if not quiet:
                 left = (time.perf_counter() - begin) / count * (len(todo) - count)
                 print(f"{outcome_line(outcome)}   ({count} of {len(todo)}, {left:.0f} s left)", flush=True)
-            if time.perf_counter() - saved > _SAVE_EVERY:
-                save_archive(archive, path)
-                saved = time.perf_counter()
     except KeyboardInterrupt:
         interrupted = True
     save_archive(archive, path)

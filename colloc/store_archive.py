@@ -20,6 +20,7 @@ import numpy as np
 
 from colloc.basins import Outcome, basins
 from colloc.errors import StoreError
+from colloc.file_lock import locked
 from colloc.gait import Fourier
 from colloc.problem import Problem
 from colloc.solution import versions
@@ -56,14 +57,22 @@ class Archive:
 def save_archive(archive: Archive, path: str | os.PathLike[str]) -> Path:
     """Write an archive; an existing file is replaced only once the new one is complete.
 
+    Writers wait for each other, and starts that another run of the same search has added to the file are kept and added to
+    `archive`.
+
     Raises
     ------
     StoreError
-        If the folder cannot be made or written.
+        If the folder cannot be made or written, or the file there is damaged.
     """
     path = Path(path)
-    with new_file(path) as file:
-        _write(file, archive)
+    with locked(path.with_name(f".{path.name}.lock"), wait=True):
+        if path.exists():
+            there = load_archive(path)
+            if (there.problem.hash, there.sampler, there.seed) == (archive.problem.hash, archive.sampler, archive.seed):
+                archive.outcomes = there.outcomes | archive.outcomes
+        with new_file(path) as file:
+            _write(file, archive)
     return path
 
 

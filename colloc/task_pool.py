@@ -114,7 +114,7 @@ def completed(
             alone = bool(suspects)
             pool = executor(1 if alone else workers)
             pending: dict[Future, Task] = {}
-            submitted = False
+            submitted, listened = False, True
             try:
                 while True:
                     while len(pending) < (1 if alone else workers + ahead):
@@ -146,6 +146,7 @@ def completed(
                             suspects.append(task)
             except BrokenExecutor:
                 if not submitted:
+                    listened = False
                     raise
                 if alone:
                     for task in pending.values():
@@ -153,10 +154,10 @@ def completed(
                 else:
                     suspects += pending.values()
             except BaseException:
-                # interrupted, or nobody listens any more: do not wait for what is under way
-                _cancelled(pending)
-                pool.shutdown(wait=False)
+                listened = False
                 raise
             finally:
-                _cancelled(pending)
-                pool.shutdown(wait=True)
+                # interrupted, or nobody listens any more: do not wait for what is under way
+                for future in pending:
+                    future.cancel()
+                pool.shutdown(wait=listened)
