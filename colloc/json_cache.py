@@ -26,7 +26,7 @@ def load_entries(cache: str | os.PathLike) -> dict[str, dict[str, Any]]:
     Raises
     ------
     ProblemError
-        If the file is no JSON dictionary.
+        If the file is no JSON dictionary, too large, or damaged.
     """
     path = Path(cache)
     if not path.exists():
@@ -34,8 +34,13 @@ def load_entries(cache: str | os.PathLike) -> dict[str, dict[str, Any]]:
     try:
         if path.stat().st_size > _LARGEST:
             raise ValueError("it is too large")
-        return dict(json.loads(path.read_text()))
-    except (OSError, ValueError, TypeError, RecursionError) as error:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if set(found) != {"sha256", "entries"}:
+            return dict(found)  # as written before there were checksums
+        if hash_of(found["entries"]) != found["sha256"]:
+            raise ValueError("its checksum does not fit")
+        return found["entries"]
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
         raise ProblemError(f"the cache {path} cannot be read ({error}); delete it or name another.") from None
 
 
@@ -52,4 +57,5 @@ def save_entry(cache: str | os.PathLike, key: str, entry: dict[str, Any]) -> Non
         entries = load_entries(path)
         entries[key] = entry
         with replaced_file(path) as temporary:
-            Path(temporary).write_text(json.dumps(entries))
+            text = json.dumps({"sha256": hash_of(entries), "entries": entries})
+            Path(temporary).write_text(text, encoding="utf-8")

@@ -38,6 +38,13 @@ def seal(path: str | os.PathLike[str]) -> None:
         file.write(MAGIC + digest)
 
 
+def write_sealed(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a whole file with its seal."""
+    with open(path, "wb") as file:
+        file.write(content)
+        file.write(MAGIC + hashlib.sha256(content).digest())
+
+
 def check_seal(path: Path, largest: int, kind: str) -> None:
     """Refuse a file that is missing, too large, or not as colloc left it; `kind` is for the message, "colloc solution".
 

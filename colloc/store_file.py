@@ -18,30 +18,31 @@ import numpy as np
 
 from colloc.errors import CollocError, StoreError
 from colloc.replaced_file import replaced_file
-from colloc.sealed_file import check_seal, seal
+from colloc.sealed_file import check_seal, write_sealed
 
 LARGEST_FILE = 2**28
 LARGEST_ARRAY = 2**27
-"""Bytes of a file, and of one array when it is in memory."""
+LONGEST_TEXT = 2**20
+"""Bytes of a file, of one array when it is in memory, and of one text, such as the description of a problem."""
 
 
 @contextlib.contextmanager
 def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     """An HDF5 file to write; it takes its place, sealed, only if the block ends well.
 
+    It is made in memory: where the disk is full, HDF5 closing a file on it can end the process (a segmentation fault).
+
     Raises
     ------
     StoreError
         If the folder or the file cannot be written.
     """
-    path = Path(path)
-    with replaced_file(path) as temporary:
-        try:
-            with h5py.File(temporary, "w") as file:
-                yield file
-        except RuntimeError as error:  # what h5py makes of a full disk when it closes a file
-            raise OSError(str(error)) from None
-        seal(temporary)
+    with h5py.File("in memory", "w", driver="core", backing_store=False, block_size=2**20) as file:
+        yield file
+        file.flush()
+        image = file.id.get_file_image()
+    with replaced_file(Path(path)) as temporary:
+        write_sealed(temporary, image)
 
 
 @contextlib.contextmanager
@@ -103,6 +104,8 @@ def text(group: h5py.Group, name: str) -> str:
     found = array(group, name)
     if not isinstance(found, str):
         raise StoreError(f"{name} is not a text.")
+    if len(found) > LONGEST_TEXT:
+        raise StoreError(f"{name} is too long: {len(found)} characters, where {LONGEST_TEXT} are allowed.")
     return found
 
 
