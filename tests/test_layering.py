@@ -92,6 +92,7 @@ LEVELS = {
         "figures_maps",
         "figures_crawlers",
         "figures_paper",
+        "figures_studies",
     ],
     7: ["study_cell", "study_journal", "study_run", "study_table", "store_study", "sweep_study"],
 }
