@@ -20,7 +20,7 @@ from colloc.gait import Fourier
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
 _SAME, _STANDING = 0.02, 0.05
 """Relative distance of a gait to its image that counts as symmetric; |wave| below which it counts as standing."""
-_INSTANTS = 400
+_INSTANTS = 200
 _DELTA = 1e-3
 
 

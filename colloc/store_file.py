@@ -37,11 +37,11 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     StoreError
         If the folder or the file cannot be written.
     """
-    with h5py.File("in memory", "w", driver="core", backing_store=False, block_size=2**20) as file:
-        yield file
-        file.flush()
-        image = file.id.get_file_image()
     with replaced_file(Path(path)) as temporary:
+        with h5py.File("in memory", "w", driver="core", backing_store=False, block_size=2**20) as file:
+            yield file
+            file.flush()
+            image = file.id.get_file_image()
         write_sealed(temporary, image)
 
 

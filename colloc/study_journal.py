@@ -56,7 +56,7 @@ def _attempt_fields(attempt: Attempt) -> dict[str, Any]:
 
 
 def _attempt_in(entry: dict[str, Any]) -> Attempt:
-    numbers = {name: math.nan if entry[name] is None else entry[name] for name in _NUMBERS}
+    numbers: dict[str, Any] = {name: math.nan if entry[name] is None else entry[name] for name in _NUMBERS}
     if not all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers.values()):
         raise ValueError("not numbers")
     origin, key, status, message = texts = [entry[name] for name in ("origin", "key", "status", "message")]

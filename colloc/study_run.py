@@ -127,7 +127,7 @@ class StudyRun:
 
     def _improvable(self) -> list[tuple[Index, ...]]:
         """Cells around which there is a gait of another family, or any gait if they have none."""
-        found = []
+        found: list[tuple[Index, ...]] = []
         best = {cell: state.best for cell, state in self.cells.items()}
         for cell, state in self.cells.items():
             problem, own = state.problem, best[cell]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -93,12 +94,12 @@ def _coordinate(values: tuple) -> np.ndarray:
     return np.array(values, dtype=object if isinstance(values[0], str) else float)
 
 
-def _cell(state: CellState, known_bound: KnownBound) -> dict[str, object]:
+def _cell(state: CellState, known_bound: KnownBound) -> dict[str, Any]:
     problem = state.problem
     if problem is None:
         return {"status": NO_PROBLEM, "message": state.message}
     outcomes = [a.outcome for a in state.attempts]
-    row: dict[str, object] = {"problem_hash": problem.hash, "starts": len(outcomes), "status": NOT_TRIED}
+    row: dict[str, Any] = {"problem_hash": problem.hash, "starts": len(outcomes), "status": NOT_TRIED}
     row["starts_certified"] = sum(o.status == SOLVED for o in outcomes)
     row["seconds"] = sum(o.seconds for o in outcomes)
     row["trivial_bound"] = 1.0 / problem.friction.smallest
@@ -112,9 +113,9 @@ def _cell(state: CellState, known_bound: KnownBound) -> dict[str, object]:
     return row
 
 
-def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, object]:
+def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     gait = outcome.gait
-    row: dict[str, object] = {name: getattr(outcome, name) for name in _NUMBERS}
+    row: dict[str, Any] = {name: getattr(outcome, name) for name in _NUMBERS}
     row |= {"mean": gait.mean, "cos": gait.cos, "sin": gait.sin}
     row["at_slowest"] = int(shape_speed(gait) < _AT_SLOWEST * problem.smallest_shape_speed)
     if problem.body.n_joint > 1:
