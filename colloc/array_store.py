@@ -13,7 +13,11 @@ import numpy as np
 
 import colloc
 from colloc.errors import StoreError
-from colloc.replaced_file import replaced_file
+from colloc.store_file import array, mark, new_file, sealed_file
+
+KIND, VERSION = "colloc arrays", 1
+_LARGEST = 2**31
+"""Bytes of a file, and of an array: velocity maps are large."""
 
 
 def write_arrays(
@@ -47,7 +51,8 @@ def write_arrays(
         "conventions": (colloc.__doc__ or "").strip(),
         **(attributes or {}),
     }
-    with replaced_file(path) as name, h5py.File(name, "w") as file:
+    with new_file(path) as file:
+        mark(file, KIND, VERSION)
         for key, value in arrays.items():
             value = np.asarray(value)
             plain = value.astype(h5py.string_dtype()) if value.dtype.kind in "US" else value
@@ -63,26 +68,23 @@ def read_arrays(path: Path) -> dict[str, Any]:
     Raises
     ------
     StoreError
-        If the file is missing, damaged or not HDF5.
+        If the file is missing, damaged or not of this kind.
     """
-    arrays: dict[str, Any] = {}
+    names: list[str] = []
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset):
-            arrays[name] = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
+            names.append(name)
 
-    try:
-        with h5py.File(path, "r") as file:
-            file.visititems(visit)
-    except OSError as error:
-        raise StoreError(f"cannot read {path}: {error}; make it again with the command that wrote it.") from None
-    return arrays
+    with sealed_file(path, KIND, VERSION, largest=_LARGEST) as file:
+        file.visititems(visit)
+        return {name: array(file, name, largest=_LARGEST) for name in names}
 
 
 def read_attribute(path: Path, name: str) -> Any:
-    """One attribute of the file, or None if the file or the attribute is missing."""
+    """One attribute of the file, or None if the file or the attribute is missing, or the file is damaged."""
     try:
-        with h5py.File(path, "r") as file:
+        with sealed_file(path, KIND, VERSION, largest=_LARGEST) as file:
             return file.attrs.get(name)
-    except OSError:
+    except StoreError:
         return None

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
-import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Executor
 from dataclasses import replace
 
 from colloc.basins import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
@@ -17,9 +14,7 @@ from colloc.path_samples import fourier_through
 from colloc.problem import Problem
 from colloc.sampling import LATIN_HYPERCUBE, seed_class, start_gait
 from colloc.solution import Certificate, Level, Solution
-
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-
+from colloc.task_pool import Lost, Task, completed, process_pool
 
 ARCHIVED_HARMONICS = 16
 """Free paths and polygons are archived and told apart by their Fourier series in arc length."""
@@ -36,6 +31,11 @@ def run_start(
 
     The time limit [s] is checked between the levels of the continuation. A `known` gait takes the place of the sample.
     """
+    return run_guess(problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit)
+
+
+def run_guess(problem: Problem, start_from: Callable[[], Fourier], start: int, time_limit: float) -> Outcome:
+    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`; raises nothing."""
     begin, cpu = time.perf_counter(), time.process_time()
     guess = fourier_through(problem.guess, seed_class(problem))
     reached: list[Level] = []
@@ -47,7 +47,7 @@ def run_start(
             raise _TimeLimit
 
     try:
-        guess = known or start_gait(problem, sampler, seed, start)
+        guess = start_from()
         outcome = Outcome(start, ERROR, "", guess, guess)
         solution = maximise_efficiency(problem.with_(guess=guess), watch)
         outcome = _outcome(start, guess, solution)
@@ -76,26 +76,6 @@ def _outcome(start: int, guess: Fourier, solution: Solution) -> Outcome:
     if solution.certificate is not None:
         outcome = replace(outcome, efficiency_error=solution.certificate.efficiency_error)
     return outcome
-
-
-@contextlib.contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Processes started inside use one BLAS thread each; the environment is put back afterwards."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def process_pool(workers: int) -> Executor:
-    """Fresh processes: they inherit no state, and their number of BLAS threads is settled before NumPy is loaded."""
-    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
 
 
 def run_starts(
@@ -129,37 +109,14 @@ def run_starts(
     known : mapping of int to Fourier, optional
         Gaits from which starts of these numbers begin instead of a sample: results of an earlier run to go on from.
     """
-    waiting = list(starts)[::-1]
-    suspects: list[int] = []
-    with one_thread_each():
-        while waiting or suspects:
-            alone = bool(suspects)
-            queue = suspects if alone else waiting
-            pool = executor(1 if alone else workers)
-            pending: dict[Future[Outcome], int] = {}
-            submitted = False
-            try:
-                while queue or pending:
-                    while queue and len(pending) < (1 if alone else workers):
-                        start = queue[-1]
-                        pending[pool.submit(run_start, problem, sampler, seed, start, time_limit, (known or {}).get(start))] = (
-                            start
-                        )
-                        queue.pop()
-                        submitted = True
-                    for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                        outcome = future.result()
-                        del pending[future]
-                        yield outcome
-            except BrokenExecutor:
-                if not submitted:
-                    raise
-                if alone:
-                    text = "its worker process died twice (killed, or out of memory)."
-                    for start in pending.values():
-                        guess = fourier_through(problem.guess, seed_class(problem))
-                        yield Outcome(start, CRASHED, text, guess, guess)
-                else:
-                    suspects = list(pending.values())
-            finally:
-                pool.shutdown(wait=True, cancel_futures=True)
+    waiting = iter(starts)
+
+    def ready() -> Task | None:
+        start = next(waiting, None)
+        return None if start is None else Task(start, (problem, sampler, seed, start, time_limit, (known or {}).get(start)))
+
+    for task, outcome in completed(run_start, ready, workers=workers, executor=executor):
+        if isinstance(outcome, Lost):
+            guess = fourier_through(problem.guess, seed_class(problem))
+            outcome = Outcome(task.arguments[3], CRASHED, outcome.message, guess, guess)
+        yield outcome

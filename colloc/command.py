@@ -12,6 +12,7 @@ from colloc.command_options import BAD_PROBLEM, OK
 SUBCOMMANDS = {
     "solve": ("colloc.solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
     "multistart": ("colloc.multistart", "solve a problem from many random starts; distinct optima with their frequencies"),
+    "sweep": ("colloc.sweep_study", "solve a study: a grid of problems, over processes or a cluster; resumable"),
     "verify": ("colloc.recheck", "check a result again by independent replay, without CasADi"),
     "compare": ("colloc.compare", "hold two results against each other"),
     "report": ("colloc.report", "one self-contained web page about a result, to read or to send"),

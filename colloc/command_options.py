@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from colloc.errors import CollocError, ProblemError
-from colloc.problem import Problem
+from colloc.problem import FORMULATIONS, Problem
 
 OK, BAD_PROBLEM, NONE_FOUND, FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 
@@ -39,7 +39,7 @@ def add_problem(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mesh", dest="intervals", type=int, metavar="N", help="intervals of the first mesh")
     parser.add_argument("--mesh-tolerance", type=float, metavar="TOL", help="relative efficiency error to refine to; 0: never")
     parser.add_argument("--scheme", metavar="NAME", help="trapezoid, hermite-simpson, gauss-N or radau-N")
-    parser.add_argument("--formulation", choices=("map", "lifted"), help="how the balance becomes constraints")
+    parser.add_argument("--formulation", choices=FORMULATIONS, help="how the balance becomes constraints")
 
 
 _CHANGES = ("delta", "delta_start", "intervals", "mesh_tolerance", "scheme", "formulation")

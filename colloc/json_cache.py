@@ -9,6 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from colloc.errors import ProblemError
+from colloc.file_lock import locked
+from colloc.replaced_file import replaced_file
+
+_LARGEST = 2**28
 
 
 def hash_of(fields: dict[str, Any]) -> str:
@@ -22,23 +26,36 @@ def load_entries(cache: str | os.PathLike) -> dict[str, dict[str, Any]]:
     Raises
     ------
     ProblemError
-        If the file is no JSON dictionary.
+        If the file is no JSON dictionary, too large, or damaged.
     """
     path = Path(cache)
     if not path.exists():
         return {}
     try:
-        return dict(json.loads(path.read_text()))
-    except (OSError, ValueError, TypeError) as error:
+        if path.stat().st_size > _LARGEST:
+            raise ValueError("it is too large")
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if set(found) != {"sha256", "entries"}:
+            return dict(found)  # as written before there were checksums
+        if hash_of(found["entries"]) != found["sha256"]:
+            raise ValueError("its checksum does not fit")
+        return found["entries"]
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
         raise ProblemError(f"the cache {path} cannot be read ({error}); delete it or name another.") from None
 
 
 def save_entry(cache: str | os.PathLike, key: str, entry: dict[str, Any]) -> None:
-    """Add an entry to a cache file, which is replaced in one step."""
+    """Add an entry to a cache file, which is replaced in one step; writers wait for each other, and none loses an entry.
+
+    Raises
+    ------
+    StoreError
+        If the file or its lock cannot be written.
+    """
     path = Path(cache)
-    entries = load_entries(path)
-    entries[key] = entry
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(json.dumps(entries))
-    temporary.replace(path)
+    with locked(path.with_name(f".{path.name}.lock"), wait=True):
+        entries = load_entries(path)
+        entries[key] = entry
+        with replaced_file(path) as temporary:
+            text = json.dumps({"sha256": hash_of(entries), "entries": entries})
+            Path(temporary).write_text(text, encoding="utf-8")

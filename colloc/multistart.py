@@ -31,7 +31,6 @@ from colloc.progress import StatusLine
 from colloc.sampling import LATIN_HYPERCUBE, SAMPLERS
 from colloc.solution import SOLVED
 
-_SAVE_EVERY = 5.0
 _MOST_BASINS_SHOWN = 12
 _RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 
@@ -142,7 +141,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
         print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go", flush=True)
     if table:
         print(OUTCOME_HEADER, flush=True)
-    begin = saved = time.perf_counter()
+    begin = time.perf_counter()
     interrupted = False
     settings = {"sampler": options.sampler, "seed": options.seed, "workers": options.workers, "time_limit": options.time_limit}
     try:
@@ -150,14 +149,12 @@ def _run(options: argparse.Namespace, command: str) -> int:
             line.say(f"{problem.name}: 0 of {len(todo)} starts")
             for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
                 archive.outcomes[outcome.start] = outcome
+                save_archive(archive, path)  # on the disk before it is reported
                 if table:
                     line.clear()
                     print(outcome_line(outcome), flush=True)
                 left = (time.perf_counter() - begin) / count * (len(todo) - count)
                 line.say(f"{problem.name}: {count} of {len(todo)} starts", left)
-                if time.perf_counter() - saved > _SAVE_EVERY:
-                    save_archive(archive, path)
-                    saved = time.perf_counter()
     except KeyboardInterrupt:
         interrupted = True
     save_archive(archive, path)

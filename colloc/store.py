@@ -20,14 +20,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.errors import CollocError, StoreError
+from colloc.errors import StoreError
 from colloc.gait_fields import fields
 from colloc.problem import Problem
-from colloc.replaced_file import replaced_file
 from colloc.solution import Certificate, Check, Level, Solution
+from colloc.store_file import array, child, mark, new_file, plain, sealed_file, text
 
 FORMAT, FORMAT_VERSION = "colloc solution", 2
-_LARGEST_FILE = 2**31
 _MOTION_SAMPLES = 401
 _LEVEL_ARRAYS = {"edges": "period", "x": "see colloc.layout", "lam_x": "see colloc.layout", "lam_g": "see colloc.layout"}
 
@@ -52,7 +51,7 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
         If the folder cannot be made or written.
     """
     path = Path(path)
-    with replaced_file(path) as temporary, h5py.File(temporary, "w") as file:
+    with new_file(path) as file:
         _write(file, solution)
     return path
 
@@ -65,25 +64,8 @@ def load(path: str | os.PathLike[str]) -> Solution:
     StoreError
         If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise StoreError(f"there is no file {path}.")
-    if path.stat().st_size > _LARGEST_FILE:
-        raise StoreError(f"{path} is too large for a colloc solution.")
-    try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT:
-                raise StoreError(f"{path} is an HDF5 file, but not a colloc solution.")
-            if int(file.attrs["format_version"]) > FORMAT_VERSION:
-                raise StoreError(f"{path} was written by a newer colloc; update colloc to read it.")
-            return _read(file)
-    except StoreError:
-        raise
-    except CollocError as error:
-        raise StoreError(f"{path} is damaged: {error}") from None
-    except Exception as error:
-        # h5py raises many kinds for a damaged file
-        raise StoreError(f"{path} is not a readable colloc solution ({type(error).__name__}: {error}).") from None
+    with sealed_file(path, FORMAT, FORMAT_VERSION) as file:
+        return _read(file)
 
 
 def _dataset(group: h5py.Group, name: str, value: np.ndarray, units: str, dims: str) -> None:
@@ -92,7 +74,7 @@ def _dataset(group: h5py.Group, name: str, value: np.ndarray, units: str, dims: 
 
 
 def _write(file: h5py.File, solution: Solution) -> None:
-    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    mark(file, FORMAT, FORMAT_VERSION)
     file.attrs["name"], file.attrs["problem_hash"] = solution.problem.name, solution.problem.hash
     file.attrs["status"], file.attrs["message"], file.attrs["seconds"] = solution.status, solution.message, solution.seconds
     file["problem"] = json.dumps(solution.problem.to_dict())
@@ -143,42 +125,34 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
     group["passed"] = [check.passed for check in checks]
 
 
-def _text(dataset: h5py.Dataset) -> str:
-    return dataset.asstr()[()]
-
-
 def _read(file: h5py.File) -> Solution:
-    problem = Problem.from_dict(json.loads(_text(file["problem"])))
+    problem = Problem.from_dict(json.loads(text(file, "problem")))
     if problem.hash != file.attrs["problem_hash"]:
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
     levels = []
-    for name in sorted(file["levels"]) if "levels" in file else []:
-        group = file["levels"][name]
-        arrays = {key: group[key][()] for key in _LEVEL_ARRAYS}
+    found = child(file, "levels") if "levels" in file else ()
+    for name in sorted(found):
+        group = child(found, name)
+        arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
         # files of format version 1 may lack later fields, which have defaults
         rest = {f.name: group.attrs[f.name] for f in dataclasses.fields(Level) if f.name in group.attrs}
-        level = Level(**arrays, **{key: _plain(value) for key, value in rest.items()})
-        levels.append(level)
+        levels.append(Level(**arrays, **{key: plain(value) for key, value in rest.items()}))
     certificate = None
     if "certificate" in file:
-        group = file["certificate"]
-        columns = (group["name"].asstr()[()], group["value"][()], group["threshold"][()], group["meaning"].asstr()[()])
+        group = child(file, "certificate")
+        columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
         checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-        rest = {f.name: _plain(group.attrs[f.name]) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+        rest = {f.name: plain(group.attrs[f.name]) for f in dataclasses.fields(Certificate) if f.name != "checks"}
         certificate = Certificate(checks, **rest)
     solution = Solution(
         problem,
         levels,
         certificate,
         float(file.attrs["seconds"]),
-        _text(file["source"]),
+        text(file, "source"),
         str(file.attrs["message"]),
-        json.loads(_text(file["versions"])),
+        json.loads(text(file, "versions")),
     )
     if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
         raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     return solution
-
-
-def _plain(value):
-    return value.item() if isinstance(value, np.generic) else value

@@ -20,10 +20,11 @@ import numpy as np
 
 from colloc.basins import Outcome, basins
 from colloc.errors import StoreError
+from colloc.file_lock import locked
 from colloc.gait import Fourier
 from colloc.problem import Problem
-from colloc.replaced_file import replaced_file
 from colloc.solution import versions
+from colloc.store_file import array, child, mark, new_file, sealed_file, text
 
 FORMAT, FORMAT_VERSION = "colloc archive", 1
 _NUMBERS = {
@@ -56,14 +57,22 @@ class Archive:
 def save_archive(archive: Archive, path: str | os.PathLike[str]) -> Path:
     """Write an archive; an existing file is replaced only once the new one is complete.
 
+    Writers wait for each other, and starts that another run of the same search has added to the file are kept and added to
+    `archive`.
+
     Raises
     ------
     StoreError
-        If the folder cannot be made or written.
+        If the folder cannot be made or written, or the file there is damaged.
     """
     path = Path(path)
-    with replaced_file(path) as temporary, h5py.File(temporary, "w") as file:
-        _write(file, archive)
+    with locked(path.with_name(f".{path.name}.lock"), wait=True):
+        if path.exists():
+            there = load_archive(path)
+            if (there.problem.hash, there.sampler, there.seed) == (archive.problem.hash, archive.sampler, archive.seed):
+                archive.outcomes = there.outcomes | archive.outcomes
+        with new_file(path) as file:
+            _write(file, archive)
     return path
 
 
@@ -75,21 +84,8 @@ def load_archive(path: str | os.PathLike[str]) -> Archive:
     StoreError
         If the file is missing, damaged, or not a colloc archive.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise StoreError(f"there is no file {path}.")
-    try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT:
-                raise StoreError(f"{path} is an HDF5 file, but not a colloc archive.")
-            if int(file.attrs["format_version"]) > FORMAT_VERSION:
-                raise StoreError(f"{path} was written by a newer colloc; update colloc to read it.")
-            return _read(file)
-    except StoreError:
-        raise
-    except Exception as error:
-        # h5py raises many kinds for a damaged file
-        raise StoreError(f"{path} is not a readable colloc archive ({type(error).__name__}: {error}).") from None
+    with sealed_file(path, FORMAT, FORMAT_VERSION) as file:
+        return _read(file)
 
 
 def _dataset(group: h5py.Group, name: str, value: list, units: str, dims: str = "start") -> None:
@@ -99,7 +95,7 @@ def _dataset(group: h5py.Group, name: str, value: list, units: str, dims: str = 
 
 
 def _write(file: h5py.File, archive: Archive) -> None:
-    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    mark(file, FORMAT, FORMAT_VERSION)
     file.attrs["name"], file.attrs["problem_hash"] = archive.problem.name, archive.problem.hash
     file.attrs["sampler"], file.attrs["seed"], file.attrs["command"] = archive.sampler, archive.seed, archive.command
     file["problem"] = json.dumps(archive.problem.to_dict())
@@ -124,17 +120,17 @@ def _write(file: h5py.File, archive: Archive) -> None:
 
 
 def _read(file: h5py.File) -> Archive:
-    problem = Problem.from_dict(json.loads(file["problem"].asstr()[()]))
+    problem = Problem.from_dict(json.loads(text(file, "problem")))
     if problem.hash != file.attrs["problem_hash"]:
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
     archive = Archive(problem, str(file.attrs["sampler"]), int(file.attrs["seed"]), str(file.attrs["command"]))
-    group = file["outcomes"]
-    starts = group["start"][()]
+    group = child(file, "outcomes")
+    starts = array(group, "start")
     if not starts.size:
         return archive
-    status, message = group["status"].asstr()[()], group["message"].asstr()[()]
-    numbers = {name: group[name][()] for name in _NUMBERS}
-    gaits = {name: [group[name][part][()] for part in ("mean", "cos", "sin")] for name in ("guess", "gait")}
+    status, message = array(group, "status"), array(group, "message")
+    numbers = {name: array(group, name) for name in _NUMBERS}
+    gaits = {name: [array(child(group, name), part) for part in ("mean", "cos", "sin")] for name in ("guess", "gait")}
     for row, start in enumerate(starts):
         guess, gait = (Fourier(*(part[row] for part in gaits[name])) for name in ("guess", "gait"))
         values = {name: column[row].item() for name, column in numbers.items()}

@@ -17,6 +17,9 @@ LEVELS = {
         "markup",
         "progress",
         "interruption",
+        "task_pool",
+        "sealed_file",
+        "file_lock",
     ],
     1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: [
@@ -79,6 +82,9 @@ LEVELS = {
         "condensed",
         "condensed_program",
         "prediction",
+        "problem_study",
+        "store_file",
+        "gait_class",
     ],
     5: [
         "verify",
@@ -129,7 +135,9 @@ LEVELS = {
         "figures_publication",
         "figures_animation",
         "animate",
+        "figures_studies",
     ],
+    7: ["study_cell", "study_journal", "study_run", "study_table", "store_study", "sweep_study"],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
 ONLY = {"matplotlib": "figures", "h5py": "store"}

@@ -171,7 +171,7 @@ def test_an_archive_comes_back_as_it_was_written(tmp_path):
     for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
         assert getattr(back.outcomes[4], name) == getattr(archive.outcomes[4], name)
     np.testing.assert_array_equal(back.outcomes[1].gait.sin, GAIT.sin)
-    assert [p.name for p in (tmp_path / "sub").iterdir()] == ["a.h5"]
+    assert [p.name for p in (tmp_path / "sub").glob("[!.]*")] == ["a.h5"]
     (tmp_path / "bad.h5").write_bytes(b"not HDF5")
     for name in ("bad.h5", "missing.h5"):
         with pytest.raises(StoreError):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from colloc.errors import StoreError
+from colloc.sealed_file import seal
 from colloc.store import load, save
 
 
@@ -52,6 +53,9 @@ def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
         load(tmp_path / "text.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = [1.0]
+    with pytest.raises(StoreError, match="carries no checksum"):
+        load(tmp_path / "other.h5")
+    seal(tmp_path / "other.h5")
     with pytest.raises(StoreError, match="not a colloc solution"):
         load(tmp_path / "other.h5")
     good = save(three_link, tmp_path / "good.h5")

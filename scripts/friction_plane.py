@@ -1,0 +1,100 @@
+"""Figure and table of the friction plane: python -m scripts.friction_plane [--results FOLDER] [--bounds N] [--output FOLDER]
+
+Reads what ``python -m colloc.sweep_study studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
+over the classes searched, and writes friction_plane.png, .pdf and .md. With ``--bounds N`` an upper bound for every gait of
+the body is computed first on a subset of N x N points (sampled, with a small spline basis: see docs/bound.md), kept in
+FOLDER/bounds.json; nothing is interpolated between them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from colloc.body import Chain
+from colloc.bound import Budget, efficiency_bound, known_bound
+from colloc.figures_studies import friction_plane_figure
+from colloc.figures_style import save
+from colloc.friction import Friction
+from colloc.store_study import StudyFile, load_study
+from colloc.study_table import best_over
+
+SMALL_BASIS = Budget(intervals=(4,), shapes=20, directions=20, refinements=1, linear_rounds=6)
+COMMAND = "python -m colloc.sweep_study studies/friction_plane.py && python -m scripts.friction_plane"
+
+
+def bounds(mu_t: np.ndarray, mu_b: np.ndarray, count: int, cache: Path) -> np.ndarray:
+    """Upper bounds on a count x count subset, (n, m), NaN elsewhere; those in the cache are always used."""
+    found = np.full((mu_t.size, mu_b.size), np.nan)
+    rows, columns = (set(np.unique(np.linspace(0, v.size - 1, count).round().astype(int))) for v in (mu_t, mu_b))
+    for i, t in enumerate(mu_t):
+        for j, b in enumerate(mu_b):
+            law = Friction(float(t), 1.0, float(b))
+            if count and i in rows and j in columns:
+                bound = efficiency_bound(Chain(), law, budget=SMALL_BASIS, cache=cache)
+                print(f"bound at mu_t {t:.3f}, mu_b {b:.3f}: {bound.sampled:.4f} ({bound.seconds:.0f} s)", flush=True)
+            else:
+                bound = known_bound(Chain(), law, budget=SMALL_BASIS, cache=cache) if cache.exists() else None
+            if bound is not None:
+                found[i, j] = bound.sampled
+    return found
+
+
+def winners(study: StudyFile) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Largest efficiency over the classes searched, and the winner's other variables."""
+    axis = study.dimensions["efficiency"].index("symmetry")
+    efficiency, where = best_over(study.variables["efficiency"], axis)
+    index = np.expand_dims(where, axis)
+    names = ("gait_class", "at_slowest", "winding", "wave", "forward", "retraced")
+    rest = {name: np.take_along_axis(study.variables[name], index, axis).squeeze(axis) for name in names}
+    return efficiency, rest
+
+
+def table(mu_t: np.ndarray, mu_b: np.ndarray, efficiency: np.ndarray, rest: dict, bound: np.ndarray) -> list[str]:
+    """Markdown for people: counts, then a row for each of some points."""
+    kinds = Counter(np.where(np.isfinite(efficiency), rest["gait_class"], "no certified gait").ravel())
+    lines = ["# The friction plane of the three-link crawler", "", f"Written by `{COMMAND}`."]
+    lines += ["One harmonic, delta = 1e-3, mu_f = 1. Every efficiency is certified by an independent replay.", ""]
+    lines += [f"{efficiency.size} points, {int(np.isfinite(efficiency).sum())} with a certified gait.", ""]
+    lines += ["| kind and symmetry of the best gait | points |", "|---|---|"]
+    lines += [f"| {name} | {n} |" for name, n in kinds.most_common()]
+    lines += [
+        "",
+        "| mu_t/mu_f | mu_b/mu_f | efficiency | kind, symmetry | winding | small strokes | 1/min(mu) | bound, sampled |",
+    ]
+    lines += ["|---|---|---|---|---|---|---|---|"]
+    for i in range(0, mu_t.size, 2):
+        for j in range(0, mu_b.size, 7):
+            limit = 1.0 / min(1.0, mu_t[i], mu_b[j])
+            sampled = f"{bound[i, j]:.4f}" if np.isfinite(bound[i, j]) else ""
+            lines.append(
+                f"| {mu_t[i]:.3f} | {mu_b[j]:.3f} | {efficiency[i, j]:.4f} | {rest['gait_class'][i, j]} "
+                f"| {rest['winding'][i, j]} | {'yes' if rest['at_slowest'][i, j] else ''} | {limit:.3f} | {sampled} |"
+            )
+    return lines
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Figure and table of the friction plane; see the top of this file.")
+    parser.add_argument("--results", type=Path, default=Path("results"))
+    parser.add_argument("--output", type=Path, help="folder (default: the same)")
+    parser.add_argument("--bounds", type=int, default=0, metavar="N")
+    options = parser.parse_args()
+    study = load_study(options.results / "friction_plane.nc")
+    mu_t, mu_b = study.coordinates["mu_t"], study.coordinates["mu_b"]
+    efficiency, rest = winners(study)
+    bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.json")
+    parts = [text.split(", ") if text else ("", "") for text in rest["gait_class"].ravel()]
+    kind, symmetry = (np.array([p[k].split(" ")[0] for p in parts]).reshape(efficiency.shape) for k in (0, 1))
+    figure = friction_plane_figure(mu_t, mu_b, efficiency, kind, symmetry, rest["at_slowest"].astype(bool), bound)
+    folder = options.output or options.results
+    print(*save(figure, folder, "friction_plane"), sep="\n")
+    text = "\n".join(table(mu_t, mu_b, efficiency, rest, bound)) + "\n"
+    (folder / "friction_plane.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

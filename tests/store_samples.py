@@ -1,0 +1,107 @@
+"""A small file of every kind that colloc writes, with its reader and a writer; for tests of faults and of damage."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from colloc.array_store import read_arrays, write_arrays
+from colloc.basins import Outcome
+from colloc.gait import Fourier, Harmonic, ellipse
+from colloc.json_cache import load_entries, save_entry
+from colloc.problem import Problem
+from colloc.problem_study import Axis, Study
+from colloc.store import load, save
+from colloc.store_archive import Archive, load_archive, save_archive
+from colloc.store_study import load_study, save_study
+from colloc.study_cell import Attempt
+from colloc.study_journal import Journal, Record, read_journal
+from colloc.study_run import StudyRun
+from colloc.study_table import study_table
+
+GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
+KINDS = ("solution", "archive", "arrays", "study", "journal", "cache")
+
+
+def problem(x=1.0):
+    fields = {"gait": Harmonic(2, "none"), "intervals": 10, "mesh_tolerance": 0.0}
+    return Problem("sample", ellipse(0.2, 1.2, 0.8), **fields, smallest_shape_speed=0.1 + 1e-6 * x)
+
+
+def outcome(start, efficiency=0.2):
+    return Outcome(start, "solved", "", GAIT, GAIT, efficiency, 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25)
+
+
+def archive(starts=range(3)):
+    return Archive(problem(), "latin-hypercube", 0, "command", {k: outcome(k) for k in starts})
+
+
+def record(k=0):
+    return Record(problem(1.0 + 0.01 * k).hash, (Attempt("warm", f"key{k}", outcome(k)),))
+
+
+def append(folder: Path, records):
+    with Journal(folder) as journal:
+        for one in records:
+            journal.append([one])
+
+
+def table(folder):
+    study = Study("sample", (Axis("x", (1.0, 1.5)), Axis("kind", ("a", "b"))), lambda x, kind: problem(x))
+    run = StudyRun(study, folder)
+    for k, state in enumerate(run.cells.values()):
+        state.attempts.append(Attempt("warm", "key", outcome(k)))
+    return study_table(run)
+
+
+class Samples:
+    """Writes and reads files of one kind under a folder."""
+
+    def __init__(self, folder: Path, solution) -> None:
+        self.folder, self.solution, self.table = folder, solution, table(folder / "none")
+
+    def path(self, kind: str) -> Path:
+        return self.folder / {"journal": "journal-sample.jsonl", "cache": "bounds.json"}.get(kind, f"{kind}.h5")
+
+    def write(self, kind: str, version: int = 0) -> Path:
+        path = self.path(kind)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if kind == "solution":
+            self.solution.seconds = float(version)
+            save(self.solution, path)
+        elif kind == "archive":
+            save_archive(archive(range(3 + version)), path)
+        elif kind == "arrays":
+            write_arrays(path, {"a/b": np.arange(2000.0) + version, "names": np.array(["d", "W"])})
+        elif kind == "study":
+            save_study(self.table, path, source=str(version) * 10)
+        elif kind == "journal":
+            if path.exists():
+                append(self.folder, [record(version)])
+            else:
+                journal = Journal(self.folder)
+                journal.path = path
+                with journal:
+                    for k in range(5):
+                        journal.append([record(k)])
+        else:
+            save_entry(path, f"key{version}", {"value": 1.0 + version})
+        return path
+
+    def read(self, kind: str, path: Path | None = None):
+        """What a file holds, as something that can be compared."""
+        path = path or self.path(kind)
+        if kind == "solution":
+            found = load(path)
+            return found.seconds, found.problem.hash, found.last.x.tobytes(), found.certificate
+        if kind == "archive":
+            return {k: o.efficiency for k, o in load_archive(path).outcomes.items()}
+        if kind == "arrays":
+            return {k: v.tolist() for k, v in read_arrays(path).items()}
+        if kind == "study":
+            found = load_study(path)
+            return found.attributes["source"], found.variables["efficiency"].tolist()
+        if kind == "journal":
+            text = read_journal(path.parent)
+            return sorted(r.attempts[0].key for r in text.records), text.damaged
+        return json.dumps(load_entries(path), sort_keys=True)
