@@ -17,7 +17,7 @@ BODY = Chain()
 
 @pytest.fixture(scope="module")
 def bound() -> Bound:
-    return efficiency_bound(BODY, Friction(), budget=Budget((4,), (1,), 12, 12, 1, 4))
+    return efficiency_bound(BODY, Friction(), budget=Budget(4, (1,), 8, 24, 3, 60))
 
 
 def test_loaded_balance_without_load_is_the_balance_of_the_body():

@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {
-    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file"],
+    0: ["arrays", "errors", "schemes", "parallel", "json_cache", "spline", "replaced_file", "minimax_program"],
     1: ["friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction"],
     2: ["balance", "problem", "damped_newton", "bump_body", "ellipses", "equivalence"],
     3: [
@@ -38,8 +38,7 @@ LEVELS = {
         "coulomb_motion",
         "loaded_balance",
         "potential",
-        "soft_maximum",
-        "linear_bound",
+        "exchange",
         "bound_sampling",
         "infinitesimal",
         "closure",
