@@ -15,6 +15,7 @@ _DELTA = 1e-6
 """Regularisation speed, at unit shape speed: solving costs half of what it does at 1e-9, the best small gait loses 1.5e-5."""
 _EDGE = 1e-9
 _FRAMES = 4
+_TRIAL_STEPS = 4
 _GROW, _SHRINK = 1.25, 0.5
 
 
@@ -67,18 +68,24 @@ class Domain:
         turn: float,
         steps: int,
         rng: np.random.Generator,
+        hopeless: float = -np.inf,
     ) -> Motion:
         """Climb `value` from every motion of `start`, ``(n_joint, n)``, in random directions of shape and rates.
 
         Pattern search: ridges where a link changes between stick and slip are creases, and run at any angle to the axes.
-        Steps begin at `spacing` [rad] for shapes and `turn` [rad] for directions, and adapt.
+        Steps begin at `spacing` [rad] for shapes and `turn` [rad] for directions, and adapt. Climbs that are below `hopeless`
+        after a few steps are given up, and not returned.
         """
         n_joint, n = start.angles.shape
         angles, rates = start.angles, start.rates
         best = value(start)
         size = np.ones(n)
         top = start
-        for _ in range(steps):
+        for step in range(steps):
+            if step == _TRIAL_STEPS and (best < hopeless).any() and (best >= hopeless).any():
+                going = np.flatnonzero(best >= hopeless)
+                top, best, size, n = top.take(going), best[going], size[going], going.size
+                angles, rates = top.angles, top.rates
             move = rng.standard_normal((2 * n_joint, n, _FRAMES))
             # a direction of rates means nothing along the rates themselves
             along = (move[n_joint:] * rates[:, :, None]).sum(axis=0)

@@ -26,6 +26,7 @@ _HELD = 2e-4
 _SIDES = (0.0, 0.08, -0.08)
 """A motion enters with the heading of its largest gain and these [rad] to the sides of it, as the best heading will move."""
 _WINDOW = 0.03
+_HOPELESS = 0.005
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -133,7 +134,7 @@ def exchanged_optimum(
         if count == _EARLY_ROUNDS:
             program.smoothing = _SMOOTHING
         # a potential that the next climbs will refute need not be exact
-        held = program.settle(float(np.clip(0.1 * surprise, _HELD, 0.02)))
+        held = program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
         free = program.best.x
 
         def ratio(motion: Motion, free: np.ndarray = free) -> np.ndarray:
@@ -144,7 +145,7 @@ def exchanged_optimum(
         pooled = fresh.joined(program.samples.motion)
         values = np.concatenate([ratio(fresh), program.samples.ratio(free)[0]])
         chosen = _starts(pooled, values, program.best.value, spacing, starts * (1 + 2 * last))
-        summit = domain.summits(ratio, pooled.take(chosen), 0.5 * spacing, 0.5 * turn, 14, rng)
+        summit = domain.summits(ratio, pooled.take(chosen), 0.5 * spacing, 0.5 * turn, 14, rng, program.best.value - _HOPELESS)
         reached = ratio(summit)
         seen += fresh.size + chosen.size
         top = max(float(reached.max()), float(values.max()))

@@ -22,13 +22,14 @@ from colloc.json_cache import hash_of, load_entries, save_entry
 
 COEFFICIENTS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
 """(mu_t, mu_f, mu_b)"""
-BUDGET = Budget(intervals=8, shapes=16, directions=40, rounds=30, starts=150, tolerance=1e-3)
+BUDGET = Budget(intervals=8, shapes=16, directions=36, rounds=30, starts=100, tolerance=2e-3)
 HEAD = """# Upper bounds on the efficiency of every gait of three equal links
 
 `python -m scripts.bound_table`. Joint angles within the limit, links 1 and 3 not crossing. *Bound*: largest ratio met
-anywhere, after climbs between the samples found nothing that exceeds the program's value by 0.001 ("converged"); it
-is a sampled value, not a proof. *Program*: value of the last program (no potential of this space does better on its samples). *Small
-gait*: efficiency of the best infinitesimal gait, so a lower end for the best possible gait; *at* its shape. Angles in rad,
+anywhere, after climbs between the samples found nothing that exceeds the program's value by 0.002 ("converged"); it
+is a sampled value, not a proof. *Program*: value of the last program (no potential of this space does better on its
+samples). *Small gait*: efficiency of the best infinitesimal gait found, so a lower end for the best possible gait; *at* its
+shape. A bound for a larger limit holds for a smaller one; the smallest valid value stands in *gap*. Angles in rad,
 delta = 1e-6 at unit shape speed, CPU seconds on a loaded machine.
 
 | mu_t, mu_f, mu_b | limit | 1/min(mu) | bound | program | converged | small gait | at | gap | motions | CPU s |
@@ -36,12 +37,13 @@ delta = 1e-6 at unit shape speed, CPU seconds on a loaded machine.
 """
 
 
-def row(mu: tuple[float, ...], limit: float, bound: Bound, gait: dict) -> str:
-    gap = bound.sampled - gait["efficiency"]
+def row(mu: tuple[float, ...], limit: float, bound: Bound, least: float, gait: dict) -> str:
+    """A line of the table; `least` is the smallest bound valid for this limit."""
     place = "({:.3f}, {:.3f})".format(*gait["angles"])
+    done = "yes" if bound.converged else "no"
     return (
-        f"| {mu[0]:g}, {mu[1]:g}, {mu[2]:g} | {limit:.4g} | {1 / min(mu):g} | {bound.sampled:.4f} | {bound.floor:.4f} "
-        f"| {'yes' if bound.converged else 'no'} | {gait['efficiency']:.4f} | {place} | {gap:.4f} | {bound.samples} | {bound.seconds:.0f} |"
+        f"| {mu[0]:g}, {mu[1]:g}, {mu[2]:g} | {limit:.4g} | {1 / min(mu):g} | {bound.sampled:.4f} | {bound.floor:.4f} | {done} "
+        f"| {gait['efficiency']:.4f} | {place} | {least - gait['efficiency']:.4f} | {bound.samples} | {bound.seconds:.0f} |"
     )
 
 
@@ -67,8 +69,9 @@ def main() -> None:
     parser.add_argument("--limits", type=float, nargs="+", default=[float(np.pi), 3.0, 2.5])
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin no new bound after so much processor time")
     arguments = parser.parse_args()
-    rows = []
-    for limit in arguments.limits:
+    rows: list[str] = []
+    least = dict.fromkeys(COEFFICIENTS, np.inf)
+    for limit in sorted(arguments.limits, reverse=True):
         for mu in COEFFICIENTS:
             friction, cache = Friction(*map(float, mu)), arguments.out / "bounds.json"
             if time.process_time() < arguments.seconds:
@@ -78,7 +81,8 @@ def main() -> None:
                 if known is None:
                     continue
                 bound = known
-            rows.append(row(mu, limit, bound, small(friction, limit, arguments.out / "small_gaits.json")))
+            least[mu] = min(least[mu], bound.sampled)
+            rows.append(row(mu, limit, bound, least[mu], small(friction, limit, arguments.out / "small_gaits.json")))
             print(rows[-1], flush=True)
     (arguments.out / "bound_table.md").write_text(HEAD + "\n".join(rows) + "\n")
 

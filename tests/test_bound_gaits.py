@@ -100,10 +100,10 @@ def test_infinitesimal_triangle_reaches_two_fifths():
     np.testing.assert_allclose(gait.rates @ gait.weights, 0.0, atol=1e-9)
 
 
-def test_small_gaits_at_the_fold_exceed_the_design_value():
-    """Refined directions find 0.4560 at (pi, 0), more than the 0.452 of a coarse set of directions."""
-    gait = small_gait(Chain(), Friction(), np.array([np.pi, 0.0]), directions=90, headings=6)
-    assert 0.454 < gait.efficiency < 0.457
+def test_small_gaits_at_the_fold_generate_their_directions():
+    """0.45606 at (pi, 0) from any first set of directions: the creases are found, where fixed sets stop at 0.452."""
+    values = [small_gait(Chain(), Friction(), np.array([np.pi, 0.0]), n, 4).efficiency for n in (60, 74)]
+    np.testing.assert_allclose(values, 0.45606, atol=2e-4)
 
 
 def test_small_gait_is_what_a_small_polygon_does():

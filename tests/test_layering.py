@@ -39,6 +39,7 @@ LEVELS = {
         "loaded_balance",
         "potential",
         "exchange",
+        "cycle_search",
         "bound_sampling",
         "infinitesimal",
         "closure",
