@@ -21,6 +21,10 @@ DELTA = 1e-9
 """Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
 
 
+_MAX_ITERATIONS = 300
+"""Steps of an attempt: the few motions that need more are left out, as the samples are many."""
+
+
 @dataclass(frozen=True)
 class Motion:
     """Balanced motions, one a column.
@@ -65,15 +69,22 @@ class Motion:
 _FIELDS = ("angles", "rates", "velocity", "spin", "power")
 
 
-def balanced_motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA) -> Motion:
-    """Solve the balance for shapes and joint rates ``(n_joint, n)``; motions that do not converge are left out."""
-    solution = solve_balance(body, friction, angles, rates, delta)
+def solved_motion(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
+) -> tuple[Motion, np.ndarray]:
+    """Solve the balance for shapes and joint rates ``(n_joint, n)``: the motions that converged, and their mask ``(n,)``."""
+    solution = solve_balance(body, friction, angles, rates, delta, max_iterations=_MAX_ITERATIONS)
     kept = solution.converged
     angles, rates, z = angles[:, kept], rates[:, kept], solution.z[:, kept]
     now = instant(body, friction, angles, rates, z, delta)
     middle = body.n_link // 2
     velocity = np.stack([now.velocity.vs[middle], now.velocity.vn[middle]])
-    return Motion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0])
+    return Motion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0]), kept
+
+
+def balanced_motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA) -> Motion:
+    """Solve the balance for shapes and joint rates ``(n_joint, n)``; motions that do not converge are left out."""
+    return solved_motion(body, friction, angles, rates, delta)[0]
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:

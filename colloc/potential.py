@@ -63,6 +63,14 @@ class PotentialSpace:
         """Number of free coefficients."""
         return self.layout[-1][2].stop
 
+    @cached_property
+    def roughness(self) -> sparse.csr_matrix:
+        """Quadratic form of the free coefficients: integral of the squared second derivatives, harmonic k weighted by k^2."""
+        table = self.spline.roughness
+        return sparse.block_diag(
+            [max(k, 1) ** 2 * (self.bases[part].T @ table @ self.bases[part]) for k, part, _ in self.layout], format="csr"
+        )
+
     def coefficients(self, free: np.ndarray) -> dict[int, np.ndarray]:
         """Complex spline coefficients of every c_k, ``(spline.size,)`` each."""
         full = {k: np.zeros(self.spline.size, dtype=complex) for k in self.harmonics}
@@ -102,35 +110,19 @@ class Samples:
         gain, heading = largest_gain(self.amplitudes(free))
         return gain / self.motion.power, heading
 
-    def heading_curvature(self, free: np.ndarray, chosen: np.ndarray, heading: np.ndarray) -> np.ndarray:
-        """Second derivative of gain / power with respect to heading for chosen samples."""
-        total = np.zeros(chosen.size)
-        for k, a in self.amplitudes(free).items():
-            total -= k * k * np.real(np.exp(1j * k * heading) * a[chosen])
-        return total / self.motion.power[chosen]
-
-    def turned_rows(self, chosen: np.ndarray, heading: np.ndarray) -> sparse.csr_matrix:
-        """Derivative of the matrix of `rows` with respect to heading."""
-        # d/dtheta multiplies harmonic k by k and advances its phase by a quarter turn
-        return self._matrix(chosen, heading, 1)
-
     def rows(self, chosen: np.ndarray, heading: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
         """The gain of chosen samples at given headings, over power: ``matrix @ free + constant``."""
         u, v = self.motion.velocity[:, chosen]
         constant = (np.cos(heading) * u - np.sin(heading) * v) / self.motion.power[chosen]
-        return self._matrix(chosen, heading, 0), constant
-
-    def _matrix(self, chosen: np.ndarray, heading: np.ndarray, order: int) -> sparse.csr_matrix:
         scale = 1.0 / self.motion.power[chosen]
         value, slope, spin = self.value[chosen], self.slope[chosen], self.motion.spin[chosen]
         blocks = []
         for k, part, _ in self.space.layout:
-            phase, factor = k * heading + 0.5 * np.pi * order, scale * float(k) ** order
-            cos, sin = np.cos(phase) * factor, np.sin(phase) * factor
+            cos, sin = np.cos(k * heading) * scale, np.sin(k * heading) * scale
             along, across = (cos, -sin) if part == 0 else (-sin, -cos)
             full = sparse.diags(along) @ slope + sparse.diags(across * k * spin) @ value
             blocks.append(full @ self.space.bases[part])
-        return sparse.hstack(blocks, format="csr")
+        return sparse.hstack(blocks, format="csr"), constant
 
 
 def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ parity has fewer free ones: ``full = E @ free`` with the sparse matrix of `symme
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -87,6 +88,20 @@ class TensorSpline:
         for joint in range(self.n_joint):
             total = total + sparse.diags(rates[joint]) @ self.matrix(angles, _unit(joint, self.n_joint))
         return total.tocsr()
+
+    @cached_property
+    def roughness(self) -> sparse.csr_matrix:
+        """Gram matrix ``(size, size)`` of the second derivatives: ``c.roughness.c`` is about the integral of |D^2 f|^2."""
+        points = 2 * self.intervals
+        axis = -self.limit + (np.arange(points) + 0.5) * 0.5 * self.spacing
+        angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.n_joint, indexing="ij")])
+        total = sparse.csr_matrix((self.size, self.size))
+        for i in range(self.n_joint):
+            for j in range(self.n_joint):
+                orders = tuple(int(k == i) + int(k == j) for k in range(self.n_joint))
+                second = self.matrix(angles, orders)
+                total = total + second.T @ second
+        return (total * (0.5 * self.spacing) ** self.n_joint).tocsr()
 
     def symmetric_basis(self, mirror: int, swap: int | None) -> sparse.csr_matrix:
         """``(size, n_free)``: functions with f(-q) = mirror f(q), and f(-reversed q) = swap f(q) unless swap is None."""

@@ -17,7 +17,7 @@ from colloc.bound import Budget, efficiency_bound
 from colloc.bound_margin import certify
 from colloc.friction import Friction
 
-BUDGET = Budget(intervals=(8,), harmonics=(1,), shapes=32, directions=32, refinements=3, linear_rounds=10)
+BUDGET = Budget(intervals=12, harmonics=(1,), shapes=24)
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ BODY = Chain()
 
 @pytest.fixture(scope="module")
 def bound() -> Bound:
-    return efficiency_bound(BODY, Friction(), budget=Budget((4,), (1,), 12, 12, 1, 4))
+    return efficiency_bound(BODY, Friction(), budget=Budget(4, (1,), 8, 24, 3, 60))
 
 
 def test_loaded_balance_without_load_is_the_balance_of_the_body():
@@ -69,8 +69,8 @@ def test_cell_bounds_hold_at_random_motions_inside(bound, n):
     assert motion.size == count * 20
     ratio = Samples(bound.potential_space(BODY), motion).ratio(np.array(bound.coefficients))[0].reshape(count, 20)
     assert np.all(ratio.max(axis=1) <= value)
-    # and they are not vacuous
-    assert np.median(value - ratio.max(axis=1)) < (0.25 if n == 64 else 0.1)
+    # and they are not vacuous; most of the excess is the roughness of this coarse reference point
+    assert np.median(value - ratio.max(axis=1)) < (0.3 if n == 64 else 0.15)
 
 
 @pytest.mark.slow

@@ -20,6 +20,7 @@ LEVELS = {
         "task_pool",
         "sealed_file",
         "file_lock",
+        "minimax_program",
     ],
     1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: [
@@ -73,8 +74,6 @@ LEVELS = {
         "coulomb_motion",
         "loaded_balance",
         "potential",
-        "soft_maximum",
-        "linear_bound",
         "bound_sampling",
         "infinitesimal",
         "closure",
@@ -85,6 +84,8 @@ LEVELS = {
         "problem_study",
         "store_file",
         "gait_class",
+        "exchange",
+        "cycle_search",
     ],
     5: [
         "verify",
