@@ -154,6 +154,7 @@ def test_the_numpy_side_never_loads_casadi():
         "nlp",
         "balanced_velocity",
         "bump_transcription",
+        "modal_transcription",
         "path_kernels",
         "path_geometry",
         "path_transcription",
