@@ -1,4 +1,4 @@
-"""Optimised bump crawlers: feasible starts, rounds within a trust region, independent replay."""
+"""Optimised bump crawlers: feasible starts, continuation in delta, independent replay."""
 
 from __future__ import annotations
 
@@ -10,11 +10,18 @@ import numpy as np
 from colloc.bump_balance import balance_and_power, bump_instant, solve_bump
 from colloc.bump_body import BumpBody
 from colloc.bump_transcription import POSITION_SCALE, BumpTranscription, bump_mesh, piece_lengths, transcribe_bump
+from colloc.errors import NotConvergedError
 from colloc.friction import Friction
 from colloc.layout import RADIANS
 from colloc.mesh import Mesh
-from colloc.nlp import NlpResult, Solver
+from colloc.nlp import OPTIMAL_TOLERANCE, NlpResult, Solver
 from colloc.smooth_period import Period, measured_period
+from colloc.solution import Check
+
+FIRST_RADIUS, NEXT_RADIUS = 0.2, 0.1
+"""Trust region of every coordinate [rad, and bump widths], at the first level and later ones."""
+GAP, ANGLE = 1e-3, 5e-3
+"""Largest values that pass. GAP is that of chains times ten: fixed panels on the bump resolve its stick to this only."""
 
 
 def prescribed_vertices(body: BumpBody, amplitude: float, n: int) -> np.ndarray:
@@ -62,17 +69,12 @@ def feasible_bump(transcription: BumpTranscription, vertices: np.ndarray, delta:
     return x
 
 
-def _loss(body: BumpBody, friction: Friction, d: float, W: float) -> float:
-    """Relative loss per region length, ``(W / (smallest coefficient d) - 1) / (2 epsilon)``; infinite if d <= 0."""
-    return float((W / (friction.smallest * d) - 1) / (2 * body.epsilon)) if d > 0 else np.inf
-
-
-def best_start(body: BumpBody, friction: Friction, candidates: list[np.ndarray], delta: float) -> np.ndarray:
+def best_start(body: BumpBody, friction: Friction, candidates: list[np.ndarray], delta: float, nodes: int = 3) -> np.ndarray:
     """The candidate coordinates at the nodes, each ``(body.n, n + 1)``, with the smallest loss."""
 
     def loss(vertices: np.ndarray) -> float:
-        _, d, W = _half_period(body, friction, bump_mesh(vertices.shape[1] - 1), vertices, delta)
-        return _loss(body, friction, d[-1], W[-1])
+        _, d, W = _half_period(body, friction, bump_mesh(vertices.shape[1] - 1, nodes), vertices, delta)
+        return float((W[-1] / (friction.smallest * d[-1]) - 1) / (2 * body.epsilon)) if d[-1] > 0 else np.inf
 
     return min(candidates, key=loss)
 
@@ -83,25 +85,30 @@ class BumpOptimum:
 
     Attributes
     ----------
+    delta : float
+        The last regularisation at which first-order conditions hold; the crawler is the optimum there.
     vertices : (body.n, n + 1)
         Position and amplitudes at the nodes of half a period.
-    losses : list of float
-        Loss per region length at the start and after every accepted round, balance solved exactly.
-    rounds : list of NlpResult
-        What IPOPT returned in each round.
+    nodes : int
+        Gauss points on each piece.
+    loss : float
+        Loss per region length, see `colloc.bump_transcription`.
+    levels : list of (float, NlpResult)
+        Every delta that was tried, and what IPOPT returned.
     """
 
     body: BumpBody
     friction: Friction
     delta: float
     vertices: np.ndarray
-    losses: list[float]
-    rounds: list[NlpResult]
+    nodes: int
+    loss: float
+    levels: list[tuple[float, NlpResult]]
 
     @property
     def efficiency(self) -> float:
         """Efficiency on the optimisation's own mesh; `replay` is the one to quote."""
-        return 1.0 / (self.friction.smallest * (1.0 + 2 * self.body.epsilon * self.losses[-1]))
+        return 1.0 / (self.friction.smallest * (1.0 + 2 * self.body.epsilon * self.loss))
 
     def replay(self, delta: float | None = None, **settings: Any) -> Period:
         """Distance, work and efficiency by the general smooth-body solver on finer panels and time nodes.
@@ -112,6 +119,21 @@ class BumpOptimum:
         options: dict[str, Any] = {"intervals": 2, "nodes": 4, "panels": 8, "regions": (region,)} | settings
         return measured_period(self.body.motion(self.vertices), self.friction, delta or self.delta, **options)
 
+    def checks(self, largest_angle: float) -> tuple[Check, ...]:
+        """What a claim of optimality rests on; the replay shares no mesh, panel or balance solver with the optimisation."""
+        result, period = next(r for d, r in reversed(self.levels) if d == self.delta and r.optimal), self.replay()
+        x = np.linspace(-1.0, 1.0, 401)
+        angles = self.body.modes_at(x)[0] @ self.vertices[1:]
+        outside = max(float(np.abs(self.vertices[0]).max()) - self.body.reach, 0.0)
+        return (
+            Check("KKT error", max(result.kkt_error, result.complementarity), OPTIMAL_TOLERANCE, "gradient of the Lagrangian"),
+            Check("constraint violation", result.violation, OPTIMAL_TOLERANCE, "largest violated equation or bound"),
+            Check("replay gap", self.efficiency / period.efficiency - 1, GAP, "collocated over replayed efficiency, less 1"),
+            Check("replay error", period.errors["efficiency"] / period.efficiency, GAP, "relative, from a coarser replay"),
+            Check("region", outside, OPTIMAL_TOLERANCE, "excess of the bump's position [bump widths]"),
+            Check("tangent angle", max(float(np.abs(angles).max()) - largest_angle, 0.0), ANGLE, "excess between nodes [rad]"),
+        )
+
 
 def optimise_bump(
     body: BumpBody,
@@ -119,17 +141,17 @@ def optimise_bump(
     vertices: np.ndarray,
     delta: float,
     *,
+    delta_start: float | None = None,
     largest_angle: float = 1.5,
-    rounds: int = 10,
-    radius: float = 0.1,
-    iterations: int = 25,
+    nodes: int = 3,
+    iterations: int = 300,
 ) -> BumpOptimum:
-    """Minimise the loss from given coordinates at the nodes, in rounds within a trust region.
+    """Minimise the loss from given coordinates at the nodes, by continuation in delta.
 
-    Each round lets IPOPT move every coordinate by at most the radius, from a point that satisfies all equations. What
-    comes back is judged by its own loss with the balance solved exactly; a worse one is dropped and the radius reduced.
-    So the result is never worse than the start. The trust region is needed because a resting part that begins to slip
-    costs a large part of the distance at once: the optimum lies close to that cliff.
+    A resting part that begins to slip costs a large part of the distance at once: at small delta the optimum lies close to
+    that cliff and IPOPT makes no headway from a poor start. At a larger delta the cliff is a slope. So delta is halved from
+    `delta_start`, every level from the optimum before, moving by at most a trust region at a time. The result is the last
+    level whose first-order conditions hold.
 
     Parameters
     ----------
@@ -137,35 +159,38 @@ def optimise_bump(
     friction : Friction
     vertices : (body.n, n + 1)
     delta : float
-        Regularisation speed, per period.
+        Regularisation speed to go down to, per period.
+    delta_start : float, optional
+        By default 8 times that.
     largest_angle : float
         Bound on |Theta| [rad].
-    rounds, iterations : int
-        Number of rounds, and IPOPT's iterations in each.
-    radius : float
-        First radius [rad, and bump widths].
+    nodes : int
+        Gauss points on each piece; two are few enough for the optimum to exploit their quadrature error.
+    iterations : int
+        IPOPT's iterations within a trust region.
+
+    Raises
+    ------
+    NotConvergedError
+        If not even the first level converges.
     """
-    transcription = transcribe_bump(body, friction, vertices, largest_angle=largest_angle)
-    layout = transcription.layout
+    transcription = transcribe_bump(body, friction, vertices, nodes=nodes, largest_angle=largest_angle)
     solver = Solver(transcription, {"max_iter": iterations, "theta_max_fact": 1e-3})
-
-    def start(at: np.ndarray) -> tuple[np.ndarray, float]:
-        x = feasible_bump(transcription, at, delta)
-        return x, _loss(body, friction, x[layout.distance[0, -1]], x[layout.work[0, -1]])
-
-    x, loss = start(vertices)
-    losses, results = [loss], []
-    for _ in range(rounds):
-        result = solver.solve(x, delta, radius=radius)
-        results.append(result)
-        trial = np.clip(result.x[layout.q], transcription.lower[layout.q], transcription.upper[layout.q])
-        new_x, new_loss = start(trial)
-        slack = np.abs(body.angles(trial[1:])).max() - largest_angle
-        if np.isfinite(new_loss) and new_x[layout.distance[0, -1]] > 0 and new_loss < losses[-1] and slack < 1e-6:
-            x, radius = new_x, 1.5 * radius
-            losses.append(new_loss)
-        else:
-            radius *= 0.3
-            if radius < 1e-4:
-                break
-    return BumpOptimum(body, friction, delta, x[layout.q], losses, results)
+    now, radius, reached, loss = delta_start or 8 * delta, FIRST_RADIUS, np.inf, np.inf
+    levels: list[tuple[float, NlpResult]] = []
+    while True:
+        now = max(now, delta)
+        result = solver.solve(feasible_bump(transcription, vertices, now), now, radius=radius)
+        levels.append((now, result))
+        if not result.optimal:
+            break
+        vertices, loss, reached, radius = result.x[transcription.layout.q], result.objective, now, NEXT_RADIUS
+        if now <= delta:
+            break
+        now *= 0.5
+    if np.isinf(reached):
+        raise NotConvergedError(
+            f"the crawler's first level, delta = {now:.2g}, did not converge (KKT error {result.kkt_error:.1e}); "
+            "give a larger delta_start."
+        )
+    return BumpOptimum(body, friction, reached, vertices, nodes, loss, levels)

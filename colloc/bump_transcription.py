@@ -13,15 +13,16 @@ Minimised is ``(W / (smallest coefficient x) - 1) / (2 epsilon)``, the relative 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from colloc.balanced_velocity import BalancedVelocity
 from colloc.blocks import Assembly, Block, LocalFunction, implicit_function, local_function
-from colloc.bump_balance import balance_and_power, bump_instant
+from colloc.bump_balance import balance_and_power, bump_instant, solve_bump
 from colloc.bump_body import BumpBody
-from colloc.bump_callback import BumpVelocity
 from colloc.friction import Friction
 from colloc.layout import RADIANS
 from colloc.mesh import Mesh, uniform_mesh
@@ -115,7 +116,7 @@ class BumpTranscription:
     constraint_lower: np.ndarray
     constraint_upper: np.ndarray
     groups: dict[str, slice]
-    velocity: BumpVelocity
+    velocity: BalancedVelocity
 
     @property
     def lifted(self) -> bool:
@@ -200,7 +201,7 @@ def transcribe_bump(
         return sparse.vstack(parts).tocsr()
 
     tau = np.tile(mesh.scheme.c, mesh.n)[None]
-    velocity = BumpVelocity(body, friction, mesh.n_point)
+    velocity = BalancedVelocity(partial(solve_bump, body, friction), body.n, mesh.n_point)
 
     def balanced(local: ca.MX, delta: ca.MX) -> ca.MX:
         q0, q1 = local[: body.n, :], local[body.n : 2 * body.n, :]

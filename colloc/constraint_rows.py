@@ -42,6 +42,15 @@ def equalities(name: str, linear: sparse.spmatrix, parts: dict[str, sparse.csr_m
     return Group(name, zero, zero, sparse.csr_matrix(linear), parts or {})
 
 
+def gait_group(name: str, variables: np.ndarray, parameters: np.ndarray, matrix: np.ndarray, n: int) -> Group:
+    """``variables - matrix p = 0`` at every point, for variables ``(n_shape, n_point)`` that are linear in a gait's p.
+
+    `variables` and `parameters` are index arrays; the matrix is ``(n_point, n_shape, n_parameter)``.
+    """
+    rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[-1]))
+    return equalities(name, selector(variables.ravel(order="F"), n) - rows @ selector(parameters[:, 0], n))
+
+
 def output_group(name: str, outputs: range, n_out: int, n_point: int, n: int) -> Group:
     """Outputs of the block "point" that have to vanish at every point."""
     columns = (np.arange(n_point)[:, None] * n_out + np.array(outputs)).ravel()

@@ -169,6 +169,12 @@ class Harmonic:
         """``(n_time, n_joint, n_parameter)``: joint rates per period at phases t per parameter."""
         return self._sampled(t, n_joint, Fourier.rates)
 
+    def mean_square_rate(self, n_joint: int) -> np.ndarray:
+        """``(n_parameter, n_parameter)``: the mean square shape speed per period as a quadratic form of the parameters."""
+        n_time = 4 * self.harmonics + 4
+        rates = self.rate_matrix(np.arange(n_time) / n_time, n_joint)
+        return np.einsum("tjp,tjq->pq", rates, rates) / n_time
+
     def _sampled(self, t: np.ndarray, n_joint: int, method) -> np.ndarray:
         size = self.size(n_joint)
         return np.stack([method(self.fourier(row, n_joint), t).T for row in np.eye(size)], axis=-1)

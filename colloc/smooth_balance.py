@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.curve import Curve, Panels, curve, node_velocity, pulled_back, resultant
-from colloc.damped_newton import relative_delta, solve, solve3, starting_state
+from colloc.curve import Curve, Panels, node_velocity
+from colloc.damped_newton import relative_delta, solve, starting_state
 from colloc.errors import NotConvergedError, ProblemError
 from colloc.friction import Friction
 from colloc.motion import Motion
-from colloc.point_friction import density_jacobian, force_density, regularised_speed, secant_density
+from colloc.point_friction import force_density
+from colloc.smooth_batch import PanelBatch, PanelFields
 
 _MOST_PANELS = 600
 _ROUNDING = 1e-15
@@ -63,82 +64,18 @@ class SmoothSolution:
         return self
 
 
-class _Batch:
-    """Instants on given panels that share a reference edge."""
-
-    def __init__(self, fields: _Fields, friction: Friction, members: np.ndarray, reference: int) -> None:
-        self.fields, self.friction, self.members, self.reference = fields, friction, members, reference
-        panels = Panels(fields.panels.edges[:, members], fields.panels.order)
-        self.edge_rate = fields.edge_rate[:, members]
-        anchor_rate = self.edge_rate[reference : reference + 1]
-        self.curve = np.stack(curve(panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))
-
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        body = Curve(*self.curve[:, :, select])
-        vs, vn = node_velocity(body, z)
-        force = resultant(body, *force_density(vs, vn, delta, self.friction))
-        if self.friction.isotropic:
-            merit = self.friction.mu_t * np.sum(body.weight * regularised_speed(vs, vn, delta), axis=0)
-        else:
-            merit = 0.5 * np.sum(force * force, axis=0)
-        return np.stack([*body, vs, vn]), force, merit
-
-    def step(self, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
-        step = np.empty_like(force)
-        for law, chosen in ((density_jacobian, newton), (secant_density, ~newton)):
-            if chosen.any():
-                vs, vn = state[7:, :, chosen]
-                blocks = law(vs, vn, delta[:, chosen], self.friction)
-                left = pulled_back(Curve(*state[:7, :, chosen]), blocks)
-                matrix = np.array([[entry[0] for entry in row] for row in left]).transpose(2, 0, 1)
-                step[:, chosen] = solve3(matrix, force[:, chosen])
-        return step
-
-    def edge_velocity(self, z: np.ndarray) -> np.ndarray:
-        """Velocity and rotation rate of every edge, ``(3, n_edge, n)``, in the axes of Theta."""
-        f, a = self.fields, self.reference
-        path = f.panels.edge_path(a)
-        width, angle = f.panels.widths[:, self.members], f.angle[:, self.members]
-        turning = width * (f.rate[:, self.members] - self.edge_rate[a] + z[2])
-        return np.stack(
-            [
-                z[0] - path @ (turning * np.sin(angle)),
-                z[1] + path @ (turning * np.cos(angle)),
-                z[2] + self.edge_rate - self.edge_rate[a],
-            ]
-        )
-
-    def panel_speed(self, z: np.ndarray) -> np.ndarray:
-        """Largest speed of a node in each panel, ``(n_panel, n)``; infinite for panels of width zero."""
-        vs, vn = node_velocity(Curve(*self.curve), z)
-        speed = np.hypot(vs, vn).reshape(self.fields.panels.n, -1, z.shape[1]).max(axis=1)
-        return np.where(np.diff(self.fields.panels.edges[:, self.members], axis=0) > 0, speed, np.inf)
-
-    def largest_speed(self, z: np.ndarray) -> np.ndarray:
-        """Largest speed of a node, ``(n,)``."""
-        vs, vn = node_velocity(Curve(*self.curve), z)
-        return np.hypot(vs, vn).max(axis=0)
-
-    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        anchor = np.argmin(self.panel_speed(z), axis=0)
-        return anchor, np.take_along_axis(self.edge_velocity(z), anchor[None, None], 1)[:, 0]
-
-
-class _Fields:
-    """Theta and its rate on the panels of some instants; rates in units of `speed` ``(n_time,)``."""
-
-    def __init__(self, motion: Motion, t: np.ndarray, panels: Panels, speed: np.ndarray | None = None) -> None:
-        self.panels = panels
-        nodes = panels.nodes
-        self.angle, self.rate = motion.angle(nodes, t), motion.rate(nodes, t)
-        if not (np.isfinite(self.rate).all() and np.isfinite(self.angle).all()):
-            raise ProblemError("the motion's tangent angle and rate must be finite.")
-        if speed is None:
-            speed = np.abs(self.rate).max(axis=0)
-            speed[speed == 0] = 1.0
-        self.speed = speed
-        self.rate = self.rate / speed
-        self.edge_rate = motion.rate(panels.edges, t) / speed
+def _motion_fields(
+    motion: Motion, t: np.ndarray, panels: Panels, speed: np.ndarray | None = None
+) -> tuple[PanelFields, np.ndarray]:
+    """Theta and its rate on the panels of some instants, rates in units of the returned `speed` ``(n_time,)``."""
+    nodes = panels.nodes
+    angle, rate = motion.angle(nodes, t), motion.rate(nodes, t)
+    if not (np.isfinite(rate).all() and np.isfinite(angle).all()):
+        raise ProblemError("the motion's tangent angle and rate must be finite.")
+    if speed is None:
+        speed = np.abs(rate).max(axis=0)
+        speed[speed == 0] = 1.0
+    return PanelFields(panels, angle, rate / speed, motion.rate(panels.edges, t) / speed), speed
 
 
 def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
@@ -216,13 +153,12 @@ def solve_smooth(
     anchor, velocity = np.full(n, len(edges) // 2), np.zeros((3, n))
     for level in range(refinements + 1):
         grid = Panels(edges, order)
-        fields = _Fields(motion, t[active], grid)
         # work in units of the largest rate: the law is homogeneous once delta scales along
-        speed = fields.speed
+        fields, speed = _motion_fields(motion, t[active], grid)
         d = relative_delta(delta, speed)
 
-        def make(members: np.ndarray, reference: int, fields: _Fields = fields) -> _Batch:
-            return _Batch(fields, friction, members, reference)
+        def make(members: np.ndarray, reference: int, fields: PanelFields = fields) -> PanelBatch:
+            return PanelBatch(fields, friction, members, reference)
 
         if level == 0:
             # one cheap pass finds what rests, so that the anchor is right before anything is judged
@@ -275,7 +211,7 @@ def _groups(anchor: np.ndarray, make):
 
 
 def _panel_error(
-    motion: Motion, friction: Friction, t: np.ndarray, batch: _Batch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
+    motion: Motion, friction: Friction, t: np.ndarray, batch: PanelBatch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
 ) -> np.ndarray:
     """How far each panel is from its two halves, ``(n_panel, n_time)``.
 
@@ -291,8 +227,8 @@ def _panel_error(
     start = batch.edge_velocity(z)[:, :-1].reshape(3, -1)
     results = []
     for cuts in ([left, right], [left, 0.5 * (left + right), right]):
-        fields = _Fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
-        one = _Batch(fields, friction, np.arange(t_many.size), 0)
+        fields, _ = _motion_fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
+        one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
         integrals = _panel_integrals(Curve(*one.curve), start, delta_many, friction, fields.panels).sum(axis=1)
         end = one.edge_velocity(start)[:2, -1] / slow_many
         results.append(np.concatenate([integrals / friction.largest, end]))

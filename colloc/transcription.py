@@ -19,7 +19,16 @@ import numpy as np
 from scipy import sparse
 
 from colloc.blocks import Assembly, Block
-from colloc.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector, stacked
+from colloc.constraint_rows import (
+    Group,
+    equalities,
+    gait_group,
+    output_group,
+    quadrature_group,
+    rotation_groups,
+    selector,
+    stacked,
+)
 from colloc.contact import Pairs
 from colloc.gait import Fourier
 from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function, shape_checks
@@ -158,14 +167,15 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         middles = _check_parameters(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]))
         blocks[name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
     blocks["shape speed"] = (
-        mean_square(ca.DM(_shape_speed_form(problem))),
+        mean_square(ca.DM(problem.gait.mean_square_rate(n_joint) / RADIANS**2)),
         layout.parameters,
         np.empty((0, 1)),
     )
 
+    rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
     groups = [
-        _gait_group("angles", layout.angles, problem.gait.angle_matrix(mesh.times, n_joint), layout),
-        _gait_group("rates", layout.rates, problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS, layout),
+        gait_group("angles", layout.angles, layout.parameters, problem.gait.angle_matrix(mesh.times, n_joint), layout.n),
+        gait_group("rates", layout.rates, layout.parameters, rates, layout.n),
         *_point_groups(problem, point.n_out, mesh.n_point, layout.n),
         *_orientation_groups(problem, mesh, layout),
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
@@ -234,13 +244,6 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
     return lower, upper
 
 
-def _gait_group(name: str, variables: np.ndarray, matrix: np.ndarray, layout: Layout) -> Group:
-    """``variables - matrix p = 0`` at every point."""
-    parameters = selector(layout.parameters[:, 0], layout.n)
-    rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[-1]))
-    return equalities(name, selector(variables.ravel(order="F"), layout.n) - rows @ parameters)
-
-
 def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
     """The equations of every point: lifted force laws, then the balance (or the velocity map in its place)."""
     n_law = n_out - N_RATE - 3
@@ -263,10 +266,3 @@ def _check_group(name: str, problem: Problem, n_cell: int, n: int) -> Group:
     lower = np.full(n_cell, -limit if is_joint else -np.inf)
     linear = sparse.csr_matrix((n_cell, n))
     return Group(name, lower, np.full(n_cell, limit), linear, {name: sparse.eye(n_cell, format="csr")})
-
-
-def _shape_speed_form(problem: Problem) -> np.ndarray:
-    """Matrix of the mean square shape speed per radian of phase, as a quadratic form of the gait parameters."""
-    t = np.arange(4 * problem.gait.harmonics + 4) / (4 * problem.gait.harmonics + 4)
-    rates = problem.gait.rate_matrix(t, problem.body.n_joint) / RADIANS
-    return np.einsum("tjp,tjq->pq", rates, rates) / t.size
