@@ -25,7 +25,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from colloc.replay import replay
+from colloc.path_replay import replay
 
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.basins import Outcome, basins, counts

@@ -41,13 +41,14 @@ TRIVIAL, TRIVIAL_EFFICIENCY = "trivial gait", 1e-4
 """Status of a level whose gait goes nowhere: efficiency times the smallest friction coefficient (at most 1) below this."""
 _SMALLEST_STEP = 0.8
 NEXT_ITERATIONS = 15
-"""Iterations a condensed level may take that starts from a converged one. Near the optimum 4 to 12 do; a solve that needs
-more follows a kink of stick-slip in tiny steps, and a smaller step in delta is cheaper than its end."""
+"""Iterations a condensed level of a one-harmonic gait may take that starts from a converged one. Near the optimum 4 to 12
+do; a solve that needs more follows a kink of stick-slip in tiny steps, and a smaller step in delta is cheaper than its end.
+Gaits of more parameters need more."""
 REFINE_DELTA = 1e-3
-"""The mesh of harmonic gaits is refined on the way, at the first level below this delta, and checked again at the end. A
+"""The mesh of one-harmonic gaits is refined on the way, at the first level below this delta, and checked again at the end. A
 refined mesh displaces the kinks that small deltas sharpen: entered at a smaller delta, most solves on it fail."""
 _RETRIES = 2
-"""A path on a refined mesh that has not converged after a few dozen iterations follows a kink in tiny steps. Hundreds more
+"""A gait of many parameters on a refined mesh that has not converged after a few dozen iterations follows a kink in tiny steps. Hundreds more
 rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does."""
 _FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
 """After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
@@ -79,6 +80,7 @@ class _Run:
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
         self.factor, self.next_radius = (PATH_FACTOR, PATH_RADIUS) if problem.has_path else (FIRST_FACTOR, NEXT_RADIUS)
+        self.rich = problem.has_path or problem.gait.harmonics > 1
         self.first_delta = problem.delta_start
         self.far: Pairs = ()
         if problem.gait.symmetry == "none" and not problem.has_path:
@@ -144,9 +146,10 @@ class _Run:
         """One solve, by default from where the optimum is expected."""
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
         x = feasible_point(transcription, self.parameters + self.track.move(delta) if start is None else start, delta)
-        iterations = NEXT_ITERATIONS if self.track and self.problem.formulation == CONDENSED else None
+        hurried = self.track and self.problem.formulation == CONDENSED and not self.rich
+        iterations = NEXT_ITERATIONS if hurried else None
         result = self.solver.solve(x, delta, multipliers, radius, iterations)
-        stuck = self.problem.has_path and bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
+        stuck = self.rich and bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
         for _ in range(_RETRIES if stuck else 0):
             if result.optimal or not np.isfinite(result.x).all():
                 break
@@ -294,7 +297,7 @@ def _refine(run: _Run) -> tuple[NlpResult, str]:
     """Levels down to the problem's delta, on planned meshes until the gait needs no other; the last result, what it lacks."""
     problem, kept = run.problem, np.empty(0)
     first = run.first_delta
-    result = _descend(run, first, problem.delta if problem.has_path else max(problem.delta, min(REFINE_DELTA, first)))
+    result = _descend(run, first, problem.delta if run.rich else max(problem.delta, min(REFINE_DELTA, first)))
     for _ in range(_REFINEMENTS):
         at = run.levels[-1].delta
         plan = _plan(run, kept) if result.optimal and problem.mesh_tolerance > 0 else None
@@ -302,7 +305,7 @@ def _refine(run: _Run) -> tuple[NlpResult, str]:
             kept = np.concatenate([kept, plan.kept])
             run.remesh(plan.edges, scheme=plan.scheme)
             # a mesh refined at the end is entered where its kinks are mild
-            begin = at if problem.has_path else min(max(at, REFINE_DELTA), first)
+            begin = at if run.rich else min(max(at, REFINE_DELTA), first)
         elif not result.optimal or at <= problem.delta:
             return result, ""
         else:

@@ -18,7 +18,7 @@ from colloc.coulomb_motion import admissible, balanced_motion
 from colloc.errors import ProblemError
 from colloc.friction import Friction
 from colloc.gait import Fourier
-from colloc.replay import Path
+from colloc.path_replay import Path
 
 _QUADRANT = ((1, 0), (2, 1), (1, 1), (1, 2))
 STEPS = np.array([*_QUADRANT, *((-b, a) for a, b in _QUADRANT)])

@@ -14,7 +14,7 @@ from colloc.equivalence import phase_distance
 from colloc.errors import CollocError
 from colloc.gait import Fourier
 from colloc.problem import Problem
-from colloc.replay import replay
+from colloc.path_replay import replay
 from colloc.sampling import LATIN_HYPERCUBE, start_gait
 from colloc.solution import SOLVED
 

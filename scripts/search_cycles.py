@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from colloc.replay import replay
+from colloc.path_replay import replay
 
 from colloc import Chain, CollocError, Friction, Harmonic, Problem, maximise_efficiency
 from colloc.cycle_search import Cycle, best_cycle, polygon_gait, polygon_path

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from colloc.replay import replay
+from colloc.path_replay import replay
 
 from colloc.body import Chain
 from colloc.contact import crossing_depth

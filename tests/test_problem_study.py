@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from colloc.replay import replay
+from colloc.path_replay import replay
 
 from colloc import study_cell, sweep_study
 from colloc.basins import CRASHED, Outcome
