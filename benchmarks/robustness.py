@@ -143,7 +143,8 @@ def markdown(rows: list[dict], command: str) -> str:
             "",
             f"## delta = {delta:g}: {everything:.1%} of {sum(r['starts'] for r in here)} starts certified",
             "",
-            "| (mu_t, mu_f, mu_b) | symmetry | starts | certified | median s | best d/W | found by | optima | replay | failures |",
+            "| (mu_t, mu_f, mu_b) | symmetry | starts | certified | median s | best d/W | found by | optima | replay "
+            "| failures |",
             "|---|---|---|---|---|---|---|---|---|---|",
         ]
         for r in here:

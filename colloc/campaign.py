@@ -136,11 +136,20 @@ def run_starts(
                 while queue or pending:
                     while queue and len(pending) < (1 if alone else workers):
                         start = queue[-1]
-                        pending[pool.submit(run_start, problem, sampler, seed, start, time_limit, (known or {}).get(start))] = start
+                        pending[pool.submit(run_start, problem, sampler, seed, start, time_limit, (known or {}).get(start))] = (
+                            start
+                        )
                         queue.pop()
                         submitted = True
                     for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                        outcome = future.result()
+                        try:
+                            outcome = future.result()
+                        except BrokenExecutor:
+                            raise
+                        except Exception as error:
+                            # `run_start` raises nothing: what carried it failed (Dask gives up on a start that kills workers)
+                            text = f"the executor lost it: {type(error).__name__}: {error}"
+                            outcome = Outcome(pending[future], CRASHED, text, problem.guess, problem.guess)
                         del pending[future]
                         yield outcome
             except BrokenExecutor:
@@ -153,4 +162,7 @@ def run_starts(
                 else:
                     suspects = list(pending.values())
             finally:
-                pool.shutdown(wait=True, cancel_futures=True)
+                for future in pending:
+                    future.cancel()
+                # not every executor knows cancel_futures (Dask's does not)
+                pool.shutdown(wait=True)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 from scipy.sparse.linalg import splu
 
@@ -143,7 +142,9 @@ class Condensed:
                     return z
                 z = np.where(bad & np.isfinite(new).all(axis=0), new, z)
         near = None if start is None else start[:, bad]
-        solved = solve_balance(self._body, self._friction, angles[:, bad], rates[:, bad], delta, start=near, tolerance=_TOLERANCE)
+        solved = solve_balance(
+            self._body, self._friction, angles[:, bad], rates[:, bad], delta, start=near, tolerance=_TOLERANCE
+        )
         z[:, bad] = np.where(solved.residual < _ACCEPTED, solved.z, np.nan)
         return z
 

@@ -62,14 +62,14 @@ class CondensedProgram:
         self.rotation = groups["rotation"].start if closes else None
         self.rows = slice(groups["work"].stop, transcription.assembly.m)
         n_check = self.rows.stop - self.rows.start
-        blocks = [
-            Block(b.function, b.gather, b.scatter[self.rows], b.parameters) for b in transcription.assembly.blocks[1:]
-        ]
+        blocks = [Block(b.function, b.gather, b.scatter[self.rows], b.parameters) for b in transcription.assembly.blocks[1:]]
         # the shape speed stands in as an objective; it gets no weight
         self._checks = oracles(Assembly(n, blocks[-1], tuple(blocks), sparse.csr_matrix((n_check, n))))
         own = self._checks.nlp["p"].shape[0]
 
-        v, p, lam_f, lam_g = (ca.MX.sym(name, size) for name, size in (("v", n), ("p", own), ("lam_f", 1), ("lam_g", n_check + closes)))
+        v, p, lam_f, lam_g = (
+            ca.MX.sym(name, size) for name, size in (("v", n), ("p", own), ("lam_f", 1), ("lam_g", n_check + closes))
+        )
         one = (1, 1)
         at = self.condensed
         self._callbacks = {

@@ -51,6 +51,7 @@ _EXCHANGES = 4
 _REFINEMENTS = 4
 _ADMISSIBLE = 1e-8
 
+_BUILT_IN = ("body", "friction", "gait", "joint_limit", "smallest_shape_speed", "intervals", "scheme", "formulation")
 _MOST_KEPT = 4
 _kept = threading.local()
 
@@ -187,8 +188,7 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
 
 def _kept_solver(problem: Problem) -> Solver:
     """The solver of a problem's uniform mesh, built once a thread: guess and delta are no part of it."""
-    key = (problem.body, problem.friction, problem.gait, problem.joint_limit, problem.smallest_shape_speed)
-    key += (problem.intervals, problem.scheme, problem.formulation)
+    key = tuple(getattr(problem, name) for name in _BUILT_IN)
     kept = _kept.__dict__.setdefault("solvers", {})
     if key not in kept:
         while len(kept) >= _MOST_KEPT:

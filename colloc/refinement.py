@@ -63,7 +63,9 @@ def _pieces(problem: Problem, mesh: Mesh, gait: Fourier, delta: float, left: np.
         move = (turn * (cx[:, rows] + 1j * cy[:, rows])) @ weight * h
         return np.stack([move, power[:, rows] @ weight * h, omega[:, rows] @ weight * h])
 
-    return _Pieces(states(slice(0, s), mesh.scheme.A, mesh.scheme.b), states(slice(s, None), _panel_integrals(nodes), panel_weights))
+    return _Pieces(
+        states(slice(0, s), mesh.scheme.A, mesh.scheme.b), states(slice(s, None), _panel_integrals(nodes), panel_weights)
+    )
 
 
 def _errors(problem: Problem, pieces: _Pieces) -> np.ndarray:
