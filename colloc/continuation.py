@@ -67,6 +67,7 @@ class _Run:
         self.track = Track()
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
+        self.velocities: np.ndarray | None = None
         self.radius = FIRST_RADIUS
         if problem.gait.symmetry == "none":
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
@@ -94,19 +95,20 @@ class _Run:
         if result.optimal:
             self.parameters = result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
+            self.velocities = result.x[self.solver.transcription.layout.z]
             self.track.record(delta, self.parameters)
             self.radius = NEXT_RADIUS
         return result
 
     def _solve(self, delta: float) -> NlpResult:
-        x = feasible_point(self.solver.transcription, self.parameters + self.track.move(delta), delta)
+        x = feasible_point(self.solver.transcription, self.parameters + self.track.move(delta), delta, self.velocities)
         iterations = NEXT_ITERATIONS if self.track and self.problem.formulation == CONDENSED else None
         return self.solver.solve(x, delta, self.multipliers, self.radius, iterations)
 
     def remesh(self, edges: np.ndarray) -> None:
         """Go on with another mesh; multipliers do not carry over."""
         self.solver = Solver(transcribe(self.problem, edges))
-        self.multipliers = None
+        self.multipliers = self.velocities = None
         self.radius = REMESH_RADIUS
         self.track.remeshed()
 

@@ -11,7 +11,9 @@ from colloc.layout import RADIANS
 from colloc.transcription import Transcription
 
 
-def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: float) -> np.ndarray:
+def feasible_point(
+    transcription: Transcription, parameters: np.ndarray, delta: float, start: np.ndarray | None = None
+) -> np.ndarray:
     """Variables that satisfy every equation of the transcription but net rotation, for a gait and delta.
 
     Parameters
@@ -21,6 +23,8 @@ def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: 
         Gait parameters.
     delta : float
         Regularisation speed, per period.
+    start : (3, n_point), optional
+        Tail velocities near by, per radian of phase; they only save steps.
 
     Returns
     -------
@@ -32,7 +36,7 @@ def feasible_point(transcription: Transcription, parameters: np.ndarray, delta: 
     n_joint = problem.body.n_joint
     angles = (problem.gait.angle_matrix(mesh.times, n_joint) @ parameters).T
     rates = (problem.gait.rate_matrix(mesh.times, n_joint) @ parameters).T / RADIANS
-    solved = solve_balance(problem.body, problem.friction, angles, rates, delta / RADIANS)
+    solved = solve_balance(problem.body, problem.friction, angles, rates, delta / RADIANS, start=start)
     now = instant(problem.body, problem.friction, angles, rates, solved.z, delta / RADIANS)
 
     state, rate = mesh.integration()
