@@ -19,7 +19,7 @@ from colloc.problem import Problem
 
 _PANELS, _NODES = 4, 4
 _SPLIT_SHARE = 0.3
-_MARGIN = 0.5
+_MARGIN = 0.3
 """A mesh that has to be refined is refined to this share of the tolerance, so that the gait found on it is good too."""
 _MOST_INTERVALS = 4000
 _TOLERANCE = 1e-8
