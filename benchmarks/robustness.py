@@ -25,12 +25,12 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from colloc.path_replay import replay
 
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.basins import Outcome, basins, counts
 from colloc.campaign import process_pool, run_starts
 from colloc.gait import shifted
+from colloc.path_replay import replay
 from colloc.sampling import LATIN_HYPERCUBE
 from colloc.solution import SOLVED, versions
 from colloc.store_archive import Archive, load_archive, save_archive
@@ -39,7 +39,7 @@ LAWS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
 SYMMETRIES = ("none", "bilateral", "antipodal")
 INTERVALS = {"none": 40, "bilateral": 20, "antipodal": 20}
 DELTA, SMALL_DELTA, NEXT_DELTA = 1e-4, 1e-6, 4e-3
-TURN = 2
+TURN = 1
 TIME_LIMIT = 60.0
 REPLAY_INSTANTS, PHASE, CONTRADICTED = 7000, 0.2345, 3e-4
 """The second replay: another grid, begun at another phase. It contradicts a certificate if the efficiencies differ by more than
@@ -143,7 +143,8 @@ def markdown(rows: list[dict], command: str) -> str:
             "",
             f"## delta = {delta:g}: {everything:.1%} of {sum(r['starts'] for r in here)} starts certified",
             "",
-            "| (mu_t, mu_f, mu_b) | symmetry | starts | certified | median s | best d/W | found by | optima | replay | failures |",
+            "| (mu_t, mu_f, mu_b) | symmetry | starts | certified | median s | best d/W | found by | optima | replay "
+            "| failures |",
             "|---|---|---|---|---|---|---|---|---|---|",
         ]
         for r in here:

@@ -13,7 +13,7 @@ import numpy as np
 from colloc.fixed_point import solve_balance
 from colloc.gait import Fourier
 from colloc.problem import Problem
-from colloc.sampling import largest_amplitude
+from colloc.sampling import is_admissible, largest_amplitude
 
 _INSTANTS = 60
 _STEPS = 30
@@ -106,4 +106,4 @@ def opened_parameters(problem: Problem, parameters: np.ndarray, delta: float) ->
 def _admissible(problem: Problem, parameters: np.ndarray) -> np.ndarray:
     """The parameters, shrunk where necessary until the gait keeps its joint limits and its links apart."""
     gait = problem.gait.fourier(parameters, problem.body.n_joint)
-    return parameters * min(1.0, largest_amplitude(problem, gait))
+    return parameters if is_admissible(problem, gait) else parameters * min(1.0, largest_amplitude(problem, gait))

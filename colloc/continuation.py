@@ -48,8 +48,9 @@ REFINE_DELTA = 1e-3
 """The mesh of one-harmonic gaits is refined on the way, at the first level below this delta, and checked again at the end. A
 refined mesh displaces the kinks that small deltas sharpen: entered at a smaller delta, most solves on it fail."""
 _RETRIES = 2
-"""A gait of many parameters on a refined mesh that has not converged after a few dozen iterations follows a kink in tiny steps. Hundreds more
-rarely help; going on from its last gait, projected back onto the balance, within half the trust region, does."""
+"""A gait of many parameters that has not converged on a refined mesh after a few dozen iterations follows a kink in tiny
+steps. Hundreds more rarely help; going on from its last gait, projected back onto the balance, within half the trust region,
+does."""
 _FAILURES_PER_MESH, _MESHES, _OTHER_MESH = 2, 4, 1.15
 """After so many failures in a row a uniform mesh with this many times the intervals is tried. Where a link changes its
 direction of sliding at a node, mu_b and mu_f give the collocated efficiency a kink, and an optimum may sit right on it:
@@ -63,6 +64,7 @@ _EXCHANGES = 4
 _REFINEMENTS = 5
 _ADMISSIBLE = 1e-8
 
+_BUILT_IN = ("body", "friction", "gait", "joint_limit", "smallest_shape_speed", "intervals", "scheme", "formulation")
 _MOST_KEPT = 4
 _kept = threading.local()
 
@@ -78,6 +80,7 @@ class _Run:
         self.track = Track()
         self.parameters = nearest_parameters(solver.transcription, problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
+        self.velocities: np.ndarray | None = None
         self.radius = FIRST_RADIUS
         self.factor, self.next_radius = (PATH_FACTOR, PATH_RADIUS) if problem.has_path else (FIRST_FACTOR, NEXT_RADIUS)
         self.rich = problem.has_path or problem.gait.harmonics > 1
@@ -125,6 +128,7 @@ class _Run:
             self.multipliers = (result.lam_x, result.lam_g)
             self.radius = self.next_radius
             if not self.problem.has_path:
+                self.velocities = result.x[self.solver.transcription.layout.z]
                 self.track.record(delta, self.parameters)
         return result
 
@@ -145,7 +149,8 @@ class _Run:
     def _solve(self, delta: float, start: np.ndarray | None = None) -> NlpResult:
         """One solve, by default from where the optimum is expected."""
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
-        x = feasible_point(transcription, self.parameters + self.track.move(delta) if start is None else start, delta)
+        own = self.parameters + self.track.move(delta) if start is None else start
+        x = feasible_point(transcription, own, delta, self.velocities)
         hurried = self.track and self.problem.formulation == CONDENSED and not self.rich
         iterations = NEXT_ITERATIONS if hurried else None
         result = self.solver.solve(x, delta, multipliers, radius, iterations)
@@ -164,7 +169,7 @@ class _Run:
         scheme, gait = scheme or self.solver.transcription.mesh.scheme.name, self.gait
         self.solver = Solver(transcribed(self.problem.with_(scheme=scheme), gait, edges, self.far))
         self.parameters = nearest_parameters(self.solver.transcription, gait)
-        self.multipliers = None
+        self.multipliers = self.velocities = None
         self.radius = radius
         self.track.remeshed()
 
@@ -247,8 +252,7 @@ def _kept_solver(problem: Problem) -> Solver[GaitProgram]:
     """The solver of a problem's uniform mesh, built once a thread: guess and delta are no part of it, save for paths."""
     if problem.has_path:
         return Solver(transcribed(problem))
-    model = (problem.body, problem.friction, problem.gait, problem.joint_limit, problem.smallest_shape_speed)
-    key = (model, problem.intervals, problem.scheme, problem.formulation)
+    key = tuple(getattr(problem, name) for name in _BUILT_IN)
     kept = _kept.__dict__.setdefault("solvers", {})
     if key not in kept:
         while len(kept) >= _MOST_KEPT:

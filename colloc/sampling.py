@@ -32,6 +32,12 @@ _SAFE = 1 - 1e-3
 _CLEARLY_MOVING = 1.5
 
 
+def is_admissible(problem: Problem, gait: Fourier) -> bool:
+    """Whether a gait keeps clear of its joint limits and its links apart, at phases spread over the period."""
+    angles = gait.angles(np.arange(_PHASES) / _PHASES)
+    return bool(np.abs(angles).max() <= problem.joint_limit * _SAFE) and not crossing_depth(problem.body, angles / _SAFE).any()
+
+
 def largest_amplitude(problem: Problem, gait: Fourier) -> float:
     """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for the straight body."""
     angles = gait.angles(np.arange(_PHASES) / _PHASES)

@@ -13,8 +13,8 @@ from colloc.campaign import run_guess
 from colloc.equivalence import phase_distance
 from colloc.errors import CollocError
 from colloc.gait import Fourier
-from colloc.problem import Problem
 from colloc.path_replay import replay
+from colloc.problem import Problem
 from colloc.sampling import LATIN_HYPERCUBE, start_gait
 from colloc.solution import SOLVED
 

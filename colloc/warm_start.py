@@ -8,10 +8,11 @@ from scipy.sparse.linalg import spsolve
 from colloc.balance import instant, total_power
 from colloc.fixed_point import solve_balance
 from colloc.layout import RADIANS
-from colloc.program import GaitProgram
 
 
-def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: float) -> np.ndarray:
+def feasible_point(
+    transcription: GaitProgram, parameters: np.ndarray, delta: float, start: np.ndarray | None = None
+) -> np.ndarray:
     """Variables that satisfy every equation of the transcription but net rotation, for a gait and delta.
 
     Parameters
@@ -21,6 +22,8 @@ def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: fl
         Gait parameters.
     delta : float
         Regularisation speed, in the units of the problem's class of gaits.
+    start : (3, n_point), optional
+        Tail velocities near by, per radian of phase; they only save steps.
 
     Returns
     -------
@@ -32,7 +35,7 @@ def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: fl
     x[layout.parameters[:, 0]] = parameters
     slow = delta * gait.delta_unit / RADIANS
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
-    solved = solve_balance(problem.body, problem.friction, angles, rates, slow)
+    solved = solve_balance(problem.body, problem.friction, angles, rates, slow, start=start)
     now = instant(problem.body, problem.friction, angles, rates, solved.z, slow)
 
     state, rate = mesh.integration()

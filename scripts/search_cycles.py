@@ -13,10 +13,10 @@ import time
 from pathlib import Path
 
 import numpy as np
-from colloc.path_replay import replay
 
 from colloc import Chain, CollocError, Friction, Harmonic, Problem, maximise_efficiency
 from colloc.cycle_search import Cycle, best_cycle, polygon_gait, polygon_path
+from colloc.path_replay import replay
 
 HEAD = """# Cycles of largest ratio on a lattice of shapes, {friction}, |angles| <= {limit:.4g}
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from colloc.path_replay import replay
 
 from colloc.body import Chain
 from colloc.contact import crossing_depth
 from colloc.cycle_search import STEPS, best_cycle, polygon_gait, polygon_path
 from colloc.errors import ProblemError
 from colloc.friction import Friction
+from colloc.path_replay import replay
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 from colloc import campaign, continuation, multistart
 from colloc.basins import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.body import Chain
-from colloc.closure import closed_parameters, enclosed_area, net_rotations
+from colloc.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
 from colloc.contact import crossing_depth
 from colloc.continuation import continue_delta
 from colloc.delta_limit import efficiency_at_zero_delta, resolution_warning
@@ -128,6 +128,17 @@ def test_closing_the_rotation_keeps_the_enclosed_area(friction):
     assert areas[1] == pytest.approx(areas[0], rel=0.2)
 
 
+def test_an_almost_retraced_gait_is_opened_without_turning_it_round():
+    stated = problem(friction=Friction(10, 1, 1), gait=Harmonic(1, "none"))
+    for sign in (1.0, -1.0):
+        narrow = stated.gait.parameters(Fourier([0.5, -0.3], [[0.9], [0.7]], [[0.0], [0.01 * sign]]))
+        opened = opened_parameters(stated, narrow, 0.1)
+        before, after = (enclosed_area(stated.gait.fourier(p, 2)) for p in (narrow, opened))
+        assert after * before > 0
+        assert abs(after) > 3 * abs(before)
+        assert abs(net_rotations(stated, opened[None], 0.1)[0]) < 1e-3
+
+
 def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retraced_one():
     stated = problem(gait=Harmonic(1, "none"), intervals=20)
     solution = continue_delta(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
@@ -139,6 +150,7 @@ def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retrac
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
     monkeypatch.setattr(continuation, "TRIVIAL_EFFICIENCY", 2.0)
+    monkeypatch.setattr(continuation, "_FIRST_DELTAS", 2)
     solution = maximise_efficiency(problem())
     assert is_trivial(solution)
     assert solution.status != SOLVED
@@ -306,8 +318,42 @@ def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
         efficiency_at_zero_delta(coarse)
 
 
-def test_dask_executor():
+class _Losing(Executor):
+    """Gives up on start 1 in its own way, as Dask does on a task that kills its workers."""
+
+    def __init__(self, workers):
+        pass
+
+    def submit(self, function, *arguments):
+        future = Future()
+        if arguments[3] == 1:
+            future.set_exception(RuntimeError("killed worker"))
+        else:
+            future.set_result(outcome(arguments[3]))
+        return future
+
+
+def test_a_start_that_the_executor_loses_does_not_end_the_run():
+    found = {o.start: o for o in campaign.run_starts(problem(), range(3), executor=_Losing)}
+    assert (found[1].status, found[1].message) == (CRASHED, "the executor lost it: RuntimeError: killed worker")
+    assert found[0].status == found[2].status == SOLVED
+
+
+def test_starts_run_on_a_dask_cluster_and_end_as_they_do_here():
     distributed = pytest.importorskip("distributed")
-    with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
-        found = list(campaign.run_starts(problem(), [0], executor=lambda n: client.get_executor()))
-    assert found[0].iterations > 0
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        found = list(campaign.run_starts(problem(), range(3), workers=2, executor=lambda n: client.get_executor()))
+    assert sorted(o.start for o in found) == [0, 1, 2]
+    there = {o.start: o for o in found}
+    here = campaign.run_start(problem(), SAMPLERS[0], 0, 1, 300.0)
+    assert there[1].status == here.status
+    assert there[1].efficiency == pytest.approx(here.efficiency, rel=1e-6)
+
+
+def test_known_gaits_take_the_place_of_samples():
+    stated, near = problem(), ellipse(0.1, 1.3, 0.8)
+    (found,) = campaign.run_starts(stated, [7], executor=ThreadPoolExecutor, known={7: near})
+    assert phase_distance(found.guess, near) < 1e-7

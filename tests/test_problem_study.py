@@ -10,7 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from colloc.path_replay import replay
 
 from colloc import study_cell, sweep_study
 from colloc.basins import CRASHED, Outcome
@@ -18,6 +17,7 @@ from colloc.errors import ProblemError, StoreError
 from colloc.friction import Friction
 from colloc.gait import Fourier, ellipse
 from colloc.gait_class import DIRECT, RETROGRADE, gait_class, wave_direction, winding
+from colloc.path_replay import replay
 from colloc.problem import Problem
 from colloc.problem_study import Axis, Study, read_study_file
 from colloc.solution import NOT_CONVERGED, SOLVED
