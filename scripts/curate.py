@@ -16,9 +16,11 @@ COMMANDS = {
     "three_link.png": "python -m colloc.solve problems/three_link.py",
     "paper.md": "python -m scripts.reproduce_paper",
     "paper/*.png": "python -m scripts.reproduce_paper",
+    "benchmarks/benchmarks.md": "python -m benchmarks",
+    "benchmarks/*.png": "python -m benchmarks",
 }
 KEPT = {
-    "mesh_tolerance.md": "python -m benchmarks.mesh_tolerance",
+    "mesh_tolerance.md": "python -m benchmarks --only mesh_tolerance",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
 }
