@@ -1,8 +1,8 @@
 """What every tool is given: the isotropic three-link body, its gait, and friction in closed form, for any array library.
 
 `m` is a module with sin, cos, sqrt and log: numpy, casadi, or the tool's own. The closed form is the one of
-`colloc.friction` without its case distinctions: q is raised by 1e-6, which changes forces by a few 1e-7 and keeps every
-expression smooth. Phase runs over 0..pi, half a period; delta is per radian of phase.
+`colloc.friction` without its case distinctions: 1 - q is lowered by one part in 1e6, which changes forces by less than 1e-6
+and keeps every expression smooth. Phase runs over 0..pi, half a period; delta is per radian of phase.
 """
 
 LENGTH = 1 / 3
@@ -28,9 +28,10 @@ def link_force(m, vs, vn, w, delta):
     r0, r1 = m.sqrt(a2 + y0**2), m.sqrt(a2 + y1**2)
     S = r0 + r1
     Q = a2 / (a2 + y0 * y1 + r0 * r1)
-    q = (2 * half / S) ** 2 + _RAISED
+    one_less_q = 2 * a2 / (Q * S**2) * (1 - _RAISED)
+    q = (2 * half / S) ** 2 * (1 - _RAISED) + _RAISED
     root = m.sqrt(q)
-    g = 0.5 * m.log((1 + root) ** 2 / (2 * a2 / (Q * S**2))) / root
+    g = 0.5 * m.log((1 + root) ** 2 / one_less_q) / root
     h = (g - 1) / q
     return -2 * LENGTH * vs * g / S, -2 * LENGTH * vn / S, -w * LENGTH**3 / S * (0.5 * Q - a2 * h / S**2)
 
