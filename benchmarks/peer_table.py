@@ -76,7 +76,7 @@ def report(quick: bool, folder: Path) -> str:
     """The table, and how many times faster the best of ours is than the best of the others."""
     rows = []
     for name, command in OWN.items():
-        starts = 2 if quick else 5 if name == "Nelder-Mead" else 20
+        starts = 2 if quick else 3 if name == "Nelder-Mead" else 20
         output = subprocess.run(
             [sys.executable, "-m", *command, "--starts", str(starts)], capture_output=True, text=True, check=True
         ).stdout
