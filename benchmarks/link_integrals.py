@@ -83,11 +83,13 @@ def _figure(errors: dict, times: dict, deltas: list[float], names: list[str], fo
         for name in names:
             line = [errors["pivoting", d][name][0] for d in deltas]
             left.loglog(deltas, line, color=colours[name], marker="o", ms=3, label=name)
-            right.loglog(times[name], errors["pivoting", 1e-4][name][0], "o", color=colours[name])
-            near = errors["pivoting", 1e-4][name][0]
-            right.annotate(name, (times[name], near), textcoords="offset points", xytext=(5, 4), fontsize=8)
+            near = errors["pivoting", deltas[0]][name][0]
+            right.loglog(times[name], near, "o", color=colours[name])
+            right.annotate(name, (times[name], near), textcoords="offset points", xytext=(6, -3), fontsize=8)
         left.set(xlabel="delta", ylabel="worst relative error", title="A link that pivots about one of its points")
         left.legend(fontsize=7)
-        right.set(xlabel="nanoseconds a link", ylabel="worst relative error", title="Work against error at delta = 1e-4")
-        right.margins(x=0.25)
+        right.set(
+            xlabel="nanoseconds a link", ylabel="worst relative error", title=f"Work against error at delta = {deltas[0]:g}"
+        )
+        right.margins(x=0.3)
         save(figure, folder, "link_integrals")

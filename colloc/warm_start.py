@@ -8,6 +8,7 @@ from scipy.sparse.linalg import spsolve
 from colloc.balance import instant, total_power
 from colloc.fixed_point import solve_balance
 from colloc.layout import RADIANS
+from colloc.program import GaitProgram
 
 
 def feasible_point(

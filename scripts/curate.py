@@ -16,12 +16,14 @@ COMMANDS = {
     "three_link.png": "python -m colloc.solve problems/three_link.py",
     "paper.md": "python -m scripts.reproduce_paper",
     "paper/*.png": "python -m scripts.reproduce_paper",
+    "benchmarks/benchmarks.md": "python -m benchmarks",
+    "benchmarks/*.png": "python -m benchmarks",
 }
 KEPT = {
     "report.png": "python -m scripts.report_screenshot",
     "gallery.json": "python -m scripts.gallery",
     "gallery": "python -m scripts.gallery",
-    "mesh_tolerance.md": "python -m benchmarks.mesh_tolerance",
+    "mesh_tolerance.md": "python -m benchmarks --only mesh_tolerance",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
 }

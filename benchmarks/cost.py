@@ -1,0 +1,150 @@
+"""Where the time of a solve goes, as shares: python -m benchmarks --only cost
+
+Every problem is solved once in a process of its own. IPOPT's own timing statistics give the linear algebra (MUMPS
+factorisation and back solves); the functions' time is CasADi's, split by kind, with the balance solver inside them timed
+separately. What is left of IPOPT's time is its own overhead. Wall-clock seconds inside the solver, processor seconds for the
+rest; shares are of the sum.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.tables import markdown_table
+
+PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")
+MODULES = (
+    "numpy",
+    "casadi",
+    "colloc",
+    "colloc.problem",
+    "colloc.fixed_point",
+    "colloc.optimise",
+    "colloc.figures",
+    "colloc.store",
+)
+
+
+def anatomy(name: str) -> dict[str, float]:
+    """Seconds by part of one solve of a problem file, certificate and figure included (run in a fresh process)."""
+    seconds: dict[str, float] = {}
+    mark = time.process_time()
+
+    def lap(part: str) -> None:
+        nonlocal mark
+        now = time.process_time()
+        seconds[part] = seconds.get(part, 0.0) + now - mark
+        mark = now
+
+    import colloc.continuation as continuation
+    from colloc import nlp, velocity_callback
+    from colloc.figures import save_figure, solution_figure
+    from colloc.problem_file import read_problem_file
+    from colloc.store import save
+    from colloc.verify import certify
+
+    lap("imports")
+    problem = read_problem_file(Path("problems") / f"{name}.py").problem
+    folder = Path(tempfile.mkdtemp())
+    log = folder / "ipopt.txt"
+    inside = {"balance solver": 0.0, "value": 0.0, "gradient": 0.0, "Jacobian": 0.0, "Hessian": 0.0, "linear algebra": 0.0}
+    kinds = {"nlp_f": "value", "nlp_g": "value", "nlp_grad_f": "gradient", "nlp_jac_g": "Jacobian", "nlp_hess_l": "Hessian"}
+
+    plain_balance = velocity_callback.solve_balance
+
+    def timed_balance(*arguments, **settings):
+        begin = time.perf_counter()
+        result = plain_balance(*arguments, **settings)
+        inside["balance solver"] += time.perf_counter() - begin
+        return result
+
+    class LoggedSolver(nlp.Solver):
+        def __init__(self, transcription, options=None):
+            logging = {"print_timing_statistics": "yes", "output_file": str(log), "file_print_level": 5}
+            super().__init__(transcription, {**(options or {}), **logging})
+
+        def _solve_within(self, *arguments):
+            result = super()._solve_within(*arguments)
+            stats = self._solver.stats()
+            for key, kind in kinds.items():
+                inside[kind] += stats.get(f"t_wall_{key}", 0.0)
+            text = log.read_text(encoding="utf-8")
+            for part in ("LinearSystemFactorization", "LinearSystemBackSolve", "LinearSystemStructureConverterInit"):
+                found = re.search(rf"{part}\.*:\s+\S+\s+\(sys:\s+\S+\s+wall:\s+(\S+)\)", text)
+                inside["linear algebra"] += float(found.group(1)) if found else 0.0
+            return result
+
+    velocity_callback.solve_balance = timed_balance
+    continuation.Solver = LoggedSolver
+    built = {"build": 0.0}
+    plain_init = LoggedSolver.__init__
+
+    def timed_init(self, *arguments, **settings):
+        begin = time.perf_counter()
+        plain_init(self, *arguments, **settings)
+        built["build"] += time.perf_counter() - begin
+
+    LoggedSolver.__init__ = timed_init  # type: ignore[method-assign]
+    solution = continuation.continue_delta(problem)
+    lap("search")
+    solution.certificate = certify(solution)
+    lap("verification")
+    save(solution, folder / "x.h5")
+    lap("saving")
+    save_figure(solution_figure(solution), folder / "x.h5")
+    lap("figure")
+
+    ipopt = sum(level.seconds for level in solution.levels)
+    functions = inside["value"] + inside["gradient"] + inside["Jacobian"] + inside["Hessian"]
+    seconds["build"] = built["build"]
+    seconds["warm starts, refinement"] = max(seconds.pop("search") - built["build"] - ipopt, 0.0)
+    seconds |= {f"IPOPT: {kind}": value for kind, value in inside.items() if kind != "balance solver"}
+    seconds["IPOPT: overhead"] = max(ipopt - functions - inside["linear algebra"], 0.0)
+    seconds["(balance solver inside IPOPT)"] = inside["balance solver"]
+    seconds["(iterations)"] = float(sum(level.iterations for level in solution.levels))
+    return seconds
+
+
+def import_seconds(module: str) -> float:
+    """Processor time of a fresh Python that imports a module, less one that imports nothing; the least of three."""
+
+    def spent(code: str) -> float:
+        command = [sys.executable, "-c", code + "\nimport time; print(time.process_time())"]
+        return min(float(subprocess.run(command, capture_output=True, text=True, check=True).stdout) for _ in range(3))
+
+    return spent(f"import {module}") - spent("pass")
+
+
+def report(quick: bool, folder: Path) -> str:
+    """Shares of the parts of three solves, and import times."""
+    names = PROBLEMS[:1] if quick else PROBLEMS
+    columns = {}
+    for name in names:
+        command = [
+            sys.executable,
+            "-c",
+            f"import json; from benchmarks.cost import anatomy; print(json.dumps(anatomy({name!r})))",
+        ]
+        output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        columns[name] = json.loads(output.splitlines()[-1])
+    parts = [part for part in columns[names[0]] if not part.startswith("(")]
+    totals = {name: sum(columns[name][part] for part in parts) for name in names}
+    rows = [[part, *(f"{columns[n][part]:.2f} ({columns[n][part] / totals[n]:.0%})" for n in names)] for part in parts]
+    rows.append(["all", *(f"{totals[n]:.2f}" for n in names)])
+    for extra in ("(balance solver inside IPOPT)", "(iterations)"):
+        rows.append([extra, *(f"{columns[n][extra]:.3g}" for n in names)])
+    shares = []
+    for n in names:
+        own = {part: s for part, s in columns[n].items() if part.startswith("IPOPT")}
+        functions = sum(s for part, s in own.items() if not part.endswith(("overhead", "algebra")))
+        shares.append(f"{n} {functions / sum(own.values()):.0%}")
+    text = markdown_table(["part, seconds (share)", *names], rows)
+    text += f"\n\nEvaluations as a share of IPOPT's time (target: at most a quarter): {', '.join(shares)}."
+    imports = [[module, import_seconds(module)] for module in MODULES]
+    return f"{text}\n\n{markdown_table(['import', 'processor seconds'], imports)}"

@@ -1,0 +1,1 @@
+"""The same problem in general tools, each written the way its documentation shows; see `benchmarks.peer_table`."""

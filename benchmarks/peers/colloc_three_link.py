@@ -1,0 +1,47 @@
+"""The three-link problem in colloc, on the same starts: python -m benchmarks.peers.colloc_three_link --starts 20 [--refined]
+
+Without --refined the mesh, scheme and levels are those of the other tools (no refinement); with it, everything is at its
+defaults, and a start counts only with a certificate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+
+import numpy as np
+
+from benchmarks.peers.settings import INTERVALS
+from benchmarks.peers.starts import starts
+from colloc import Harmonic, Problem, ellipse, maximise_efficiency
+from colloc.continuation import continue_delta
+from colloc.solution import SOLVED
+
+
+def solve(start: np.ndarray, refined: bool) -> dict:
+    """The gait and efficiency from one start, or what went wrong."""
+    same_work: dict = {} if refined else {"scheme": "radau-3", "mesh_tolerance": 0}
+    problem = Problem("peer", ellipse(*start), gait=Harmonic(1, "bilateral"), intervals=INTERVALS, **same_work)
+    solution = maximise_efficiency(problem) if refined else continue_delta(problem)
+    good = solution.status == SOLVED if refined else solution.levels[-1].optimal and solution.levels[-1].delta <= 1e-4
+    if not good:
+        return {"failed_at": solution.levels[-1].delta, "message": solution.message[:80]}
+    gait = solution.gait
+    return {"efficiency": solution.efficiency, "gait": [gait.mean[0], gait.cos[0, 0], gait.sin[0, 0]]}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="The three-link problem in colloc; see the top of this file.")
+    parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--refined", action="store_true")
+    options = parser.parse_args()
+    for start in starts(options.starts):
+        begin = time.process_time()
+        result = solve(start, options.refined)
+        result |= {"cpu": time.process_time() - begin, "start": start.tolist(), "with_build": True}
+        print(json.dumps(result), flush=True)
+
+
+if __name__ == "__main__":
+    main()

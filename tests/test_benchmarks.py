@@ -1,0 +1,107 @@
+"""The benchmarks measure what they say: other tools get the same physics, the newcomer's residual and references are right."""
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import PARTS, document
+from benchmarks.balance_solvers import newcomers_residual, random_instants
+from benchmarks.link_integrals import worst_errors
+from benchmarks.peer_table import OPTIMA, judged
+from benchmarks.peers import physics
+from benchmarks.peers.nelder_mead import minus_efficiency
+from benchmarks.peers.starts import feasible_motion, starts
+from benchmarks.scaling import problem_of
+from benchmarks.smooth_panels import MOTION, loads
+from benchmarks.tables import interleaved_seconds, markdown_table
+from benchmarks.time_schemes import GAIT, adaptive_efficiency
+from colloc import Chain, Friction, ellipse, replay, solve_balance
+from colloc.balance import instant, net_force, total_power
+from colloc.ellipses import admissible
+from colloc.smooth_balance import solve_smooth
+
+
+@pytest.mark.parametrize("delta", [1e-1, 1e-4])
+def test_other_tools_are_given_the_same_physics(delta):
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        own, t, theta, z = rng.normal(size=3), rng.uniform(0, np.pi), rng.normal(), rng.normal(size=3)
+        balance, rates = physics.balance_and_rates(np, t, theta, z, own, delta)
+        gait, phase = ellipse(*own), np.array([t / (2 * np.pi)])
+        now = instant(Chain(), Friction(), gait.angles(phase), gait.rates(phase) / (2 * np.pi), z[:, None], delta)
+        np.testing.assert_allclose(balance, net_force(now.posture, now.force)[:, 0], atol=3e-6)
+        assert rates[2] == pytest.approx(total_power(now.velocity, now.force).item(), rel=1e-5)
+
+
+def test_starts_are_admissible_and_their_motion_is_in_balance():
+    own = starts(20)
+    assert admissible(Chain(), own.T).all()
+    phases = np.linspace(0, np.pi, 9)
+    states, z = feasible_motion(own[0], 0.01, phases)
+    for k in range(0, 9, 2):
+        balance, _ = physics.balance_and_rates(np, phases[k], states[0, k], z[:, k], own[0], 0.01)
+        assert np.abs(balance).max() < 1e-3
+    gait = ellipse(*own[0])
+    whole = replay(Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 0.01 * 2 * np.pi)
+    assert states[1, -1] / states[2, -1] == pytest.approx(whole.efficiency, rel=1e-4)
+
+
+def test_the_newcomers_residual_is_the_closed_form_where_quadrature_suffices():
+    angles, rates = random_instants(5)
+    law, delta = (1.7, 1.0, 1.7), 1.0
+    z = np.random.default_rng(2).normal(size=(3, 5))
+    now = instant(Chain(), Friction(1.7, 1.0, 1.7), angles, rates, z, delta)
+    expected = net_force(now.posture, now.force)
+    for k in range(5):
+        found = newcomers_residual(z[:, k], angles[:, k], rates[:, k], delta, law)
+        np.testing.assert_allclose(found, expected[:, k], atol=1e-9)
+
+
+def test_the_reference_of_smooth_bodies_finds_no_load_at_our_balance():
+    t = np.array([0.2])
+    solved = solve_smooth(MOTION, Friction(3, 1, 2), t, 0.1)
+    z = solved.z[:, 0] + [0, 0, MOTION.rate(np.zeros((1, 1)), t).item()]
+    force_x, force_y, torque, power = loads(MOTION, Friction(3, 1, 2), 0.2, z, 0.1)
+    assert max(abs(force_x), abs(force_y), abs(torque)) < 1e-9
+    assert power == pytest.approx(solved.power[0], rel=1e-9)
+
+
+def test_the_reference_in_time_agrees_with_a_replay():
+    expected = replay(Chain(), Friction(), lambda t: (GAIT.angles(t), GAIT.rates(t)), 1.0, tolerance=1e-9).efficiency
+    assert adaptive_efficiency(GAIT, 1.0, 1e-6) == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_run_is_judged_by_the_replay_of_its_gait():
+    good = {"gait": [0.0, 2.859, 1.302], "efficiency": OPTIMA[0] * 1.01}
+    found, claim, short = judged(good)
+    assert found
+    assert claim == pytest.approx(0.01, abs=1e-4)
+    assert abs(short) < 1e-5
+    assert not judged({"gait": [0.0, 1.0, 1.0], "efficiency": 0.26})[0]
+    assert not judged({"gait": [0.0, 3.5, 1.0], "efficiency": 0.26})[0]
+    assert not judged({"failed_at": 0.1, "message": "restoration failed"})[0]
+
+
+def test_nelder_mead_is_given_the_efficiency():
+    assert -minus_efficiency(np.array([0.0, 2.859, 1.302])) == pytest.approx(OPTIMA[0], rel=3e-3)
+    assert minus_efficiency(np.array([0.0, 4.0, 1.0])) == 0.0
+
+
+def test_closed_forms_are_as_good_as_the_table_says_and_few_points_as_bad():
+    errors = worst_errors("pivoting", 1e-4, 20)
+    assert errors["closed form"][0] < 1e-14
+    assert errors["Gauss 12"][0] > 0.1
+
+
+def test_every_size_of_the_scaling_study_is_a_problem():
+    for size in ((50, 3, 1), (40, 12, 1), (40, 3, 16)):
+        problem = problem_of(*size)
+        assert problem.body.n_link == size[1]
+
+
+def test_tables_and_report():
+    assert markdown_table(["a", "b"], [[1, 1e-7]]) == "| a | b |\n|---|---|\n| 1 | 1.0e-07 |"
+    assert set(interleaved_seconds({"x": lambda: solve_balance})) == {"x"}
+    section = {"text": "T", "seconds": 1.0, "machine": "M", "command": "C", "figure": False}
+    text = document({"cost": section})
+    assert PARTS["cost"] in text
+    assert PARTS["scaling"] not in text
