@@ -95,6 +95,9 @@ class NlpResult:
 OPTIMAL_TOLERANCE = 1e-6
 AnyProgram = TypeVar("AnyProgram", bound=Program)
 _REGIONS = 20
+_INSIDE = 0.999
+"""A point nearer to the edge of its trust region than this is on it: the barrier keeps off an active bound by its tolerance
+over the multiplier, which is small where efficiency is flat."""
 
 
 class Solver(Generic[AnyProgram]):
@@ -131,7 +134,7 @@ class Solver(Generic[AnyProgram]):
         result = self._solve_within(x, delta, multipliers, radius)
         own = self.transcription.layout.parameters[:, 0]
         for _ in range(_REGIONS):
-            if not result.optimal or np.abs(result.x[own] - x[own]).max() < radius * (1 - 1e-6):
+            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * radius:
                 return result
             x = result.x
             result = self._solve_within(x, delta, None, radius).accumulated(result)
