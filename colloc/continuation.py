@@ -65,7 +65,7 @@ class _Run:
         self.levels: list[Level] = []
         self.parameters = nearest_parameters(solver.transcription, problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
-        self.radius = FIRST_RADIUS
+        self.radius, self.refined = FIRST_RADIUS, False
         self.factor, self.next_radius = (PATH_FACTOR, PATH_RADIUS) if problem.has_path else (FIRST_FACTOR, NEXT_RADIUS)
         if problem.gait.symmetry == "none" and not problem.has_path:
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
@@ -126,6 +126,7 @@ class _Run:
         gait, problem = self.gait, self.problem
         mesh = self.solver.transcription.phase_mesh(gait)
         edges = refined_edges(problem, mesh, gait, problem.delta, problem.mesh_tolerance)
+        self.refined = True
         if edges is not None:
             self.remesh(edges)
         return edges is not None
@@ -191,15 +192,13 @@ def _descend(run: _Run) -> NlpResult:
     """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
     target = run.problem.delta
     delta, factor, reached, failures, meshes = run.problem.delta_start, run.factor, None, 0, 1
-    early = False
     while True:
         result = run.attempt(delta)
         if result.optimal:
             reached = delta
             if delta <= target:
                 return result
-            if run.problem.has_path and delta < PATH_REMESH_DELTA and not early and run.problem.mesh_tolerance > 0:
-                early = True
+            if run.problem.has_path and delta < PATH_REMESH_DELTA and not run.refined and run.problem.mesh_tolerance > 0:
                 run.refine()
             factor, failures = max(run.factor, factor**2), 0
         elif reached is None:
@@ -225,9 +224,10 @@ def _refine(run: _Run, result: NlpResult) -> NlpResult:
     """Solve again on refined meshes until the gait found needs no further refinement."""
     problem = run.problem
     for _ in range(_REFINEMENTS):
+        again = run.refined
         if not run.refine():
             break
-        if problem.has_path:
+        if problem.has_path and again:
             run.radius = SMALLEST_RADIUS
         result = run.attempt(problem.delta)
         if not result.optimal:

@@ -225,9 +225,12 @@ def _scipy(matrix: ca.DM) -> sparse.csr_matrix:
 
 
 def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
-    """Largest |multiplier| x distance to the bound it belongs to; equality rows do not count."""
+    """Largest |multiplier| x distance to the bound it belongs to; equality rows do not count.
+
+    Where that bound is infinite the multiplier itself ought to vanish and counts as it is.
+    """
     inequality = lower < upper
     distance = np.where(multiplier > 0, upper - value, value - lower)
     with np.errstate(invalid="ignore"):
-        product = np.where(multiplier == 0, 0.0, np.abs(multiplier * distance))
+        product = np.where(np.isinf(distance), np.abs(multiplier), np.abs(multiplier * distance))
     return float(product[inequality].max(initial=0.0))
