@@ -102,6 +102,9 @@ class NlpResult:
 OPTIMAL_TOLERANCE = 1e-6
 AnyProgram = TypeVar("AnyProgram", bound=Program)
 _REGIONS = 20
+_INSIDE = 0.999
+"""A point nearer to the edge of its trust region than this is on it: the barrier keeps off an active bound by its tolerance
+over the multiplier, which is small where efficiency is flat."""
 
 
 class Solver(Generic[AnyProgram]):
@@ -153,7 +156,7 @@ class Solver(Generic[AnyProgram]):
         result = self._solve_within(x, delta, multipliers, radius, iterations)
         own = self.transcription.layout.parameters[:, 0]
         for _ in range(_REGIONS):
-            if not result.optimal or np.abs(result.x[own] - x[own]).max() < radius * (1 - 1e-6):
+            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * radius:
                 return result
             x = result.x
             result = self._solve_within(x, delta, None, radius, iterations).accumulated(result)
@@ -290,9 +293,12 @@ def _scipy(matrix: ca.DM) -> sparse.csr_matrix:
 
 
 def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
-    """Largest |multiplier| x distance to the bound it belongs to; equality rows do not count."""
+    """Largest |multiplier| x distance to the bound it belongs to; equality rows do not count.
+
+    Where that bound is infinite the multiplier itself ought to vanish and counts as it is.
+    """
     inequality = lower < upper
     distance = np.where(multiplier > 0, upper - value, value - lower)
     with np.errstate(invalid="ignore"):
-        product = np.where(multiplier == 0, 0.0, np.abs(multiplier * distance))
+        product = np.where(np.isinf(distance), np.abs(multiplier), np.abs(multiplier * distance))
     return float(product[inequality].max(initial=0.0))

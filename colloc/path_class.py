@@ -3,7 +3,8 @@
 Without a bound on curvature, corners or bandwidth the efficiency has no maximum among nice paths: it keeps growing as
 paths get finer (docs/gait_classes.md). So the class is part of the problem. Members are vectors of parameters on a mesh:
 
-- `FreePath`: the length of the whole path, then the tangents at all edges, then the joint angles there;
+- `FreePath`: the mean shape speed, that is the length of the whole path over 2 pi (so that it moves about as far as the
+  angles do), then the tangents at all edges, then the joint angles there;
 - `Polygon`: the joint angles at the ends of all straight pieces of the solved part.
 """
 
@@ -67,7 +68,7 @@ class FreePath:
         return 1 + (n_interval + 1) * (n_joint + (1 if n_joint == 2 else n_joint))
 
     def split(self, parameters: np.ndarray, n_joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Length ``(1, 1)``, tangents ``(1 or n_joint, n + 1)`` and angles ``(n_joint, n + 1)`` of a parameter vector.
+        """Mean shape speed ``(1, 1)``, tangents ``(1 or n_joint, n + 1)``, angles ``(n_joint, n + 1)`` of a parameter vector.
 
         Works on the parameters' index array as well.
         """
@@ -78,12 +79,12 @@ class FreePath:
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> ArcPath:
         """The gait of a parameter vector on the mesh `edges` (phases)."""
-        length, tangents, shapes = self.split(parameters, n_joint)
-        return ArcPath(edges, shapes, tangents, length[0, 0], self.symmetry)
+        speed, tangents, shapes = self.split(parameters, n_joint)
+        return ArcPath(edges, shapes, tangents, 2 * np.pi * speed[0, 0], self.symmetry)
 
     def parameters(self, path: ArcPath) -> np.ndarray:
         """The parameter vector of a member."""
-        return np.concatenate([[path.length], path.tangents.ravel(order="F"), path.shapes.ravel(order="F")])
+        return np.concatenate([[path.length / (2 * np.pi)], path.tangents.ravel(order="F"), path.shapes.ravel(order="F")])
 
 
 @dataclass(frozen=True)

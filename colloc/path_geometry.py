@@ -19,7 +19,7 @@ from colloc.path_kernels import Piece, arc, chord, excess_turn, placed_check, si
 from colloc.problem import Problem
 from colloc.symmetry import BILATERAL, end_conditions, tangent_conditions
 
-_LONGEST = 200.0
+_FASTEST = 30.0
 _ANGLE_PER_ARC = 2.5
 """Most that a tangent may turn on one arc [rad]; more could not be told from turning the other way."""
 
@@ -106,15 +106,15 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     """
     gait: FreePath = problem.gait
     n_joint, symmetry = problem.body.n_joint, gait.symmetry
-    length, tangents, shapes = gait.split(parameters, n_joint)
+    speed, tangents, shapes = gait.split(parameters, n_joint)
     piece = arc(n_joint)
     cells = np.arange(mesh.n)
-    shape = np.concatenate([shapes[:, :-1], tangents[:, :-1], tangents[:, 1:], np.repeat(length, mesh.n, axis=1)])
+    shape = np.concatenate([shapes[:, :-1], tangents[:, :-1], tangents[:, 1:], np.repeat(speed, mesh.n, axis=1)])
     geometry = PathGeometry(
         piece, shape, cells, np.zeros(mesh.n), np.ones(mesh.n), mesh.h, [], {}, shape_checks(problem.body, far),
         np.full(n, -np.inf), np.full(n, np.inf),
     )  # fmt: skip
-    geometry.lower[length], geometry.upper[length] = 2 * np.pi * problem.smallest_shape_speed, _LONGEST
+    geometry.lower[speed], geometry.upper[speed] = problem.smallest_shape_speed, _FASTEST
 
     function = chord(piece)
     geometry.blocks["chord"] = (function, shape, mesh.h[None])
@@ -126,7 +126,9 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     ]
     if n_joint == 2:
         turn = selector(tangents[0, 1:], n) - selector(tangents[0, :-1], n)
-        allowed = sparse.csr_matrix((gait.curvature * mesh.h, (cells, np.full(mesh.n, length[0, 0]))), shape=(mesh.n, n))
+        allowed = sparse.csr_matrix(
+            (2 * np.pi * gait.curvature * mesh.h, (cells, np.full(mesh.n, speed[0, 0]))), shape=(mesh.n, n)
+        )
         least, most = np.full(mesh.n, -np.inf), np.zeros(mesh.n)
         geometry.groups += [
             Group("curvature to the left", least, most, (turn - allowed).tocsr()),

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from colloc.arcs import advance, direction
 from colloc.balance import instant, net_force, total_power
@@ -34,14 +35,15 @@ class Piece(NamedTuple):
 def arc(n_joint: int) -> Piece:
     """A point of an arc.
 
-    Shape: angles at its start, tangents at both ends, length of the whole path. Given: the fraction tau of the arc, and the
-    part of a period h that the arc takes.
+    Shape: angles at its start, tangents at both ends, mean shape speed (length of the whole path over 2 pi). Given: the
+    fraction tau of the arc, and the part of a period h that the arc takes.
     """
     rows = 1 if n_joint == 2 else n_joint
     start, t0, t1 = ca.SX.sym("q", n_joint), ca.SX.sym("t0", rows), ca.SX.sym("t1", rows)
-    length, tau, h = (ca.SX.sym(name) for name in ("length", "tau", "h"))
+    speed, tau, h = (ca.SX.sym(name) for name in ("speed", "tau", "h"))
+    length = 2 * np.pi * speed
     return Piece(
-        ca.vertcat(start, t0, t1, length),
+        ca.vertcat(start, t0, t1, speed),
         ca.vertcat(tau, h),
         start + length * h * advance(t0, t1, tau),
         direction(t0, t1, tau),
@@ -101,14 +103,14 @@ def unit_norm(n_joint: int) -> LocalFunction:
 def excess_turn(n_joint: int, curvature: float) -> LocalFunction:
     """How far unit tangents at both ends of an arc are apart, squared, beyond what the curvature allows.
 
-    Locals: both tangents and the path's length; given: the part of a period h that the arc takes. Half a turn an arc is the
+    Locals: both tangents and the mean shape speed; given: the part of a period h that the arc takes. Half a turn an arc is the
     most that unit tangents can express.
     """
     t0, t1 = ca.SX.sym("t0", n_joint), ca.SX.sym("t1", n_joint)
-    length, h = ca.SX.sym("length"), ca.SX.sym("h")
-    half = ca.fmin(0.5 * curvature * length * h, 1.4)
+    speed, h = ca.SX.sym("speed"), ca.SX.sym("h")
+    half = ca.fmin(np.pi * curvature * speed * h, 1.4)
     out = 0.25 * ca.sumsqr(t1 - t0) - ca.sin(half) ** 2
-    return local_function("turn", ca.vertcat(t0, t1, length), h, ca.SX.sym("delta"), out)
+    return local_function("turn", ca.vertcat(t0, t1, speed), h, ca.SX.sym("delta"), out)
 
 
 def squared_distance(n: int) -> LocalFunction:

@@ -24,7 +24,8 @@ CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
 FORMULATIONS = (CONDENSED, MAP, LIFTED)
 _CHECKED_PHASES = 2000
 _SLACK = 1e-9
-_FLOOR_SLACK = 1e-6
+_AT_THE_BOUND = 1e-4
+"""An optimum that lies on the lower bound of the shape speed is a good guess, although sampling makes it a little shorter."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +183,7 @@ class Problem:
             guess = self.guess
             points = symmetric_samples(guess, self.gait.symmetry)
             rms = np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.gait.fraction)
-        if rms < self.smallest_shape_speed * (1 - _FLOOR_SLACK):
+        if rms < self.smallest_shape_speed * (1 - _AT_THE_BOUND):
             raise ProblemError(
                 f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"

@@ -22,6 +22,7 @@ from colloc.optimise import maximise_efficiency
 from colloc.path_samples import path_length
 from colloc.prolongation import delta_in
 from colloc.replaced_file import replaced_file
+from colloc.sampling import LATIN_HYPERCUBE, start_gait
 
 STORE = Path("results/class_table.json")
 DELTA = 1e-4
@@ -44,6 +45,7 @@ def rows(short: bool) -> dict[str, tuple[object, int, list[str]]]:
     for n in harmonics:
         seeds = [f"harmonics {m}" for m in harmonics if m < n][-1:]
         seeds.append("large loop" if n == 1 else "curvature 8")
+        seeds += [f"start {k}" for k in range(4)] if n == 2 and not short else []
         result[f"harmonics {n}"] = (Harmonic(n, "bilateral"), 30 + 6 * n, seeds)
     corners = (3, 4) if short else range(3, 9)
     for m in corners:
@@ -65,6 +67,9 @@ def named_gait(name: str, friction: Friction) -> object:
         return ellipse(0, 1.8, 1.2)
     if name == "small triangle":
         return Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
+    if name.startswith("start"):
+        seeded = Problem("seeded", ellipse(0, 1, 1), gait=Harmonic(2, "bilateral"))
+        return start_gait(seeded, LATIN_HYPERCUBE, 0, int(name.split()[1]))
     body, length = Chain(), 0.7
     if name == "fold":
         shape = np.array([3.0, -0.03])
