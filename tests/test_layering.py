@@ -82,6 +82,7 @@ LEVELS = {
         "figures_maps",
         "figures_crawlers",
         "figures_paper",
+        "figures_precision",
     ],
 }
 LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
