@@ -11,6 +11,8 @@ Links farther apart cross iff each has its ends on both sides of the other's lin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from colloc.arrays import Array, namespace
@@ -20,8 +22,9 @@ Pairs = tuple[tuple[int, int], ...]
 """Pairs of links."""
 
 SMOOTHING = 1e-3
-"""Width [rad], or [body lengths] for links farther apart, of smoothed minima and maxima; they err to the safe side, by
-at most half of this for angles and 1.5 times this for lengths."""
+"""Width [rad] of the smoothed minimum; it errs to the safe side, by at most half of this."""
+CLEARANCE_SMOOTHING = 2e-4
+"""Width [body lengths] of smoothed absolute values and maxima; they err to the safe side, by at most 1.5 times this."""
 
 
 def _subtended(angle: Array, link: float, middle: float) -> Array:
@@ -72,9 +75,9 @@ def clearance(body: Chain, angles: Array, first: int, second: int) -> Array:
 
 
 def _smooth_abs(xp, value: Array) -> Array:
-    """Never above the absolute value, and below it by at most 0.3 `SMOOTHING`."""
+    """Never above the absolute value, and below it by at most 0.3 `CLEARANCE_SMOOTHING`."""
     square = value * value
-    return square / xp.sqrt(square + SMOOTHING * SMOOTHING)
+    return square / xp.sqrt(square + CLEARANCE_SMOOTHING**2)
 
 
 def _side(body: Chain, angles: Array, line: int, link: int) -> Array:
@@ -89,42 +92,46 @@ def _side(body: Chain, angles: Array, line: int, link: int) -> Array:
         rise = body.lengths[k] * xp.sin(turn)
         near, height = height, height + rise
     mean, spread = 0.5 * (near + height), 0.5 * (height - near)
-    return _smooth_abs(xp, mean) - xp.sqrt(spread * spread + SMOOTHING * SMOOTHING)
+    return _smooth_abs(xp, mean) - xp.sqrt(spread * spread + CLEARANCE_SMOOTHING**2)
 
 
-def crossing_depth(body: Chain, angles: np.ndarray) -> np.ndarray:
+def separate_pairs(body: Chain) -> list[tuple[int, int]]:
+    """All pairs of links that are not neighbours."""
+    return [(i, j) for i in range(body.n_link) for j in range(i + 2, body.n_link)]
+
+
+def crossing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
     """How far links penetrate each other, ``(n_time,)``; 0 where no two of them cross.
 
-    Plain segment intersection of all pairs that are not neighbours, independent of `crossing_bounds`: the depth is the
-    smallest distance from an end of one of two crossing segments to the other segment.
+    Plain segment intersection of the given pairs, by default of all that are not neighbours, independent of
+    `crossing_bounds` and `clearance`: the depth is the smallest distance from an end of one of two crossing segments to the
+    other segment.
     """
     ends = np.stack(body.joints(angles))
     depth = np.zeros(angles.shape[1])
-    for i in range(body.n_link):
-        for j in range(i + 2, body.n_link):
-            (d1, d2), (d3, d4), _ = _end_distances(ends, i, j)
-            crossing = (d1 * d2 < 0) & (d3 * d4 < 0)
-            distance = np.min(np.abs([d1, d2, d3, d4]), axis=0)
-            depth = np.maximum(depth, np.where(crossing, distance, 0.0))
+    for i, j in separate_pairs(body) if pairs is None else pairs:
+        (d1, d2), (d3, d4), _ = _end_distances(ends, i, j)
+        crossing = (d1 * d2 < 0) & (d3 * d4 < 0)
+        distance = np.min(np.abs([d1, d2, d3, d4]), axis=0)
+        depth = np.maximum(depth, np.where(crossing, distance, 0.0))
     return depth
 
 
-def passing_depth(body: Chain, angles: np.ndarray) -> float:
+def passing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
     """How far links pass through each other between successive instants of a path [body lengths]; 0 if none does.
 
-    A link cannot cross another without one of its ends passing through it. That shows even where two samples hold no
+    A link cannot cross another without an end of one passing through the other. That shows even where no sample holds a
     crossing (parallel links that slip through each other): an end that is beside the other link changes its side. The
     value is the smaller of the end's distances before and after.
     """
     ends = np.stack(body.joints(angles))
     deepest = 0.0
-    for i in range(body.n_link):
-        for j in range(i + 2, body.n_link):
-            first, second, beside = _end_distances(ends, i, j)
-            for distance, along in zip((*first, *second), beside, strict=True):
-                through = (distance[1:] * distance[:-1] < 0) & along[1:] & along[:-1]
-                passed = np.minimum(np.abs(distance[1:]), np.abs(distance[:-1]))[through]
-                deepest = max(deepest, float(passed.max(initial=0.0)))
+    for i, j in separate_pairs(body) if pairs is None else pairs:
+        first, second, beside = _end_distances(ends, i, j)
+        for distance, along in zip((*first, *second), beside, strict=True):
+            through = (distance[1:] * distance[:-1] < 0) & along[1:] & along[:-1]
+            passed = np.minimum(np.abs(distance[1:]), np.abs(distance[:-1]))[through]
+            deepest = max(deepest, float(passed.max(initial=0.0)))
     return deepest
 
 

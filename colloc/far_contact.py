@@ -9,19 +9,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.contact import Pairs, clearance, far_pairs
+from colloc.contact import Pairs, crossing_depth, far_pairs, passing_depth
 from colloc.program import GaitProgram
 
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs are checked; the certificate checks 20000 a period."""
+TOUCHING = 1e-8
+"""Penetration [body lengths] that counts as contact, not as crossing."""
 _FRACTIONS = np.linspace(1.0, 0.0, 21)
 
 
-def crossing_pairs(program: GaitProgram, parameters: np.ndarray, tolerance: float = 1e-8) -> Pairs:
-    """Pairs of links more than two apart that cross, or come nearer than `tolerance` [body lengths] to it, in a gait."""
+def crossing_pairs(program: GaitProgram, parameters: np.ndarray) -> Pairs:
+    """Pairs of links more than two apart that cross, or pass through each other, in a gait.
+
+    Judged by plain intersection: the smooth `colloc.contact.clearance` keeps a small distance, and constraining pairs that
+    only touch makes problems harder for nothing (a folded chain of equal links has such contacts).
+    """
     body, t = program.problem.body, np.linspace(0.0, program.problem.gait.fraction, PHASES)
     angles = program.member(parameters).angles(t)
-    return tuple((i, j) for i, j in far_pairs(body) if clearance(body, angles, i, j).min() < -tolerance)
+    return tuple(
+        pair
+        for pair in far_pairs(body)
+        if max(crossing_depth(body, angles, [pair]).max(), passing_depth(body, angles, [pair])) > TOUCHING
+    )
 
 
 def last_free(program: GaitProgram, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.contact import clearance, crossing_bounds, far_pairs
+from colloc.contact import crossing_bounds, crossing_depth, far_pairs
 from colloc.fine_motion import FineMotion, Rates, fine_motion, increments, rates_at
 from colloc.gait_fields import AnyGait
 from colloc.mesh import Mesh
@@ -179,5 +179,5 @@ def constraint_violation(problem: Problem, mesh: Mesh, gait: AnyGait) -> np.ndar
     bounds = crossing_bounds(body, angles)
     if bounds is not None:
         rows.append(bounds.max(axis=0) - np.pi)
-    rows += [-clearance(body, angles, i, j)[0] for i, j in far_pairs(body)]
+    rows.append(crossing_depth(body, angles, far_pairs(body)))
     return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)

@@ -143,6 +143,7 @@ LEVELS = {
         "figures_animation",
         "animate",
         "figures_studies",
+        "figures_precision",
     ],
     7: ["study_cell", "study_journal", "study_run", "study_table", "store_study", "sweep_study"],
 }
