@@ -210,7 +210,8 @@ def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool)
                     line.clear()
                     print(level_line(level), flush=True)
                 left = levels_left(problem, level) * (time.monotonic() - begin) / (len(levels) - len(before_levels))
-                line.say(f"{problem.name}: solving, delta {level.delta:.0e} done", left)
+                what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
+                line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
 
             solution = maximise_efficiency(problem, ended, before_levels)
     except KeyboardInterrupt:

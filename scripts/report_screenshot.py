@@ -21,10 +21,18 @@ from colloc.solve import main as solve
 ROOT = Path(__file__).resolve().parents[1]
 TARGET = ROOT / "results/curated/report.png"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-OPTIONS = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --hide-scrollbars --virtual-time-budget=3000"
-).split()
+OPTIONS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+    "--virtual-time-budget=3000",
+]
 _WINDOW, _WIDTH, _COLOURS = (1120, 4400), 900, 96
 
 

@@ -226,3 +226,12 @@ def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
     cursors = re.findall(r'class="cursor" x1="([0-9.]+)"', result.stdout)
     assert len(set(cursors)) == 1
     assert "cx=" in re.search(r'<circle class="dot"[^>]*>', result.stdout).group(0)
+
+
+def test_a_notebook_shows_a_card(three_link):
+    card = outline(three_link._repr_html_())
+    text = " ".join(card.text)
+    for words in ("three_link", "solved", "0.26003", "checks, all hold", "joint angles [rad]"):
+        assert words in text
+    failed = Solution(three_link.problem, [], message="no first level.")
+    assert "not converged" in " ".join(outline(failed._repr_html_()).text)
