@@ -57,7 +57,7 @@ class _Run:
         self.parameters = problem.gait.parameters(problem.guess)
         self.multipliers: tuple[np.ndarray, np.ndarray] | None = None
         self.radius = FIRST_RADIUS
-        self.first_delta = problem.delta_start
+        self.reached: NlpResult | None = None
         if problem.gait.symmetry == "none":
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
 
@@ -66,16 +66,16 @@ class _Run:
         return self.problem.gait.fourier(self.parameters, self.problem.body.n_joint)
 
     def take_over(self, levels: Sequence[Level]) -> None:
-        """Go on where an interrupted run stopped: its last optimal level is solved again, from its own result."""
+        """Go on where an interrupted run stopped: all up to its last optimal level counts as done."""
         optimal = [k for k, level in enumerate(levels) if level.optimal]
         if not optimal:
             return
-        last = levels[optimal[-1]]
-        if not np.array_equal(last.edges, self.solver.transcription.mesh.edges):
-            self.remesh(last.edges)
-        self.levels = list(levels[: optimal[-1]])
+        self.levels = list(levels[: optimal[-1] + 1])
+        last = self.levels[-1]
+        self.solver = Solver(transcribe(self.problem, last.edges))
         self.parameters = last.x[self.solver.transcription.layout.parameters[:, 0]]
-        self.multipliers, self.radius, self.first_delta = (last.lam_x, last.lam_g), NEXT_RADIUS, last.delta
+        self.multipliers, self.radius = (last.lam_x, last.lam_g), NEXT_RADIUS
+        self.reached = _as_result(last)
 
     def attempt(self, delta: float) -> NlpResult:
         """Solve at delta from the last converged gait; take the result over if it is optimal."""
@@ -184,7 +184,12 @@ def continue_delta(
 def _descend(run: _Run) -> NlpResult:
     """Levels down to the problem's delta, with smaller steps after a failure; the last result."""
     target = run.problem.delta
-    delta, factor, reached, failures, meshes = run.first_delta, FIRST_FACTOR, None, 0, 1
+    delta, factor, reached, failures, meshes = run.problem.delta_start, FIRST_FACTOR, None, 0, 1
+    if run.reached is not None:
+        reached = run.levels[-1].delta
+        if reached <= target:
+            return run.reached
+        delta = _next_delta(reached, factor, target)
     while True:
         result = run.attempt(delta)
         if result.optimal:
@@ -208,7 +213,29 @@ def _descend(run: _Run) -> NlpResult:
                 return result
             else:
                 factor = factor**0.5
-        delta = reached * factor if reached * factor > 1.2 * target else target
+        delta = _next_delta(reached, factor, target)
+
+
+def _next_delta(reached: float, factor: float, target: float) -> float:
+    return reached * factor if reached * factor > 1.2 * target else target
+
+
+def _as_result(level: Level) -> NlpResult:
+    """What the optimiser returned for an optimal level that was kept."""
+    return NlpResult(
+        level.x,
+        level.lam_x,
+        level.lam_g,
+        -level.efficiency,
+        level.kkt_error,
+        level.violation,
+        level.complementarity,
+        level.status,
+        level.iterations,
+        level.seconds,
+        level.evaluation_seconds,
+        np.zeros_like(level.lam_g),
+    )
 
 
 def _refine(run: _Run, result: NlpResult) -> NlpResult:

@@ -43,13 +43,13 @@ def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
     assert {path.name for path in out.iterdir()} == {"long.h5"}
     solution = load(out / "long.h5")
     assert solution.status == "solved"
-    # the last level kept is solved again from its own result, which is quick; those before it are not touched
-    kept = len(partial.levels) - 1
-    for old, new in zip(partial.levels[:kept], solution.levels[:kept], strict=True):
+    # what was optimal is not solved again
+    last = max(k for k, level in enumerate(partial.levels) if level.optimal)
+    kept = partial.levels[: last + 1]
+    for old, new in zip(kept, solution.levels, strict=False):
         assert new.seconds == old.seconds
         np.testing.assert_array_equal(new.x, old.x)
-    assert solution.levels[kept].delta == partial.levels[kept].delta
-    assert solution.levels[kept].iterations < 0.5 * partial.levels[kept].iterations
+    assert len(solution.levels) > len(kept)
     assert solution.certificate.efficiency == pytest.approx(0.26003, abs=2e-5)
 
 
