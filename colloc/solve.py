@@ -26,6 +26,7 @@ from colloc.command_options import (
     new_parser,
     output_path,
 )
+from colloc.errors import StoreError
 from colloc.problem import Problem, Reference
 from colloc.problem_file import read_problem_file
 from colloc.progress import StatusLine
@@ -189,7 +190,10 @@ def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool)
     partial = _partial(path)
     levels: list[Level] = []
     if partial.exists() and not fresh:
-        before = load(partial)
+        try:
+            before = load(partial)
+        except StoreError as error:
+            raise StoreError(f"{error} It was left by an interrupted run; --fresh begins again.") from None
         if before.problem.hash == problem.hash:
             levels = list(before.levels)
     table = not quiet and sys.stdout.isatty()

@@ -17,6 +17,10 @@ from colloc import *
 PROBLEM = Problem(name="long", gait=Harmonic(1, "bilateral"), guess=ellipse(0.3, 1.0, 0.5), intervals=80,
                   mesh_tolerance=1e-5)
 """
+QUICK = """
+from colloc import *
+PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
+"""
 
 
 def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
@@ -73,3 +77,25 @@ def test_a_handler_of_somebody_else_is_left_alone():
     finally:
         signal.signal(signal.SIGINT, before)
     assert heard == [signal.SIGINT]
+
+
+def test_a_damaged_partial_file_is_named_and_fresh_begins_again(tmp_path, capsys):
+    from colloc.solve import main
+
+    (tmp_path / "quick.py").write_text(QUICK, encoding="utf-8")
+    (tmp_path / "quick.partial.h5").write_text("no levels")
+    command = [str(tmp_path / "quick.py"), "--output", str(tmp_path), "--no-figure"]
+    assert main(command) == 2
+    assert "--fresh begins again" in capsys.readouterr().err
+    assert main([*command, "--fresh"]) in (0, 4)
+    assert not (tmp_path / "quick.partial.h5").exists()
+
+
+def test_levels_of_another_problem_are_not_taken_over(tmp_path, capsys, three_link):
+    from colloc.solve import main
+    from colloc.store import save
+
+    (tmp_path / "quick.py").write_text(QUICK, encoding="utf-8")
+    save(three_link, tmp_path / "quick.partial.h5")
+    main([str(tmp_path / "quick.py"), "--output", str(tmp_path), "--no-figure"])
+    assert "going on" not in capsys.readouterr().out
