@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from colloc.continuation import TRIVIAL, Report, continue_delta
+from colloc.continuation import continue_delta
 from colloc.errors import NotConvergedError
+from colloc.level_run import TRIVIAL, Report
 from colloc.problem import Problem
 from colloc.solution import Level, Solution
 from colloc.verify import certify

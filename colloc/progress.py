@@ -79,8 +79,9 @@ class StatusLine:
                 return
             now = time.monotonic()
             line = f"{self._text}   {duration(now - self._begin)}"
-            if self._left is not None:
-                line += f", about {duration(max(self._left - (now - self._since), 1))} left"
+            left = 0.0 if self._left is None else self._left - (now - self._since)
+            if left > 0.5:  # an estimate that has run out is worth nothing
+                line += f", about {duration(left)} left"
             self._stream.write("\r" + line.ljust(self._width))
             self._stream.flush()
             self._width = len(line)

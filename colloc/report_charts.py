@@ -15,33 +15,55 @@ from colloc.solution import Solution
 _PI_TICKS = [(-np.pi, "−π"), (-np.pi / 2, "−π/2"), (0.0, "0"), (np.pi / 2, "π/2"), (np.pi, "π")]
 _CELLS = 120
 _FORBIDDEN = "#dcdcdc"
+_PLANE, _SMALL, _MOST_PLANES = 320, 1.6, 6
+"""Pixels of a plane; extent [rad] below which a path is also shown closer; planes shown at most."""
 
 
-def plane_chart(problem: Problem, angles: np.ndarray, first: int, second: int, size: int = 320) -> Markup:
-    """The gait in the plane of two joint angles; grey shapes are not allowed. A dot follows the animation."""
-    limit = 1.03 * np.pi
+def plane_chart(problem: Problem, angles: np.ndarray, first: int, second: int, *, closer: bool = False) -> Markup:
+    """The gait in the plane of two joint angles; grey shapes are not allowed. A dot follows the animation.
+
+    Parameters
+    ----------
+    problem : Problem
+    angles : (n_joint, n_time)
+    first, second : int
+        Joints, from 0.
+    closer : bool
+        Show a square around the path instead of the whole plane.
+    """
+    path = angles[[first, second]]
+    middle, half = np.zeros(2), 1.03 * np.pi
+    if closer:
+        middle, half = 0.5 * (path.min(axis=1) + path.max(axis=1)), 0.6 * float(np.ptp(path, axis=1).max())
+    x, y = ((float(m - half), float(m + half)) for m in middle)
     chart = Chart(
-        (-limit, limit),
-        (-limit, limit),
-        f"joints {first + 1} and {second + 1}",
+        x,
+        y,
+        f"joints {first + 1} and {second + 1}" + (", closer" if closer else ""),
         f"joint angle {first + 1} [rad]",
         f"joint angle {second + 1} [rad]",
-        width=size,
-        height=round(0.98 * size),
+        width=_PLANE,
+        height=round(0.98 * _PLANE),
     )
-    for x, y in forbidden_rectangles(problem):
-        chart.rectangle(x, y, _FORBIDDEN)
-    path = angles[[first, second]]
+    for wide, high in forbidden_rectangles(problem):
+        if wide[0] < x[1] and wide[1] > x[0] and high[0] < y[1] and high[1] > y[0]:
+            chart.rectangle((max(wide[0], x[0]), min(wide[1], x[1])), (max(high[0], y[0]), min(high[1], y[1])), _FORBIDDEN)
     chart.line(path[0], path[1], BLUE, width=2)
     chart.marks(path[0, :1], path[1, :1], BLUE, hollow=True)
-    chart.parts.append(_dot(chart, first, second))
-    return chart.svg(_PI_TICKS, _PI_TICKS)
+    pixels = [*chart.px(np.array(x)), *chart.py(np.array(y))]
+    box = ",".join(f"{value:.5g}" for value in [*pixels, *x, *y])
+    chart.parts.append(element("circle", class_="dot", r=5, fill=VERMILION, data_box=box, data_first=first, data_second=second))
+    return chart.svg() if closer else chart.svg(_PI_TICKS, _PI_TICKS)
 
 
-def _dot(chart: Chart, first: int, second: int) -> Markup:
-    ends = np.array([-np.pi, np.pi])
-    box = ",".join(f"{value:.2f}" for value in [*chart.px(ends), *chart.py(ends)])
-    return element("circle", class_="dot", r=5, fill=VERMILION, data_box=box, data_first=first, data_second=second)
+def plane_charts(problem: Problem, angles: np.ndarray) -> list[Markup]:
+    """The planes of neighbouring joints; a path that fills little of its plane is shown closer, too."""
+    charts = []
+    for j in range(min(len(angles) - 1, _MOST_PLANES)):
+        charts.append(plane_chart(problem, angles, j, j + 1))
+        if np.ptp(angles[j : j + 2], axis=1).max() < _SMALL:
+            charts.append(plane_chart(problem, angles, j, j + 1, closer=True))
+    return charts
 
 
 def forbidden_rectangles(problem: Problem) -> list[tuple[tuple[float, float], tuple[float, float]]]:

@@ -10,11 +10,10 @@ import numpy as np
 from colloc.markup import Markup, element, table
 from colloc.motion_frames import Frames, frames
 from colloc.problem import Reference
-from colloc.report_charts import angles_chart, convergence_chart, mesh_chart, plane_chart, power_chart, speeds_chart
+from colloc.report_charts import angles_chart, convergence_chart, mesh_chart, plane_charts, power_chart, speeds_chart
 from colloc.solution import SOLVED, Solution
 
 _PHASES = 601
-_MOST_PLANES = 6
 _STAGE_WIDTH, _STAGE_HEIGHTS = 1040, (240, 560)
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """The page may run its own script and nothing else: it can fetch nothing, whatever the file held."""
@@ -197,7 +196,7 @@ def _charts(solution: Solution) -> Markup:
     t = np.linspace(0.0, 1.0, _PHASES)
     angles = solution.sample(t).angles
     n = len(angles)
-    planes = [plane_chart(solution.problem, angles, j, j + 1) for j in range(min(n - 1, _MOST_PLANES))]
+    planes = plane_charts(solution.problem, angles)
     note = "Grey: beyond the joint limit" + (", or links would cross." if n == 2 else " (contact depends on the other joints).")
     return element(
         "section",

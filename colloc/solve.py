@@ -28,6 +28,7 @@ from colloc.command_options import (
     new_parser,
     output_path,
 )
+from colloc.errors import StoreError
 from colloc.gait import Fourier
 from colloc.gait_fields import fields
 from colloc.path_gait import ArcPath
@@ -201,7 +202,10 @@ def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool)
     partial = _partial(path)
     levels: list[Level] = []
     if partial.exists() and not fresh:
-        before = load(partial)
+        try:
+            before = load(partial)
+        except StoreError as error:
+            raise StoreError(f"{error} It was left by an interrupted run; --fresh begins again.") from None
         if before.problem.hash == problem.hash:
             levels = list(before.levels)
     table = not quiet and sys.stdout.isatty()
@@ -222,7 +226,8 @@ def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool)
                     line.clear()
                     print(level_line(level), flush=True)
                 left = levels_left(problem, level) * (time.monotonic() - begin) / (len(levels) - len(before_levels))
-                line.say(f"{problem.name}: solving, delta {level.delta:.0e} done", left)
+                what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
+                line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
 
             solution = maximise_efficiency(problem, ended, before_levels)
     except KeyboardInterrupt:

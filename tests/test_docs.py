@@ -7,9 +7,11 @@ import io
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from colloc.command import SUBCOMMANDS
+from colloc.gait import ellipse
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
@@ -68,7 +70,7 @@ def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys)
 
 def test_messages_quoted_in_troubleshooting_are_the_programs_own():
     text = (ROOT / "docs/troubleshooting.md").read_text(encoding="utf-8")
-    quoted = [part for part in re.findall(r"`([^`\n]{18,})`", text) if " " in part and not part.startswith("--")]
+    quoted = [part for part in re.findall(r"`([^`\n]+)`", text) if len(part) > 17 and " " in part and part[0] != "-"]
     words = re.sub(r'"\s*\n\s*f?"', "", SOURCES)  # literals continued on the next line
     known = " ".join(re.sub(r"\{[^{}]*\}", "...", words).split())
     for message in quoted:
@@ -82,3 +84,19 @@ def test_readme_and_tutorial_name_every_documented_command():
     tutorial = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
     for name in ("solve", "report", "animate", "verify", "multistart", "export", "compare"):
         assert f"colloc {name}" in tutorial
+
+
+@pytest.mark.slow
+def test_the_scripts_page_runs_from_top_to_bottom(tmp_path, monkeypatch):
+    """Every block in one namespace; what the text leaves to the reader (shapes, rates, a path) is given here."""
+    monkeypatch.chdir(tmp_path)
+    t = np.linspace(0.0, 1.0, 50)
+    gait = ellipse(0.0, 2.0, 1.0)
+    names = {"angles": gait.angles(t), "rates": gait.rates(t), "path": lambda t: (gait.angles(t), gait.rates(t))}
+    for block in blocks(ROOT / "docs/howto/scripts.md", "python"):
+        exec(compile(block, "scripts.md", "exec"), names)
+    assert names["solution"].status == "solved"
+    assert names["z"].shape == (3, 50)
+    assert names["measured"].efficiency > 0.1
+    assert [s.problem.friction.mu_t for s in names["solutions"]] == [1.7, 2, 3, 5]
+    assert (tmp_path / "results/mine.h5").exists()

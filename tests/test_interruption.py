@@ -17,6 +17,10 @@ from colloc import *
 PROBLEM = Problem(name="long", gait=Harmonic(1, "bilateral"), guess=ellipse(0.3, 1.0, 0.5), intervals=80,
                   mesh_tolerance=1e-5)
 """
+QUICK = """
+from colloc import *
+PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
+"""
 
 
 def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
@@ -43,13 +47,13 @@ def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
     assert {path.name for path in out.iterdir()} == {"long.h5"}
     solution = load(out / "long.h5")
     assert solution.status == "solved"
-    # the last level kept is solved again from its own result, which is quick; those before it are not touched
-    kept = len(partial.levels) - 1
-    for old, new in zip(partial.levels[:kept], solution.levels[:kept], strict=True):
+    # what was optimal is not solved again
+    last = max(k for k, level in enumerate(partial.levels) if level.optimal)
+    kept = partial.levels[: last + 1]
+    for old, new in zip(kept, solution.levels, strict=False):
         assert new.seconds == old.seconds
         np.testing.assert_array_equal(new.x, old.x)
-    assert solution.levels[kept].delta == partial.levels[kept].delta
-    assert solution.levels[kept].iterations < 0.5 * partial.levels[kept].iterations
+    assert len(solution.levels) > len(kept)
     assert solution.certificate.efficiency == pytest.approx(0.26003, abs=2e-5)
 
 
@@ -73,3 +77,25 @@ def test_a_handler_of_somebody_else_is_left_alone():
     finally:
         signal.signal(signal.SIGINT, before)
     assert heard == [signal.SIGINT]
+
+
+def test_a_damaged_partial_file_is_named_and_fresh_begins_again(tmp_path, capsys):
+    from colloc.solve import main
+
+    (tmp_path / "quick.py").write_text(QUICK, encoding="utf-8")
+    (tmp_path / "quick.partial.h5").write_text("no levels")
+    command = [str(tmp_path / "quick.py"), "--output", str(tmp_path), "--no-figure"]
+    assert main(command) == 2
+    assert "--fresh begins again" in capsys.readouterr().err
+    assert main([*command, "--fresh"]) in (0, 4)
+    assert not (tmp_path / "quick.partial.h5").exists()
+
+
+def test_levels_of_another_problem_are_not_taken_over(tmp_path, capsys, three_link):
+    from colloc.solve import main
+    from colloc.store import save
+
+    (tmp_path / "quick.py").write_text(QUICK, encoding="utf-8")
+    save(three_link, tmp_path / "quick.partial.h5")
+    main([str(tmp_path / "quick.py"), "--output", str(tmp_path), "--no-figure"])
+    assert "going on" not in capsys.readouterr().out

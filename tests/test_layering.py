@@ -96,6 +96,7 @@ LEVELS = {
         "verify",
         "diagnosis",
         "continuation",
+        "level_run",
         "concertina",
         "epsilon_study",
         "chain_study",

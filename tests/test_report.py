@@ -18,7 +18,7 @@ from colloc.markup import VOID, Markup, element, table
 from colloc.motion_frames import frames
 from colloc.problem import Problem, Reference
 from colloc.report import main
-from colloc.report_charts import forbidden_rectangles
+from colloc.report_charts import forbidden_rectangles, plane_charts
 from colloc.report_page import json_block, report_page
 from colloc.solution import Check, Solution
 from colloc.store import save
@@ -159,7 +159,8 @@ def test_chains_of_two_to_eight_links(n_link, unsolved):
     motion = json.loads(seen.scripts[0])
     assert len(motion["x"]) == n_link + 1
     assert len(motion["angles"]) == n_link - 1
-    assert page.count('class="dot"') == min(n_link - 2, 6)
+    planes = min(n_link - 2, 6)
+    assert page.count('class="dot"') == planes + page.count(", closer</text>")
     assert len(page) < 600_000
 
 
@@ -174,6 +175,22 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
     np.testing.assert_allclose(shown.step, shown.centre[:, -1] - shown.centre[:, 0])
+
+
+def test_a_small_loop_is_also_shown_closer(unsolved):
+    small = crawler(3, guess=Fourier(np.array([2.3, -2.3]), np.array([[0.2], [-0.2]]), np.array([[0.15], [0.15]])))
+    problem = small.with_(smallest_shape_speed=0.01)
+    angles = problem.guess.angles(np.linspace(0, 1, 50))
+    whole, closer = plane_charts(problem, angles)
+    assert ", closer" in closer
+    x0, x1, y0, y1, low, high, *_ = (float(v) for v in re.search('data-box="([^"]*)"', closer).group(1).split(","))
+    assert x0 < x1
+    assert y0 > y1
+    assert low < angles[0].min() < angles[0].max() < high
+    points = re.findall(r"([0-9.]+),([0-9.]+)", re.search('polyline points="([^"]*)"', closer).group(1))
+    x = np.array(points, dtype=float)[:, 0]
+    np.testing.assert_allclose(x, x0 + (angles[0] - low) / (high - low) * (x1 - x0), atol=0.1)
+    assert ", closer" not in whole
 
 
 def test_forbidden_rectangles_cover_the_exact_set_of_the_three_link_body():
@@ -226,3 +243,12 @@ def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
     cursors = re.findall(r'class="cursor" x1="([0-9.]+)"', result.stdout)
     assert len(set(cursors)) == 1
     assert "cx=" in re.search(r'<circle class="dot"[^>]*>', result.stdout).group(0)
+
+
+def test_a_notebook_shows_a_card(three_link):
+    card = outline(three_link._repr_html_())
+    text = " ".join(card.text)
+    for words in ("three_link", "solved", "0.26003", "checks, all hold", "joint angles [rad]"):
+        assert words in text
+    failed = Solution(three_link.problem, [], message="no first level.")
+    assert "not converged" in " ".join(outline(failed._repr_html_()).text)

@@ -120,9 +120,11 @@
     });
     const angles = at(data.angles, position, -1);
     document.querySelectorAll(".dot").forEach(mark => {
-      const ends = mark.dataset.box.split(",").map(Number), share = k => (angles[Number(k)] + Math.PI) / (2 * Math.PI);
-      mark.setAttribute("cx", ends[0] + share(mark.dataset.first) * (ends[1] - ends[0]));
-      mark.setAttribute("cy", ends[2] + share(mark.dataset.second) * (ends[3] - ends[2]));
+      // pixels of the limits (x, x, y, y), then the limits in radians
+      const box = mark.dataset.box.split(",").map(Number);
+      const place = (k, angle) => box[k] + (angle - box[k + 4]) / (box[k + 5] - box[k + 4]) * (box[k + 1] - box[k]);
+      mark.setAttribute("cx", place(0, angles[Number(mark.dataset.first)]));
+      mark.setAttribute("cy", place(2, angles[Number(mark.dataset.second)]));
     });
   }
 
