@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from colloc.friction import Friction
     from colloc.gait import Fourier, Harmonic, ellipse
     from colloc.optimise import maximise_efficiency
+    from colloc.path_replay import replay
     from colloc.problem import Problem, Reference
-    from colloc.replay import replay
     from colloc.solution import Solution
     from colloc.store import load, save
     from colloc.verify import certify
@@ -65,7 +65,7 @@ _HOME = {
     "gait": ("Fourier", "Harmonic", "ellipse"),
     "optimise": ("maximise_efficiency",),
     "problem": ("Problem", "Reference"),
-    "replay": ("replay",),
+    "path_replay": ("replay",),
     "solution": ("Solution",),
     "store": ("load", "save"),
     "verify": ("certify",),

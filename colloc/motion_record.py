@@ -11,7 +11,7 @@ from colloc.balance import instant
 from colloc.body import Chain
 from colloc.fixed_point import solve_balance
 from colloc.friction import Friction
-from colloc.replay import Path
+from colloc.path_replay import Path
 
 
 class Record(NamedTuple):

@@ -24,7 +24,7 @@ from colloc.fixed_point import solve_balance
 from colloc.friction import Friction
 from colloc.gait import ellipse
 from colloc.parallel import parallel_map
-from colloc.replay import Replay, replay
+from colloc.path_replay import Replay, replay
 from colloc.velocity_map import VelocityMap
 
 _CHUNK_INSTANTS = 10_000

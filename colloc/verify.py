@@ -6,7 +6,7 @@ import numpy as np
 
 from colloc.balance import net_force
 from colloc.contact import crossing_depth
-from colloc.replay import Path, Replay, replay
+from colloc.path_replay import Path, Replay, replay
 from colloc.solution import Certificate, Check, Solution
 
 KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK, DELTA = 1e-6, 1e-8, 1e-6, 1e-9, 1e-3, 1e-6, 1e-4, 1e-7, 1e-2

@@ -11,7 +11,7 @@ from colloc.fixed_point import solve_balance
 from colloc.gait import ellipse
 from colloc.motion_record import record
 from colloc.parallel import parallel_map
-from colloc.replay import replay
+from colloc.path_replay import replay
 from colloc.study import Arrays, Context
 from colloc.sweep import Route, distinct_maxima, performance
 from colloc.velocity_map import STENCILS

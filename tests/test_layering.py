@@ -25,7 +25,7 @@ LEVELS = {
         "blocks",
         "kernels",
         "velocity_callback",
-        "replay",
+        "path_replay",
         "warm_start",
         "transcription",
         "smooth_balance",
@@ -167,3 +167,10 @@ def test_only_one_module_names_ipopt():
 def test_modules_are_short():
     for name, path in modules().items():
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 350, name
+
+
+def test_no_public_name_is_shadowed_by_a_module():
+    """Importing colloc.x sets the attribute x of colloc, so a function of that name would vanish once it is used."""
+    import colloc
+
+    assert not set(colloc.__all__) & set(modules())

@@ -21,8 +21,8 @@ from colloc.friction import Friction
 from colloc.gait import Fourier, Harmonic, ellipse, shifted
 from colloc.homotopy import continue_parameter, with_parameter
 from colloc.optimise import is_trivial, maximise_efficiency
+from colloc.path_replay import replay
 from colloc.problem import Problem
-from colloc.replay import replay
 from colloc.sampling import BLOCK, SAMPLERS, shape_speed, start_gait
 from colloc.solution import SOLVED
 from colloc.store_archive import Archive, load_archive, save_archive

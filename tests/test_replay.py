@@ -6,7 +6,7 @@ import pytest
 from colloc.body import Chain
 from colloc.friction import Friction
 from colloc.gait import ellipse
-from colloc.replay import replay
+from colloc.path_replay import replay
 
 
 def test_reciprocal_gaits_go_nowhere():

@@ -8,8 +8,8 @@ from colloc.fixed_point import solve_balance
 from colloc.friction import Friction
 from colloc.gait import Harmonic, ellipse
 from colloc.optimise import maximise_efficiency
+from colloc.path_replay import replay
 from colloc.problem import Problem
-from colloc.replay import replay
 from colloc.verify import certify
 
 

@@ -8,7 +8,7 @@ from colloc.ellipses import gait_grid, largest_amplitude
 from colloc.errors import ProblemError
 from colloc.friction import Friction
 from colloc.gait import ellipse
-from colloc.replay import replay
+from colloc.path_replay import replay
 from colloc.sweep import Route, distinct_maxima, local_maxima, performance, refined_maximum
 from colloc.velocity_map import velocity_map
 
