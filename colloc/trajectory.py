@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from colloc.errors import ProblemError
-from colloc.replay import Path
+from colloc.path_replay import Path
 
 _PHASES = 20001
 _MOST_SAMPLES = 2_000_000
@@ -55,7 +55,7 @@ def timed(path: Path, rate: float, period: float | None = None, limits: np.ndarr
     Parameters
     ----------
     path : callable
-        Joint angles and rates at phases, see `colloc.replay.Path`.
+        Joint angles and rates at phases, see `colloc.path_replay.Path`.
     rate : float
         Samples a second.
     period : float, optional

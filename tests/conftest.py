@@ -40,7 +40,7 @@ def unsolved():
 
 
 def guess_in_balance(problem):
-    from colloc.replay import replay
+    from colloc.path_replay import replay
     from colloc.solution import Level, Solution
     from colloc.transcription import transcribe
     from colloc.warm_start import feasible_point

@@ -12,7 +12,7 @@ from colloc.errors import ProblemError
 from colloc.export import main
 from colloc.friction import Friction
 from colloc.gait import Fourier, ellipse
-from colloc.replay import replay
+from colloc.path_replay import replay
 from colloc.store import save
 from colloc.trajectory import timed
 
