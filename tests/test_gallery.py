@@ -8,7 +8,7 @@ from colloc.concertina import Concertina
 from scripts.gallery import PICTURES, TABLE, examples, prescribed_row, solved_row
 
 NUMBERS = json.loads(TABLE.read_text())
-SLOW = 6.0
+SLOW = 4.0
 """Files that took longer [s of processor time] are left to the slow tests."""
 
 

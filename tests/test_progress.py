@@ -2,6 +2,7 @@
 
 import io
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -57,6 +58,6 @@ def test_nothing_is_written_where_nobody_watches():
 
 def test_levels_left_counts_decades_and_a_refined_mesh(three_link):
     problem = Problem("x", ellipse(0.0, 1.4, 0.8), delta=1e-4, delta_start=0.1)
-    counts = [levels_left(problem, level) for level in three_link.levels]
-    assert counts == [4, 3, 2, 1, 1]
-    assert levels_left(problem.with_(mesh_tolerance=0.0), three_link.levels[0]) == 3
+    levels = [replace(three_link.last, delta=delta) for delta in (0.1, 0.01, 0.003, 1e-3, 1e-4)]
+    assert [levels_left(problem, level) for level in levels] == [4, 3, 3, 2, 1]
+    assert levels_left(problem.with_(mesh_tolerance=0.0), levels[0]) == 3
