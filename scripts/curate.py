@@ -18,6 +18,8 @@ COMMANDS = {
     "paper/*.png": "python -m scripts.reproduce_paper",
 }
 KEPT = {
+    "gait_classes.md": "python -m scripts.class_table",
+    "gait_classes.png": "python -m scripts.class_table",
     "mesh_tolerance.md": "python -m benchmarks.mesh_tolerance",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
