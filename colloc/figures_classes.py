@@ -67,7 +67,7 @@ def gait_panels(panels: list[GaitPanel], body: Chain | None = None) -> Figure:
             angles = panel.gait.angles(np.linspace(0.0, 1.0, 401))
             low, high = angles.min(axis=1), angles.max(axis=1)
             if (high - low).max() < 1.5:
-                inset = axes.inset_axes((0.06, 0.5, 0.44, 0.44))
+                inset = axes.inset_axes((0.16, 0.5, 0.44, 0.44))
                 _draw_path(inset, panel.gait, (0.5 * (low + high), 0.6 * float((high - low).max())))
                 inset.tick_params(labelsize=5)
                 for spine in inset.spines.values():

@@ -102,6 +102,17 @@ def _motion(solution: Solution, fine: Replay, path: Path) -> list[Check]:
     ]
 
 
+_BESIDE = 1e-10
+
+
+def _largest_jump(gait: ArcPath) -> float:
+    """Largest jump of the angles of a free path where its arcs meet and where a symmetry continues it."""
+    seams = np.concatenate([gait.edges, 1 - gait.edges, 0.5 + gait.edges])
+    seams = seams[(seams > _BESIDE) & (seams < 1 - _BESIDE)]
+    jump = np.linalg.norm(gait.angles(seams + _BESIDE) - gait.angles(seams - _BESIDE), axis=0).max()
+    return float(max(jump - 2 * _BESIDE * gait.length, 0.0))
+
+
 def _class(solution: Solution) -> list[Check]:
     """How far a free path bends more than its class allows, from the directions of its rates alone."""
     gait = solution.gait
@@ -112,7 +123,10 @@ def _class(solution: Solution) -> list[Check]:
     turn = 2 * np.arcsin(0.5 * np.linalg.norm(np.diff(tangent), axis=0))
     curvature = float(turn.max()) * _FINE_PHASES / gait.length
     excess = max(curvature / solution.problem.gait.curvature - 1, 0.0)
-    return [Check("curvature", excess, CURVATURE, "of the path between nodes, relative excess over its bound")]
+    return [
+        Check("joins", _largest_jump(gait), VIOLATION, "jump of the joint angles where arcs or symmetric halves meet [rad]"),
+        Check("curvature", excess, CURVATURE, "of the path between nodes, relative excess over its bound"),
+    ]
 
 
 def _mesh(solution: Solution) -> list[Check]:

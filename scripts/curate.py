@@ -24,6 +24,8 @@ KEPT = {
     "gallery.json": "python -m scripts.gallery",
     "gallery": "python -m scripts.gallery",
     "mesh_tolerance.md": "python -m benchmarks --only mesh_tolerance",
+    "gait_classes.md": "python -m scripts.class_table",
+    "gait_classes.png": "python -m scripts.class_table",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
 }

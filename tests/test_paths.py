@@ -18,7 +18,7 @@ from colloc.path_samples import (
 from colloc.path_start import nearest_parameters, transcribed
 from colloc.prolongation import delta_at_unit_speed, prolonged
 from colloc.symmetry import SYMMETRIES
-from colloc.verify import corner_phases
+from colloc.verify import _largest_jump, corner_phases
 
 TRIANGLE = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
 
@@ -239,3 +239,15 @@ def test_problems_of_every_class_survive_their_description():
         assert again.hash == problem.hash
         assert again.gait == gait
         assert again.delta_start == 0.01
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def test_the_certificate_sees_a_path_that_does_not_join(symmetry):
+    path = member(symmetry)
+    assert _largest_jump(path) < 1e-8
+    for place in (5, -1) if symmetry == "bilateral" else (5,):
+        shapes = path.shapes.copy()
+        shapes[:, place] += 1e-6
+        # arcs are drawn from their starts: the last shape is drawn by nobody, so its arc is bent instead
+        tangents = path.tangents + (1e-5 if place == -1 else 0.0) * (np.arange(path.edges.size) == path.edges.size - 1)
+        assert _largest_jump(ArcPath(path.edges, shapes, tangents, path.length, symmetry)) > 1e-7

@@ -1,0 +1,36 @@
+"""Build and solve times of a free path: python -m benchmarks.free_path
+
+Processor time to build the program on 60 and 240 intervals of order 3, and of the full continuation in delta from 0.01 to 1e-5
+on 60 intervals without refinement (design target: 0.5 s and 5 s). Certificates are not part of it: 60 intervals over-report.
+"""
+
+import time
+
+from colloc import FreePath, Problem, ellipse
+from colloc.continuation import continue_delta
+from colloc.nlp import Solver
+from colloc.path_start import transcribed
+
+
+def main() -> None:
+    print("intervals  build [s]  continuation [s]  levels  iterations  efficiency")
+    for intervals in (60, 240):
+        problem = Problem(
+            "free_path", ellipse(0, 2.8, 1.3), gait=FreePath(8, "bilateral"), intervals=intervals, delta=1e-5, mesh_tolerance=0
+        )
+        begin = time.process_time()
+        solver = Solver(transcribed(problem))
+        built = time.process_time() - begin
+        if intervals > 60:
+            print(f"{intervals:9d} {built:10.2f}")
+            continue
+        begin = time.process_time()
+        solution = continue_delta(problem, solver=solver)
+        spent = time.process_time() - begin
+        iterations = sum(level.iterations for level in solution.levels)
+        found = f"{solution.last.efficiency:.6f}" if solution.last.optimal else solution.last.status
+        print(f"{intervals:9d} {built:10.2f} {spent:17.2f} {len(solution.levels):7d} {iterations:11d}  {found}")
+
+
+if __name__ == "__main__":
+    main()
