@@ -18,7 +18,10 @@ COMMANDS = {
     "paper/*.png": "python -m scripts.reproduce_paper",
 }
 KEPT = {
+    "chains.md": "python -m benchmarks.chains --starts 4",
+    "error_control.md": "python -m benchmarks.error_control",
     "mesh_tolerance.md": "python -m benchmarks.mesh_tolerance",
+    "work_precision.png": "python -m benchmarks.mesh_tolerance",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
 }
