@@ -26,6 +26,9 @@ KEPT = {
     "mesh_tolerance.md": "python -m benchmarks --only mesh_tolerance",
     "gait_classes.md": "python -m scripts.class_table",
     "gait_classes.png": "python -m scripts.class_table",
+    "chains.md": "python -m benchmarks.chains --starts 4",
+    "error_control.md": "python -m benchmarks.error_control",
+    "work_precision.png": "python -m benchmarks.work_precision",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
 }
