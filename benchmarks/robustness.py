@@ -31,7 +31,7 @@ from colloc.basins import Outcome, basins, counts
 from colloc.campaign import process_pool, run_starts
 from colloc.gait import shifted
 from colloc.replay import replay
-from colloc.sampling import LATIN_HYPERCUBE
+from colloc.sampling import LATIN_HYPERCUBE, on_speed_floor
 from colloc.solution import SOLVED, versions
 from colloc.store_archive import Archive, load_archive, save_archive
 
@@ -118,6 +118,7 @@ def row(archive: Archive) -> dict:
         "counts": counts(outcomes),
         "failures": {str(o.start): f"{o.status}: {o.message}" for o in outcomes if o.status != SOLVED},
         "optima": [[b.best.efficiency, b.frequency] for b in found],
+        "on_speed_floor": [on_speed_floor(problem, b.best.gait) for b in found],
         "replay_differences": [contradiction(problem, b.best) for b in found],
         "best_gait": {k: getattr(found[0].best.gait, k).tolist() for k in ("mean", "cos", "sin")} if found else None,
     }
@@ -132,7 +133,8 @@ def markdown(rows: list[dict], command: str) -> str:
         "Certified: first-order conditions and an independent fine replay agree. Time: processor time of one start,",
         "certificate included, on one core that other work shared, so it is an upper estimate; at the smaller delta that of",
         "going on from the result at the larger one. Replay: largest relative difference of the distinct optima's",
-        "efficiencies from a second replay, on another grid and from another phase.",
+        "efficiencies from a second replay, on another grid and from another phase. On the floor: optima that are as slow as",
+        "smallest_shape_speed = 0.1 allows; that bound, not mechanics, decides their size.",
     ]
     for delta in (DELTA, SMALL_DELTA):
         here = [r for r in rows if r["delta"] == delta]
@@ -151,11 +153,13 @@ def markdown(rows: list[dict], command: str) -> str:
             best, share = r["optima"][0] if r["optima"] else (float("nan"), 0.0)
             failures = ", ".join(f"{n} {s}" for s, n in r["counts"].items() if s != SOLVED) or "none"
             law = ", ".join(f"{mu:g}" for mu in r["law"])
+            floor = sum(r["on_speed_floor"])
+            optima = f"{len(r['optima'])}" + (f" ({floor} on the floor)" if floor else "")
             replayed = max((abs(d) for d in r["replay_differences"]), default=float("nan"))
             replay_word = f"{replayed:.0e}" + (" CONTRADICTED" if replayed > CONTRADICTED else "")
             lines.append(
                 f"| ({law}) | {r['symmetry']} | {r['starts']} | {r['certified']:.0%} | {r['median_cpu_seconds']:.1f} "
-                f"| {best:.5f} | {share:.0%} | {len(r['optima'])} | {replay_word} | {failures} |"
+                f"| {best:.5f} | {share:.0%} | {optima} | {replay_word} | {failures} |"
             )
         lines += ["", "Starts that fail:", ""]
         failed = [(r, start, text) for r in here for start, text in r["failures"].items()]

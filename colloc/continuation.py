@@ -167,6 +167,8 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     """
     begin = time.perf_counter()
     run = _Run(problem, solver or _kept_solver(problem), on_level)
+    first = feasible_point(run.solver.transcription, run.parameters, problem.delta_start)
+    redundant = redundant_equations(run.solver, first, problem.delta_start)
     result = _descend(run, problem.delta_start, max(problem.delta, min(REFINE_DELTA, problem.delta_start)))
     for _ in range(_REFINEMENTS):
         at = run.levels[-1].delta
@@ -182,9 +184,10 @@ def continue_delta(problem: Problem, on_level: Report | None = None, solver: Sol
     if not result.optimal:
         delta = run.levels[-1].delta
         solution.message = explanation(run.solver.transcription, result, delta)
-        redundant = redundant_equations(run.solver, feasible_point(run.solver.transcription, run.parameters, delta), delta)
         if redundant:
-            solution.message += f" Redundant equations, which no optimiser bears: {', '.join(redundant)}."
+            solution.message += (
+                f" Before the first solve the equations were rank deficient, which no optimiser bears: {', '.join(redundant)}."
+            )
     return solution
 
 

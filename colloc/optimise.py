@@ -7,6 +7,7 @@ import time
 from colloc.continuation import TRIVIAL, Report, continue_delta
 from colloc.errors import NotConvergedError
 from colloc.problem import Problem
+from colloc.sampling import on_speed_floor
 from colloc.solution import Solution
 from colloc.verify import certify
 
@@ -46,5 +47,10 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None) -> Sol
             failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in solution.certificate.failures)
             if failures:
                 solution.message = f"the certificate failed: {failures}. Try more intervals or a smaller mesh_tolerance."
+            elif on_speed_floor(problem, solution.gait):
+                solution.message = (
+                    f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: smaller gaits are "
+                    "more efficient still. Lower the bound (and delta with it) to see how far that goes."
+                )
     solution.seconds = time.perf_counter() - begin
     return solution

@@ -27,6 +27,7 @@ _BISECTIONS = 40
 _ATTEMPTS = 200
 _SAFE = 1 - 1e-3
 _CLEARLY_MOVING = 1.5
+_ON_FLOOR = 1e-4
 
 
 def is_admissible(problem: Problem, gait: Fourier) -> bool:
@@ -55,6 +56,11 @@ def shape_speed(gait: Fourier) -> float:
     """Root-mean-square shape speed, in rad per radian of phase."""
     k = np.arange(1, gait.n_harmonic + 1)
     return float(np.sqrt(0.5 * np.sum(k**2 * (gait.cos**2 + gait.sin**2))))
+
+
+def on_speed_floor(problem: Problem, gait: Fourier) -> bool:
+    """Whether a gait is as slow as ``smallest_shape_speed`` allows: then that bound, and no mechanics, decided its size."""
+    return shape_speed(gait) < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
 def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:

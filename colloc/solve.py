@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from colloc.errors import CollocError, ProblemError
-from colloc.problem import Problem, Reference
+from colloc.problem import FORMULATIONS, Problem, Reference
 from colloc.problem_file import read_problem_file
 from colloc.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Level, Solution
 
@@ -44,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mesh", type=int, metavar="N", help="intervals of the first mesh")
     parser.add_argument("--mesh-tolerance", type=float, metavar="TOL", help="relative efficiency error to refine to; 0: never")
     parser.add_argument("--scheme", metavar="NAME", help="trapezoid, hermite-simpson, gauss-N or radau-N")
-    parser.add_argument("--formulation", choices=("map", "lifted"), help="how the balance becomes constraints")
+    parser.add_argument("--formulation", choices=FORMULATIONS, help="how the balance becomes constraints")
     parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
     parser.add_argument("--output", metavar="PATH", default="results", help="folder, or .h5 file (default: results/NAME.h5)")
     parser.add_argument(
