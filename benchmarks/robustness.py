@@ -40,7 +40,7 @@ SYMMETRIES = ("none", "bilateral", "antipodal")
 INTERVALS = {"none": 40, "bilateral": 20, "antipodal": 20}
 DELTA, SMALL_DELTA, NEXT_DELTA = 1e-4, 1e-6, 4e-3
 TURN = 1
-TIME_LIMIT = 60.0
+TIME_LIMIT = 600.0
 REPLAY_INSTANTS, PHASE, CONTRADICTED = 7000, 0.2345, 3e-4
 """The second replay: another grid, begun at another phase. It contradicts a certificate if the efficiencies differ by more than
 this relative amount: three times the certificate's own tolerance, since this grid is a fixed one."""
