@@ -20,7 +20,7 @@ from colloc.ellipses import gait_grid
 from colloc.sweep import Route, distinct_maxima, performance
 
 LAWS = ((10, 1, 1), (3, 1, 1))
-STEP, INSTANTS, FINE_INSTANTS, CANDIDATES = 0.2, 48, 400, 8
+STEP, INSTANTS, FINE_INSTANTS, CANDIDATES = 0.2, 48, 400, 3
 DELTA = 1e-4
 
 

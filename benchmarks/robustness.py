@@ -124,7 +124,7 @@ def row(archive: Archive) -> dict:
     }
 
 
-def markdown(rows: list[dict], command: str) -> str:
+def markdown(rows: list[dict], asked: int, command: str) -> str:
     """The tables for people."""
     lines = [
         "# Robustness of the search over gaits",
@@ -136,6 +136,8 @@ def markdown(rows: list[dict], command: str) -> str:
         "efficiencies from a second replay, on another grid and from another phase. On the floor: optima that are as slow as",
         "smallest_shape_speed = 0.1 allows; that bound, not mechanics, decides their size.",
     ]
+    if min(r["starts"] for r in rows) < asked:
+        lines += ["", "The run was interrupted: the third column says how many starts are done. The same command goes on."]
     for delta in (DELTA, SMALL_DELTA):
         here = [r for r in rows if r["delta"] == delta]
         if not here:
@@ -167,14 +169,14 @@ def markdown(rows: list[dict], command: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_tables(symmetries: list[str], folder: Path, output: Path, command: str) -> None:
+def write_tables(symmetries: list[str], asked: int, folder: Path, output: Path, command: str) -> None:
     """results/robustness.md and .json from the archives."""
     archives = [
         stored(case_problem(law, symmetry, delta, 0.1 if delta == DELTA else NEXT_DELTA), folder)
         for delta, symmetry, law in product((DELTA, SMALL_DELTA), symmetries, LAWS)
     ]
     rows = [row(archive) for archive in archives if archive.outcomes]
-    (output / "robustness.md").write_text(markdown(rows, command), encoding="utf-8")
+    (output / "robustness.md").write_text(markdown(rows, asked, command), encoding="utf-8")
     record = {"command": command, "versions": versions(), "rows": rows}
     (output / "robustness.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
@@ -196,7 +198,7 @@ def main() -> None:
         for symmetry, law in product(options.symmetries, LAWS):
             advance(law, symmetry, most, options.workers, folder)
             print(f"{most} starts of {law}, {symmetry}", flush=True)
-    write_tables(list(options.symmetries), folder, options.output, command)
+    write_tables(list(options.symmetries), options.starts, folder, options.output, command)
 
 
 if __name__ == "__main__":

@@ -19,8 +19,9 @@ COMMANDS = {
 }
 KEPT = {
     "mesh_tolerance.md": "python -m benchmarks.mesh_tolerance",
-    "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
-    "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
+    "robustness.md": "python -m benchmarks.robustness --starts 100",
+    "grid_confirmation.md": "python -m benchmarks.grid_confirmation",
+    "robustness.json": "python -m benchmarks.robustness --starts 100",
 }
 
 
