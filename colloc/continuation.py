@@ -68,14 +68,17 @@ def continue_delta(
     begin = time.perf_counter()
     run = Run(problem, solver or _kept_solver(problem), on_level)
     run.take_over(before)
+    first = feasible_point(run.solver.transcription, run.parameters, problem.delta_start)
+    redundant = redundant_equations(run.solver, first, problem.delta_start)
     result, shortfall = _refine(run)
     solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin, message=shortfall)
     if not result.optimal:
         delta = run.levels[-1].delta
         solution.message = explanation(run.solver.transcription, result, delta)
-        redundant = redundant_equations(run.solver, feasible_point(run.solver.transcription, run.parameters, delta), delta)
         if redundant:
-            solution.message += f" Redundant equations, which no optimiser bears: {', '.join(redundant)}."
+            solution.message += (
+                f" Before the first solve the equations were rank deficient, which no optimiser bears: {', '.join(redundant)}."
+            )
     return solution
 
 

@@ -28,7 +28,7 @@ from colloc.errors import ProblemError
 from colloc.problem import Problem
 from colloc.problem_file import read_problem_file
 from colloc.progress import StatusLine
-from colloc.sampling import LATIN_HYPERCUBE, SAMPLERS
+from colloc.sampling import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
 from colloc.solution import SOLVED
 
 _MOST_BASINS_SHOWN = 12
@@ -82,7 +82,8 @@ def summary_lines(problem: Problem, outcomes: Sequence[Outcome], found: Sequence
     lines = [f"{problem.name}: {len(outcomes)} starts: {tally}; {len(found)} distinct optima"]
     for basin in found[:_MOST_BASINS_SHOWN]:
         share = f"{len(basin.starts)} of {len(outcomes)} starts"
-        lines.append(f"  efficiency {basin.best.efficiency:.6f}  {share:<20s} best: start {basin.best.start}")
+        floor = "  on the bound smallest_shape_speed" if on_speed_floor(problem, basin.best.gait) else ""
+        lines.append(f"  efficiency {basin.best.efficiency:.6f}  {share:<20s} best: start {basin.best.start}{floor}")
     if len(found) > _MOST_BASINS_SHOWN:
         lines.append(f"  ... and {len(found) - _MOST_BASINS_SHOWN} more")
     failures = [o for o in outcomes if o.status != SOLVED]
@@ -103,6 +104,7 @@ def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[
                 "efficiency": b.best.efficiency,
                 "frequency": b.frequency,
                 "starts": list(b.starts),
+                "on_speed_floor": on_speed_floor(problem, b.best.gait),
                 "gait": {key: getattr(b.best.gait, key).tolist() for key in ("mean", "cos", "sin")},
             }
             for b in found

@@ -9,6 +9,7 @@ from colloc.continuation import continue_delta
 from colloc.errors import NotConvergedError
 from colloc.level_run import TRIVIAL, Report
 from colloc.problem import Problem
+from colloc.sampling import on_speed_floor
 from colloc.solution import Level, Solution
 from colloc.verify import certify
 
@@ -61,5 +62,10 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
                 failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
                 advice = " and ".join(dict.fromkeys(ADVICE.get(c.name, FINER) for c in failed))
                 solution.message = f"the certificate failed: {failures}. Try {advice}."
+            elif on_speed_floor(problem, solution.gait):
+                solution.message = (
+                    f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: smaller gaits are "
+                    "more efficient still. Lower the bound (and delta with it) to see how far that goes."
+                )
     solution.seconds = time.perf_counter() - begin
     return solution

@@ -30,6 +30,7 @@ _BISECTIONS = 40
 _ATTEMPTS = 200
 _SAFE = 1 - 1e-3
 _CLEARLY_MOVING = 1.5
+_ON_FLOOR = 1e-4
 
 
 def is_admissible(problem: Problem, gait: Fourier) -> bool:
@@ -63,6 +64,12 @@ def shape_speed(gait: Fourier) -> float:
 def seed_class(problem: Problem) -> Harmonic:
     """The harmonics that starts are drawn from: the problem's own, or a few where its class bounds the path."""
     return problem.gait if isinstance(problem.gait, Harmonic) else Harmonic(PATH_SEED_HARMONICS, problem.gait.symmetry)
+
+
+def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
+    """Whether a gait is as slow as ``smallest_shape_speed`` allows: then that bound, and no mechanics, decided its size."""
+    speed = shape_speed(gait) if isinstance(gait, Fourier) else gait.length / (2 * np.pi)
+    return speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
 def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:

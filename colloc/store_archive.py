@@ -5,7 +5,7 @@ Layout (every dataset carries ``units`` and ``dims``)::
     /problem   JSON text      /versions  JSON text     attributes problem_hash, sampler, seed, command
     /outcomes/{start,status,message,efficiency,efficiency_error,distance,work,delta,iterations,seconds,cpu_seconds}
     /outcomes/{guess,gait}/{mean,cos,sin}
-    /basins/{best_start,count,frequency,efficiency}      the distinct optima, best first
+    /basins/{best_start,count,frequency,efficiency,on_speed_floor}      the distinct optima, best first
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from colloc.errors import StoreError
 from colloc.file_lock import locked
 from colloc.gait import Fourier
 from colloc.problem import Problem
+from colloc.sampling import on_speed_floor
 from colloc.solution import versions
 from colloc.store_file import array, child, mark, new_file, sealed_file, text
 
@@ -117,6 +118,7 @@ def _write(file: h5py.File, archive: Archive) -> None:
     _dataset(group, "count", [len(b.starts) for b in found], "1", "basin")
     _dataset(group, "frequency", [b.frequency for b in found], "share of starts", "basin")
     _dataset(group, "efficiency", [b.best.efficiency for b in found], "1/weight", "basin")
+    _dataset(group, "on_speed_floor", [on_speed_floor(archive.problem, b.best.gait) for b in found], "1", "basin")
 
 
 def _read(file: h5py.File) -> Archive:

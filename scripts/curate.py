@@ -29,8 +29,9 @@ KEPT = {
     "chains.md": "python -m benchmarks.chains --starts 4",
     "error_control.md": "python -m benchmarks.error_control",
     "work_precision.png": "python -m benchmarks.work_precision",
-    "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
-    "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
+    "robustness.md": "python -m benchmarks.robustness --starts 100",
+    "grid_confirmation.md": "python -m benchmarks.grid_confirmation",
+    "robustness.json": "python -m benchmarks.robustness --starts 100",
 }
 
 

@@ -23,7 +23,7 @@ from colloc.homotopy import continue_parameter, with_parameter
 from colloc.optimise import is_trivial, maximise_efficiency
 from colloc.path_replay import replay
 from colloc.problem import Problem
-from colloc.sampling import BLOCK, SAMPLERS, shape_speed, start_gait
+from colloc.sampling import BLOCK, SAMPLERS, on_speed_floor, shape_speed, start_gait
 from colloc.solution import SOLVED
 from colloc.store_archive import Archive, load_archive, save_archive
 
@@ -155,6 +155,19 @@ def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     assert is_trivial(solution)
     assert solution.status != SOLVED
     assert "goes nowhere" in solution.message
+
+
+def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
+    # where friction resists backwards sliding five times as much, small gaits beat large ones
+    stated = problem(friction=Friction(0.5, 1, 5), delta=1e-3, delta_start=1e-2, guess=ellipse(0.5, 0.12, 0.12), intervals=14)
+    solution = maximise_efficiency(stated)
+    assert solution.status == SOLVED
+    assert on_speed_floor(stated, solution.gait)
+    assert "smallest_shape_speed = 0.1" in solution.message
+    assert not on_speed_floor(stated, ellipse(0.2, 1.2, 0.8))
+    found = [outcome(0, solution.gait), outcome(1)]
+    lines = multistart.summary_lines(stated, found, basins(stated, found))
+    assert sum("on the bound smallest_shape_speed" in line for line in lines) == 1
 
 
 def outcome(start, gait=GAIT, efficiency=0.2, status=SOLVED):
@@ -342,11 +355,11 @@ def test_a_start_that_the_executor_loses_does_not_end_the_run():
 def test_starts_run_on_a_dask_cluster_and_end_as_they_do_here():
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
-        found = list(campaign.run_starts(problem(), range(3), workers=2, executor=lambda n: client.get_executor()))
-    assert sorted(o.start for o in found) == [0, 1, 2]
+        found = list(campaign.run_starts(problem(), range(2), workers=2, executor=lambda n: client.get_executor()))
+    assert sorted(o.start for o in found) == [0, 1]
     there = {o.start: o for o in found}
     here = campaign.run_start(problem(), SAMPLERS[0], 0, 1, 300.0)
     assert there[1].status == here.status
