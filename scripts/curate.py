@@ -18,6 +18,9 @@ COMMANDS = {
     "paper/*.png": "python -m scripts.reproduce_paper",
 }
 KEPT = {
+    "bound_table.md": "python -m scripts.bound_table",
+    "cycles.md": "python -m scripts.search_cycles --cases 32,1 24,2 24,4 24,7",
+    "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
     "mesh_tolerance.md": "python -m benchmarks.mesh_tolerance",
     "robustness.md": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
     "robustness.json": "python benchmarks/robustness.py --starts 6 --symmetries none bilateral",
