@@ -95,7 +95,7 @@ def test_friction_without_a_potential_has_no_proof(bound):
 
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
 def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
-    """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their power at most delta below it.
+    """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their power at most delta below.
 
     These are all that the allowance for finite delta uses (docs/bound.md, section 3).
     """
