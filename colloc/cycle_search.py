@@ -27,8 +27,8 @@ STEPS = np.concatenate([STEPS, -STEPS])
 _PARTS = 3
 """Motions a step is made of."""
 _DELTA = 1e-6
-_SLACK = 0.15
-"""A cycle may miss its own start by this heading [rad]; closing it is left to collocation."""
+_SLACK, _SLACK_PER_DISTANCE = 0.15, 0.5
+"""A cycle may miss its own heading by this [rad], and by this over its distance; closing it is left to collocation."""
 _BLOCKED = -1e3
 
 
@@ -149,10 +149,10 @@ def _followed(values: _Values, ratio: float, starts: int, length: int, rng: np.r
         same = np.flatnonzero((shapes[:end, k] == shapes[end, k]) & (stepped[:end, k] == stepped[end, k]))
         for begin in same[::-1]:
             rotation = thetas[end, k] - thetas[begin, k]
-            if abs(rotation) < _SLACK:
-                part = slice(begin, end)
-                ratio_here = abs(moves[part, k].sum()) / works[part, k].sum()
-                found.append(Cycle(float(ratio_here), edges.shapes[:, shapes[part, k]], float(rotation)))
+            part = slice(begin, end)
+            distance = float(abs(moves[part, k].sum()))
+            if abs(rotation) < min(_SLACK, _SLACK_PER_DISTANCE * distance):
+                found.append(Cycle(distance / works[part, k].sum(), edges.shapes[:, shapes[part, k]], float(rotation)))
                 break
     return found
 
@@ -242,6 +242,6 @@ def polygon_gait(shapes: np.ndarray, harmonics: int, joint_limit: float = float(
     wave = np.fft.rfft(angles, axis=1)[:, : harmonics + 1] * 2.0 / count
     gait = Fourier(0.5 * wave[:, 0].real, wave[:, 1:].real, -wave[:, 1:].imag)
     fine = gait.angles(np.arange(1000) / 1000) - gait.mean[:, None]
-    room = (joint_limit - np.abs(gait.mean)) / np.abs(fine).max(axis=1)
-    scale = min(1.0, 0.98 * float(room.min()))
+    room = (joint_limit - np.sign(fine) * gait.mean[:, None]) / np.maximum(np.abs(fine), 1e-12)
+    scale = min(1.0, 0.999 * float(room.min()))
     return Fourier(gait.mean, scale * gait.cos, scale * gait.sin)

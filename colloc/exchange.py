@@ -87,7 +87,8 @@ class _Program:
         return float(self.samples.ratio(self.best.x)[0].max())
 
     def add(self, motion: Motion) -> None:
-        self.samples = self.samples.joined(motion)
+        if motion.size:
+            self.samples = self.samples.joined(motion)
 
 
 def _starts(motion: Motion, ratio: np.ndarray, level: float, spacing: float, count: int) -> np.ndarray:

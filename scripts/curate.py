@@ -32,6 +32,9 @@ KEPT = {
     "robustness.md": "python -m benchmarks.robustness --starts 100",
     "grid_confirmation.md": "python -m benchmarks.grid_confirmation",
     "robustness.json": "python -m benchmarks.robustness --starts 100",
+    "bound_table.md": "python -m scripts.bound_table",
+    "cycles.md": "python -m scripts.search_cycles --cases 32,1 24,2 24,4 24,7",
+    "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
 }
 
 

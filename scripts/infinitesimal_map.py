@@ -1,6 +1,6 @@
 """Map of the best infinitesimal gait over shape space (three equal links); writes JSON and a figure.
 
-python scripts/infinitesimal_map.py [--mu MU_T MU_F MU_B] [--steps 32] [--out results]
+python -m scripts.infinitesimal_map [--mu MU_T MU_F MU_B] [--steps 32] [--out results]
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def main() -> None:
         for j, b in enumerate(axis):
             shape = np.array([[a], [b]])
             if admissible(body, shape, 1e-9)[0] and fundamental(body, shape)[0]:
-                value = small_gait(body, friction, shape[:, 0], directions=60, headings=6).efficiency
+                value = small_gait(body, friction, shape[:, 0], directions=90, headings=4, rounds=3).efficiency
                 # mirror, exchange of the joints, and both
                 for k, m in ((i, j), (n - i, n - j), (j, i), (n - j, n - i)):
                     table[k, m] = value

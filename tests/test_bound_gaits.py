@@ -12,7 +12,7 @@ from colloc.friction import Friction
 from colloc.infinitesimal import small_gait
 from colloc.potential import Samples
 
-ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=60)
+ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
 DIRECTED = dataclasses.replace(ODD, harmonics=(0, 1))
 STEPS = 48
 

@@ -91,3 +91,24 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
 def test_friction_without_a_potential_has_no_proof(bound):
     with pytest.raises(ProblemError, match="isotropic"):
         certify(BODY, Friction(2.0, 1.0, 1.0), bound, 0.5)
+
+
+@pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
+def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
+    """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their power at most delta below.
+
+    These are all that the allowance for finite delta uses (docs/bound.md, section 3).
+    """
+    q, r = np.random.default_rng(35).uniform(-3, 3, (2, 2, 300))
+    rest = np.zeros((3, 300))
+    exact = loaded_balance(BODY, q, r, rest, rest, 1e-10)
+    soft = loaded_balance(BODY, q, r, rest, rest, delta)
+    # the dissipation J of the regularised motion itself: evaluated there, no step taken
+    there = loaded_balance(BODY, q, r, rest, soft.velocity, 1e-12, steps=0)
+    least = exact.potential
+    assert np.all(there.potential >= least - 1e-7)
+    assert np.all(there.potential <= least + delta + 1e-7)
+    assert np.all(soft.power >= there.potential - delta - 1e-7)
+    assert np.all(soft.power <= soft.potential + 1e-7)
+    # and not vacuously: motions do change
+    assert np.max(there.potential - least) > 1e-3 * delta
