@@ -18,8 +18,8 @@ import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from colloc import Friction, Harmonic, Problem, ellipse, study_run
 from colloc.basins import Outcome
@@ -68,27 +68,33 @@ def warmed(workers: int, executor: Callable[[int], Executor]) -> Executor:
     return pool
 
 
-def timed(cells: int, workers: int, pool: Executor, ahead: int | None = None, chunk: int = 1) -> tuple[float, float, float]:
-    """Wall seconds of a run, and the sums over cells of wall and processor seconds on the workers."""
+class Timing(NamedTuple):
+    """Of a run: its wall seconds, processor seconds of the scheduling process, and both summed over cells on the workers."""
+
+    wall: float
+    own: float
+    busy: float
+    cpu: float
+
+
+def timed(cells: int, workers: int, pool: Executor, ahead: int | None = None, chunk: int = 1) -> Timing:
+    """Run a study of so many cells."""
     with tempfile.TemporaryDirectory() as folder:
         run = StudyRun(study(cells, chunk), Path(folder))
-        begin = time.perf_counter()
+        begin, own = time.perf_counter(), time.process_time()
         for _ in run.run(workers=workers, executor=lambda n: pool, ahead=ahead):
             pass
-        wall = time.perf_counter() - begin
+        wall, own = time.perf_counter() - begin, time.process_time() - own
     outcomes = [a.outcome for state in run.cells.values() for a in state.attempts]
-    return wall, sum(o.seconds for o in outcomes), sum(o.cpu_seconds for o in outcomes)
+    return Timing(wall, own, sum(o.seconds for o in outcomes), sum(o.cpu_seconds for o in outcomes))
 
 
 def overhead(tasks: int, workers: int, pool: Executor, chunk: int) -> float:
-    """Seconds a task of the scheduling process, for tasks that do nothing."""
+    """Processor seconds a task of the scheduling process, for tasks that do nothing."""
     before = study_run.run_chunk
     study_run.run_chunk = nothing
     try:
-        cpu = time.process_time()
-        wall, _, _ = timed(tasks * chunk, workers, pool, 4 * workers, chunk)
-        print(f"  wall {wall / tasks * 1e3:.2f} ms, processor {(time.process_time() - cpu) / tasks * 1e3:.2f} ms", end="; ")
-        return (time.process_time() - cpu) / tasks
+        return timed(tasks * chunk, workers, pool, 4 * workers, chunk).own / tasks
     finally:
         study_run.run_chunk = before
 
@@ -100,18 +106,18 @@ def main() -> None:
     parser.add_argument("--dask", action="store_true", help="measure the overhead with a local Dask cluster, too")
     options = parser.parse_args()
     print(f"load of the machine at the start: {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors")
-    rates, cpus, seconds = [], [], 1.0
+    rates, busy, cpus = [], [], []
     for workers in (1, 2):
-        pool = warmed(workers, process_pool)
-        wall, busy, cpu = timed(options.cells, workers, pool)
-        rates.append(options.cells / wall)
-        cpus.append(cpu / options.cells)
-        seconds = busy / options.cells
+        run = timed(options.cells, workers, warmed(workers, process_pool))
+        rates.append(options.cells / run.wall)
+        busy.append(run.busy / workers / run.wall)
+        cpus.append(run.cpu / options.cells)
         print(
-            f"{workers} workers: {options.cells} cells in {wall:.1f} s, {rates[-1]:.3f} a second; workers busy "
-            f"{busy / workers / wall:.1%}; {cpus[-1]:.2f} s of processor time a cell"
+            f"{workers} workers: {options.cells} cells in {run.wall:.1f} s, {rates[-1]:.3f} a second; workers busy "
+            f"{busy[-1]:.1%}; {cpus[-1]:.2f} s of processor time a cell"
         )
-    print(f"efficiency of scaling, wall: {rates[1] / rates[0] / 2:.1%}; processor time a cell x{cpus[1] / cpus[0]:.3f}")
+    print(f"efficiency of scaling by wall time: {rates[1] / rates[0] / 2:.1%}")
+    print(f"without the load of others (busy share over processor time a cell): {busy[1] / busy[0] * cpus[0] / cpus[1]:.1%}")
     makers: list[tuple[str, Callable[[int], Executor]]] = [("processes", process_pool)]
     if options.dask:
         from distributed import Client
@@ -120,10 +126,12 @@ def main() -> None:
         makers.append(("Dask", lambda n: client.get_executor(pure=False)))
     for name, maker in makers:
         for chunk in (1, 10):
-            print(f"{name}, {chunk} cells a task:", end="")
             own = overhead(options.tasks // chunk, 2, warmed(2, maker), chunk)
-            most = partial(max, 1)(seconds * chunk / own)
-            print(f"at {cpus[0]:.2f} s a cell one scheduler keeps {most:,.0f} workers busy")
+            print(
+                f"{name}, {chunk} cells a task: {own * 1e3:.2f} ms of the scheduler a task, {own / chunk * 1e3:.2f} ms "
+                f"a cell; at {cpus[0]:.2f} s a cell it keeps {cpus[0] * chunk / own:,.0f} workers busy",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -310,7 +310,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     lines = [process.stdout.readline() for _ in range(3)]
     process.send_signal(signal.SIGINT)
-    rest, errors = process.communicate(timeout=60)
+    rest, errors = process.communicate(timeout=240)
     assert process.returncode == 130
     assert errors == "colloc: interrupted; what is done is kept, and the same command goes on from there.\n"
     reported = sum(": round 0" in line or "round 0" in line for line in [*lines, *rest.splitlines()])

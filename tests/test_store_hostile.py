@@ -1,7 +1,7 @@
 """Damaged and hostile files: refused in bounded time and memory, with nothing executed and nothing believed.
 
 The quick tests mutate 600 files, the slow ones 6,000 more; each of the kinds in `store_samples.KINDS` takes its share. A
-further 3,000 are sealed anew after the mutation, as somebody would who wants HDF5 to see them, and read in processes with
+further 1,000 are sealed anew after the mutation, as somebody would who wants HDF5 to see them, and read in processes with
 limits of memory and time.
 """
 
@@ -29,7 +29,7 @@ from colloc.store_archive import load_archive, save_archive
 from colloc.store_file import LARGEST_FILE, array, mark, new_file, sealed_file
 from colloc.study_journal import FORMAT, LONGEST_LINE, read_journal
 
-QUICK, SLOW, RESEALED = 600, 6000, 3000
+QUICK, SLOW, RESEALED = 600, 6000, 1000
 
 
 @pytest.fixture(scope="module")
