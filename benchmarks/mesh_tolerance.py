@@ -49,15 +49,19 @@ def report(quick: bool, folder: Path) -> str:
         for tolerance in tolerances
         if name != "trapezoid" or not 0 < tolerance < 1e-4  # second order: thousands of intervals
     ]
+    _figure(rows, folder)
+    header = ["scheme", "tolerance", "intervals (half period)", "efficiency", "error against replay", "iterations", "seconds"]
+    return markdown_table(header, rows)
+
+
+def _figure(rows: list[list], folder: Path) -> None:
     with styled():
         figure, axis = plt.subplots(figsize=(5.2, 3.6))
-        for name in schemes:
-            own = [(float(r[6]), abs(float(r[4]))) for r in rows if r[0] == name]  # type: ignore[arg-type]
+        for name in dict.fromkeys(r[0] for r in rows):
+            own = [(float(r[6]), abs(float(r[4]))) for r in rows if r[0] == name]
             axis.loglog(*zip(*own, strict=True), color=COLOURS[name], marker="o", ms=4, label=name)
         axis.set(xlabel="processor seconds of a whole solve", ylabel="relative error of d/W against the replay")
         axis.set_xticks([0.3, 0.5, 1, 2, 5], labels=["0.3", "0.5", "1", "2", "5"])
         axis.minorticks_off()
         axis.legend(fontsize=7)
         save(figure, folder, "mesh_tolerance")
-    header = ["scheme", "tolerance", "intervals (half period)", "efficiency", "error against replay", "iterations", "seconds"]
-    return markdown_table(header, rows)

@@ -9,7 +9,9 @@ of their own (benchmarks/peers/requirements.txt), and their runs are read from f
     peers-venv/bin/python -m benchmarks.peers.yapss_three_link --starts 20 --tuned > results/peers/yapss-tuned.jsonl
 
 and the same without --tuned into rockit.jsonl and yapss.jsonl. What is not in results/peers is taken from
-results/curated/benchmarks/peers. A start succeeds if the replay of its gait reaches one of the two certified optima to 1e-3.
+results/curated/benchmarks/peers; colloc and Nelder-Mead are run if there is neither. A start succeeds if the replay of its
+gait reaches one of the two certified optima to 1e-3. Joint limits that hold at nodes only, as general tools impose them, are
+exceeded between nodes by some 3e-4 rad at the best optimum; up to 2e-3 rad is forgiven here, not by colloc's certificate.
 """
 
 from __future__ import annotations
@@ -28,9 +30,9 @@ from colloc.ellipses import admissible
 OPTIMA = (0.260030, 0.207596)
 """Certified by problems/three_link.py and problems/three_link_offset.py."""
 OWN = {
-    "colloc, defaults": ["benchmarks.peers.colloc_three_link", "--refined"],
-    "colloc, same mesh": ["benchmarks.peers.colloc_three_link"],
-    "Nelder-Mead": ["benchmarks.peers.nelder_mead"],
+    "colloc, defaults": ("colloc-refined.jsonl", ["benchmarks.peers.colloc_three_link", "--refined"]),
+    "colloc, same mesh": ("colloc.jsonl", ["benchmarks.peers.colloc_three_link"]),
+    "Nelder-Mead": ("nelder-mead.jsonl", ["benchmarks.peers.nelder_mead"]),
 }
 OTHERS = {
     "rockit, default IPOPT": "rockit.jsonl",
@@ -51,7 +53,7 @@ def recorded(name: str) -> list[dict]:
 
 def judged(run: dict) -> tuple[bool, float, float]:
     """Whether a run found an optimum, its claim over its replay less 1, and its replay over the nearest optimum less 1."""
-    if "gait" not in run or not admissible(Chain(), np.array(run["gait"])[:, None], slack=1e-6)[0]:
+    if "gait" not in run or not admissible(Chain(), np.array(run["gait"])[:, None], slack=2e-3)[0]:
         return False, np.nan, np.nan
     gait = ellipse(*run["gait"])
     replayed = replay(Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 1e-4).efficiency
@@ -75,14 +77,14 @@ def row(name: str, runs: list[dict]) -> list[object]:
 def report(quick: bool, folder: Path) -> str:
     """The table, and how many times faster the best of ours is than the best of the others."""
     rows = []
-    for name, command in OWN.items():
-        starts = 2 if quick else 3 if name == "Nelder-Mead" else 20
-        output = subprocess.run(
-            [sys.executable, "-m", *command, "--starts", str(starts)], capture_output=True, text=True, check=True
-        ).stdout
-        (folder / "peers").mkdir(parents=True, exist_ok=True)
-        (folder / "peers" / f"{name.replace(', ', '-').replace(' ', '-').lower()}.jsonl").write_text(output, encoding="utf-8")
-        rows.append(row(name, [json.loads(line) for line in output.splitlines()]))
+    for name, (file, command) in OWN.items():
+        if not recorded(file):
+            starts = 2 if quick else 3 if name == "Nelder-Mead" else 20
+            run = [sys.executable, "-m", *command, "--starts", str(starts)]
+            output = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+            _PLACES[0].mkdir(parents=True, exist_ok=True)
+            (_PLACES[0] / file).write_text(output, encoding="utf-8")
+        rows.append(row(name, recorded(file)))
     rows += [row(name, runs) for name, file in OTHERS.items() if (runs := recorded(file))]
     header = ["tool", "starts", "optima found", "median s a start", "s an optimum", "claim against replay", "short of optimum"]
     text = markdown_table(header, rows)

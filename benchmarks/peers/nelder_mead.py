@@ -1,6 +1,6 @@
 """What a newcomer would try: Nelder-Mead over (A0, A1, B1) on the paper's fixed point: python -m benchmarks.peers.nelder_mead
 
-Every evaluation solves the balance at 200 instants of the period by the fixed point (batched, which a first version would not
+Every evaluation solves the balance at 400 instants of the period by the fixed point (batched, which a first version would not
 be) at delta = 1e-4, and sums distance and work. Gaits that cross themselves or exceed pi are worth nothing.
 """
 
@@ -18,7 +18,7 @@ from colloc import Chain, Friction, ellipse, solve_balance
 from colloc.balance import instant, total_power
 from colloc.ellipses import admissible
 
-INSTANTS = 200
+INSTANTS = 400
 
 
 def minus_efficiency(parameters: np.ndarray) -> float:
