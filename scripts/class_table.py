@@ -74,8 +74,8 @@ def named_gait(name: str, friction: Friction) -> object:
     if name == "fold":
         shape = np.array([3.0, -0.03])
     else:
-        grid = [np.array([a, b]) for a in np.linspace(0.2, 2.8, 7) for b in np.linspace(-2.8, 2.8, 9)]
-        shape = max(grid, key=lambda s: small_gait(body, friction, s, directions=48, headings=6).efficiency)
+        grid = [np.array([a, b]) for a in np.linspace(0.4, 2.8, 4) for b in np.linspace(-2.8, 2.8, 5)]
+        shape = max(grid, key=lambda s: small_gait(body, friction, s, directions=36, headings=4).efficiency)
     return Corners(small_gait(body, friction, shape).path(shape, length))
 
 
