@@ -28,6 +28,10 @@ def save_work_precision(folder: Path, name: str, uniform: Series, refined: Serie
         axes.plot([], [], ":", color=BLACK, marker="o", mfc="white", label="uniform meshes")
         axes.plot([], [], "-", color=BLACK, marker="o", label="refined")
         axes.set(xlabel="processor time [s]", ylabel="relative error of the efficiency", title=title)
+        ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]
+        low, high = axes.get_xlim()
+        axes.set_xticks([t for t in ticks if low <= t <= high], [f"{t:g}" for t in ticks if low <= t <= high])
+        axes.set_xticks([], minor=True)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.grid(alpha=0.25)
         return save(figure, folder, name)
