@@ -23,7 +23,7 @@ from colloc.transcription import Transcription
 
 _TOLERANCE = 1e-12
 _ACCEPTED = 1e-9
-_ROUNDING = 4e-16
+_ROUNDING = 1e-16
 _NEWTON_STEPS = 8
 _ADVANCE, _POWER = 3, 4
 
