@@ -18,12 +18,12 @@ import time
 from pathlib import Path
 
 import numpy as np
-from colloc.replay import replay
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
 from colloc.continuation import continue_delta
 from colloc.json_cache import load_entries, save_entry
 from colloc.mesh_error import mesh_error
+from colloc.path_replay import replay
 
 OPTIMISM = 2.0
 """The estimate must be at least the true error divided by this."""

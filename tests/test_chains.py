@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from colloc.replay import replay
 
 from colloc.body import Chain
 from colloc.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, passing_depth
@@ -11,6 +10,7 @@ from colloc.far_contact import crossing_pairs, last_free
 from colloc.friction import Friction
 from colloc.gait import Fourier, Harmonic
 from colloc.nlp import Solver
+from colloc.path_replay import replay
 from colloc.problem import Problem
 from colloc.solve import main
 from colloc.transcription import transcribe

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from colloc.replay import replay
 
 from colloc.balance import instant, net_force
 from colloc.condensed import Condensed
@@ -12,6 +11,7 @@ from colloc.gait import Harmonic, ellipse
 from colloc.layout import RADIANS
 from colloc.mesh import Mesh
 from colloc.nlp import Solver
+from colloc.path_replay import replay
 from colloc.prediction import Track
 from colloc.problem import FORMULATIONS, Problem
 from colloc.refinement import interval_errors, refined_edges

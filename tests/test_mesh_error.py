@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from colloc.replay import replay
 
 from benchmarks.error_control import CASES, case_problem, held, outcome
 from colloc import continuation, refinement
@@ -20,6 +19,7 @@ from colloc.layout import problem_mesh
 from colloc.mesh import Mesh
 from colloc.mesh_error import constraint_violation, gait_motion, mesh_error
 from colloc.optimise import maximise_efficiency
+from colloc.path_replay import replay
 from colloc.problem import Problem
 from colloc.refinement import kink_knots, moved_knots, planned_mesh
 from colloc.schemes import scheme

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from colloc.replay import replay
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.arcs import advance, direction
 from colloc.errors import NotConvergedError, ProblemError
 from colloc.gait import shifted
+from colloc.path_replay import replay
 from colloc.path_samples import (
     corners_through,
     fourier_through,
