@@ -212,17 +212,22 @@ class Condensed:
         return result
 
     def lifted(self, v: np.ndarray, delta: float) -> np.ndarray:
-        """All variables of the transcription at v: a point that satisfies every equation but net rotation."""
-        s, layout = self.at(v, delta), self.transcription.layout
-        theta = self._orientation(s.velocity[2])
+        """All variables of the transcription at v: a point that satisfies every equation but net rotation.
+
+        Its velocities are the damped solver's, which at very small delta are more accurate than Newton steps on the tail's.
+        """
+        s, layout, n_joint = self.at(v, delta), self.transcription.layout, self._body.n_joint
+        angles, rates = s.local[1 : 1 + n_joint], s.local[1 + n_joint : -3]
+        z = solve_balance(self._body, self._friction, angles, rates, delta, start=s.velocity, tolerance=_TOLERANCE).z
+        theta = self._orientation(z[2])
         theta = theta - 0.5 * theta[-1] if self._centred else theta + v[-1]
-        n_joint = self._body.n_joint
-        out = self._value(s.local, s.velocity, np.full((1, s.velocity.shape[1]), delta)).full()
+        local = np.concatenate([theta[None, self._site], angles, rates, z])
+        out = self._value(local, z, np.full((1, z.shape[1]), delta)).full()
         quadrature = RADIANS * self.transcription.mesh.quadrature()[1]
         x = np.zeros(layout.n)
         x[layout.parameters[:, 0]] = v[: self._n_parameter]
         x[layout.theta[0]] = theta
-        x[layout.angles], x[layout.rates], x[layout.z] = s.local[1 : 1 + n_joint], s.local[1 + n_joint : -3], s.velocity
+        x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
         x[layout.distance[0, 1:]] = np.cumsum(quadrature @ out[_ADVANCE])
         x[layout.work[0, 1:]] = np.cumsum(quadrature @ out[_POWER])
         return x

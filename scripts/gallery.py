@@ -11,6 +11,7 @@ import runpy
 import sys
 import time
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,10 @@ from matplotlib.figure import Figure
 
 from colloc.concertina import Concertina
 from colloc.figures import STYLE, draw_filmstrip, draw_shape_path
+from colloc.friction import Friction
+from colloc.modal_optimum import ModalOptimum, optimise_modal
+from colloc.modal_problem import ModalProblem
+from colloc.motion import Motion
 from colloc.optimise import maximise_efficiency
 from colloc.problem import Problem, Reference
 from colloc.smooth_period import measured_period
@@ -54,15 +59,35 @@ def examples() -> list[Example]:
     return [Example(path.stem, runpy.run_path(str(path))) for path in paths]
 
 
+@cache
+def _low_mode_optimum(problem: ModalProblem) -> ModalOptimum:
+    return optimise_modal(problem)
+
+
+def _motion(stated: dict[str, Any]) -> tuple[Motion, Friction, float]:
+    """The motion of a smooth body, friction and delta: prescribed, or the optimum of a few modes."""
+    problem = stated.get("PROBLEM")
+    if isinstance(problem, ModalProblem):
+        gait = _low_mode_optimum(problem).gait
+        return problem.body.motion(gait, problem.gait.symmetry == "antipodal"), problem.friction, problem.delta
+    if isinstance(problem, Concertina):
+        return problem.motion(), problem.friction, problem.delta
+    return stated["MOTION"], stated["FRICTION"], stated["DELTA"]
+
+
 def prescribed_row(example: Example) -> dict[str, Any]:
-    """Numbers of a file that prescribes a motion."""
-    stated = example.stated
-    if isinstance(stated.get("PROBLEM"), Concertina):
-        p, delta = stated["PROBLEM"].measured_period(intervals=2), stated["PROBLEM"].delta
+    """Numbers of a file about a smooth body."""
+    problem, status = example.stated.get("PROBLEM"), "computed"
+    motion, friction, delta = _motion(example.stated)
+    if isinstance(problem, ModalProblem):
+        p = _low_mode_optimum(problem).period
+        status = "solved" if _low_mode_optimum(problem).certified else "certificate failed"
+    elif isinstance(problem, Concertina):
+        p = problem.measured_period(intervals=2)
     else:
-        p, delta = measured_period(stated["MOTION"], stated["FRICTION"], stated["DELTA"]), stated["DELTA"]
+        p = measured_period(motion, friction, delta)
     return {
-        "status": "computed",
+        "status": status,
         "efficiency": p.efficiency,
         "error": p.errors["efficiency"],
         "distance": p.d,
@@ -102,11 +127,7 @@ def _picture(example: Example, solution: Solution | None) -> None:
 
 
 def _draw_snapshots(figure: Figure, stated: dict[str, Any]) -> None:
-    crawler = stated.get("PROBLEM")
-    if isinstance(crawler, Concertina):
-        motion, friction, delta = crawler.motion(), crawler.friction, crawler.delta
-    else:
-        motion, friction, delta = stated["MOTION"], stated["FRICTION"], stated["DELTA"]
+    motion, friction, delta = _motion(stated)
     shown = snapshots(motion, friction, delta, count=6)
     axes = figure.add_subplot()
     spacing, low = max(1.15 * float(np.ptp(shown.x, axis=0).max()), 0.6), float(shown.y.min()) - 0.1

@@ -11,6 +11,7 @@ from colloc.animate import animate, main
 from colloc.body import Chain
 from colloc.figures_animation import pictures
 from colloc.figures_publication import save_panels
+from colloc.friction import Friction
 from colloc.gait import Fourier
 from colloc.problem import Problem
 from colloc.solution import Solution
@@ -20,7 +21,7 @@ from colloc.store import save
 def crawler(n_link):
     j = np.arange(n_link - 1)
     guess = Fourier(np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1)
-    return Problem("crawler", guess, Chain((1 / n_link,) * n_link), delta=1e-2, intervals=8)
+    return Problem("crawler", guess, Chain((1 / n_link,) * n_link), Friction(1.0, 1.0, 2.0), delta=1e-2, intervals=8)
 
 
 def dark(picture):

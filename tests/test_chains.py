@@ -76,9 +76,10 @@ def test_last_free_gait_stops_before_links_cross():
     problem = curl(1.0)
     free = problem.gait.parameters(problem.guess)
     bad = 1.6 * free
-    assert (0, 4) in crossing_pairs(problem, bad)
-    between = last_free(problem, free, bad)
-    assert not crossing_pairs(problem, between)
+    program = transcribe(problem)
+    assert (0, 4) in crossing_pairs(program, bad)
+    between = last_free(program, free, bad)
+    assert not crossing_pairs(program, between)
     assert 1.0 < between.max() / free.max() < 1.6
 
 

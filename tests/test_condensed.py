@@ -10,12 +10,14 @@ from colloc.friction import Friction
 from colloc.gait import Harmonic, ellipse
 from colloc.layout import RADIANS
 from colloc.mesh import Mesh
+from colloc.mesh_error import mesh_error
 from colloc.nlp import Solver
 from colloc.path_replay import replay
 from colloc.prediction import Track
 from colloc.problem import FORMULATIONS, Problem
-from colloc.refinement import interval_errors, refined_edges
+from colloc.refinement import planned_mesh
 from colloc.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.schemes import scheme
 from colloc.transcription import transcribe
 from colloc.warm_start import feasible_point
 
@@ -107,11 +109,13 @@ def test_a_gait_that_moves_linearly_in_delta_is_predicted_exactly():
 def test_a_refined_mesh_meets_its_tolerance_against_a_replay():
     stated = problem("bilateral", Friction(1, 1, 3), delta=1e-3, intervals=12)
     gait, mesh = stated.guess, transcribe(stated).mesh
-    edges = refined_edges(stated, mesh, gait, 1e-3, 1e-4)
-    assert edges.size > mesh.edges.size
-    refined = Mesh(mesh.scheme, edges)
-    assert np.abs(interval_errors(stated, refined, gait, 1e-3)).sum() < 1e-4
-    assert refined_edges(stated, refined, gait, 1e-3, 1e-4) is None
+    plan = planned_mesh(stated, mesh, gait, 1e-3, 1e-4)
+    assert plan is not None
+    assert plan.reached
+    refined, edges = Mesh(scheme(plan.scheme), plan.edges), plan.edges
+    assert mesh_error(stated, refined, gait, 1e-3, 1e-4).estimate < 1e-4
+    assert planned_mesh(stated, refined, gait, 1e-3, 1e-4) is None
+    stated = stated.with_(scheme=plan.scheme)
     fine = replay(stated.body, stated.friction, lambda t: (gait.angles(t), gait.rates(t)), 1e-3, instants=6400)
     x = feasible_point(transcribe(stated, edges), stated.gait.parameters(gait), 1e-3)
     layout = transcribe(stated, edges).layout

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import campaign, continuation, multistart
+from colloc import campaign, continuation, level_run, multistart
 from colloc.basins import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.body import Chain
 from colloc.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
@@ -149,7 +149,7 @@ def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retrac
 
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
-    monkeypatch.setattr(continuation, "TRIVIAL_EFFICIENCY", 2.0)
+    monkeypatch.setattr(level_run, "TRIVIAL_EFFICIENCY", 2.0)
     monkeypatch.setattr(continuation, "_FIRST_DELTAS", 2)
     solution = maximise_efficiency(problem())
     assert is_trivial(solution)
@@ -348,7 +348,7 @@ class _Losing(Executor):
 
 def test_a_start_that_the_executor_loses_does_not_end_the_run():
     found = {o.start: o for o in campaign.run_starts(problem(), range(3), executor=_Losing)}
-    assert (found[1].status, found[1].message) == (CRASHED, "the executor lost it: RuntimeError: killed worker")
+    assert (found[1].status, found[1].message) == (CRASHED, "its worker failed twice (RuntimeError: killed worker).")
     assert found[0].status == found[2].status == SOLVED
 
 
