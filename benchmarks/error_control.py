@@ -31,6 +31,7 @@ FLOOR = 3e-8
 """Relative accuracy of the references: errors below cannot be told."""
 
 FOUR = Fourier(np.zeros(3), [[1.2], [0.3], [-1.2]], [[0.6], [0.6], [0.6]])
+SMALL_LOOP = Fourier([1.8, -1.8], [[0.3, -0.1], [-0.3, 0.1]], [[-0.4, -0.1], [-0.4, -0.1]])
 FIVE = Fourier(np.zeros(4), [[-0.6], [0.8], [-0.8], [0.6]], [[-1.0], [1.2], [1.2], [-1.0]])
 WAVE = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.0], [0.8], [0.0]])
 BILATERAL, ANTIPODAL = Harmonic(1, "bilateral"), Harmonic(1, "antipodal")
@@ -50,7 +51,7 @@ CASES = (
     ("gauss-5", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-5", 12, 0.0),
     ("gauss-1", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3, "gauss-1", 80, 0.0),
     ("second optimum", Chain(), (1, 1, 1), BILATERAL, ellipse(1.1, 0.66, 1.1), 1e-4, "gauss-3", 16, 0.0),
-    ("two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), ellipse(0, 2.6, 1.2), 1e-4, "gauss-3", 24, 0.0),
+    ("two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), SMALL_LOOP, 1e-4, "gauss-3", 24, 0.0),
     ("three harmonics", Chain(), (1, 1, 1), Harmonic(3, "bilateral"), ellipse(0, 2.6, 1.2), 1e-4, "radau-5", 20, 0.0),
     ("no symmetry", Chain(), (1, 1, 1), Harmonic(1), ellipse(0, 2.8, 1.25), 1e-3, "gauss-3", 30, 0.0),
     ("antipodal", Chain(), (3, 1, 1), ANTIPODAL, ellipse(0, 1.5, 1.0), 1e-4, "gauss-2", 24, 0.0),
@@ -66,7 +67,7 @@ CASES = (
     ("refined to 1e-4", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-2", 20, 1e-4),
     ("refined to 1e-6", Chain(), (1, 1, 1), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "gauss-3", 20, 1e-6),
     ("refined, anisotropic", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-4, "radau-3", 20, 1e-5),
-    ("refined, two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), ellipse(0, 2.6, 1.2), 1e-4, "gauss-3", 24, 1e-5),
+    ("refined, two harmonics", Chain(), (1, 1, 1), Harmonic(2, "bilateral"), SMALL_LOOP, 1e-4, "gauss-3", 24, 1e-5),
 )  # fmt: skip
 
 
@@ -103,6 +104,8 @@ def outcome(problem: Problem) -> dict:
     )
     reference = continue_delta(finer)
     certificate = certify(reference, tolerance=1e-8) if reference.last.optimal else None
+    if certificate is not None and certificate.efficiency < (1.0 - FLOOR) * fine.efficiency:
+        certificate = None  # below the gait it started from: an optimum of another basin, not the reference of this one
     return {
         "optimal": True,
         "scheme": solution.mesh.scheme.name,

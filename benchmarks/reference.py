@@ -6,6 +6,7 @@ says (asinh), and digits are bought with precision instead. `quadrature_moments`
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import mpmath as mp
@@ -105,13 +106,15 @@ def balanced_velocity(
     delta: float,
     anchor: int,
     start: Sequence[float],
-    digits: int = 40,
+    digits: int | None = None,
 ) -> list[mp.mpf]:
     """Velocity of the midpoint of link `anchor` that balances the body: damped Newton with difference quotients.
 
     With equal coefficients the balance has one solution, so any root found is the answer; otherwise it is the root that
     Newton reaches from `start`. Raises ArithmeticError if it does not converge.
     """
+    # slow stretches lose the square of delta to cancellation
+    digits = digits or 40 + 2 * max(0, round(-math.log10(delta)))
     with mp.workdps(digits):
 
         def residual(z: Sequence[mp.mpf]) -> mp.matrix:

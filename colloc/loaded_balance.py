@@ -19,6 +19,8 @@ _SHRINK = (0.5,) * 3 + (0.1,) * 5
 _TOLERANCE = 1e-10
 _STALLED = 1e-7
 _SOFTEST = 1e-2
+_RUNAWAY = 1e6
+"""Speed beyond which a load is more than friction can hold: nothing balances it, and the search ends."""
 
 
 class Loaded(NamedTuple):
@@ -100,7 +102,7 @@ def _newton(
                 evaluate(active[retry], trial[:, retry])[2] <= merit[retry] - 1e-4 * alpha[retry] * slope[retry] + 1e-15
             )
         z[:, active[~failed]] = trial[:, ~failed]
-        active = active[~failed]
+        active = active[~failed & (np.abs(z[:, active]).max(axis=0) < _RUNAWAY)]
         if not active.size:
             break
     everything = np.arange(n)

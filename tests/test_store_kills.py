@@ -62,7 +62,7 @@ def child(kind, folder, pipe):
     os.dup2(null, 1)
     os.dup2(null, 2)
     if kind == "solve":
-        store.save = told(say, kind, store.save, lambda solution, path: {"result": solution.last.x.sum()})
+        store.save = told(say, kind, store.save, solve_facts)
         return solve.main([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
@@ -76,11 +76,20 @@ def child(kind, folder, pipe):
     return sweep_study.main([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 
 
+def solve_facts(solution, path):
+    """What a file of one solve holds: its first level, be the run under way or finished, and the result if it is finished."""
+    facts = {"first level": solution.levels[0].x.sum()}
+    return facts if path.name.endswith(".partial.h5") else facts | {"result": solution.last.x.sum()}
+
+
 def kept(kind, folder):
     """What the files of a folder hold; every file that is there must be whole."""
     if kind == "solve":
-        files = [folder / name for name in ("tiny.h5", "tiny.failed.h5") if (folder / name).exists()]
-        return {"result": store.load(files[0]).last.x.sum()} if files else {}
+        facts = {}
+        for name in ("tiny.partial.h5", "tiny.failed.h5", "tiny.h5"):
+            if (folder / name).exists():
+                facts |= solve_facts(store.load(folder / name), folder / name)
+        return facts
     if kind == "multistart":
         path = folder / "tiny.starts.h5"
         outcomes = store_archive.load_archive(path).outcomes if path.exists() else {}
@@ -130,7 +139,7 @@ def cycle(kind, folder, rng, longest, at_a_write):
 def test_nothing_finished_is_lost_in_120_kills(tmp_path):
     rng = np.random.default_rng(7)
     seen = Counter()
-    for kind, whole in (("solve", 1), ("multistart", 4), ("sweep", 4)):
+    for kind, whole in (("solve", 2), ("multistart", 4), ("sweep", 4)):
         longest, number, before = 3.0, 0, {}
         folder = tmp_path / f"{kind} 0"
         folder.mkdir()
