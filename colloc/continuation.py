@@ -121,7 +121,7 @@ def _descend(run: Run, delta: float, target: float) -> NlpResult:
             continue
         else:
             failures += 1
-            if failures >= _FAILURES_PER_MESH and meshes < _MESHES:
+            if failures >= _FAILURES_PER_MESH and meshes < _MESHES and not run.problem.has_path:
                 run.other_mesh()
                 failures, meshes = 0, meshes + 1
             elif factor > _SMALLEST_STEP:

@@ -71,8 +71,7 @@ def child(kind, folder, pipe):
         return multistart.main([str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"])
     task_pool.process_pool = ThreadPoolExecutor
     append = study_journal.Journal.append
-    facts = lambda journal, records: {a.key: a.outcome.gait.cos.sum() for r in records for a in r.attempts}  # noqa: E731
-    study_journal.Journal.append = told(say, kind, append, facts)
+    study_journal.Journal.append = told(say, kind, append, lambda journal, records: attempt_facts(records))
     return sweep_study.main([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 
 
@@ -80,6 +79,11 @@ def solve_facts(solution, path):
     """What a file of one solve holds: its first level, be the run under way or finished, and the result if it is finished."""
     facts = {"first level": solution.levels[0].x.sum()}
     return facts if path.name.endswith(".partial.h5") else facts | {"result": solution.last.x.sum()}
+
+
+def attempt_facts(records):
+    """What the journal of a study holds: the gait of each attempt at each problem."""
+    return {f"{r.problem} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts}
 
 
 def kept(kind, folder):
@@ -98,7 +102,7 @@ def kept(kind, folder):
         load_study(folder / "tiny.nc")
     text = study_journal.read_journal(folder / "tiny.study")
     assert text.damaged == 0
-    return {a.key: a.outcome.gait.cos.sum() for r in text.records for a in r.attempts}
+    return attempt_facts(text.records)
 
 
 def cycle(kind, folder, rng, longest, at_a_write):
