@@ -83,7 +83,7 @@ def solve_facts(solution, path):
 
 def attempt_facts(records):
     """What the journal of a study holds: the gait of each attempt at each problem."""
-    return {f"{r.problem} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts}
+    return {f"{r.problem_hash} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts}
 
 
 def kept(kind, folder):
