@@ -26,7 +26,7 @@ from colloc.errors import CollocError, StoreError
 from colloc.sealed_file import MAGIC, SEAL_SIZE, check_seal, seal, write_sealed
 from colloc.store import load
 from colloc.store_archive import load_archive, save_archive
-from colloc.store_file import LARGEST_FILE, array, mark, new_file, sealed_file
+from colloc.store_file import LARGEST_FILE, array, attribute, mark, new_file, sealed_file
 from colloc.study_journal import FORMAT, LONGEST_LINE, read_journal
 
 QUICK, SLOW, RESEALED = 600, 6000, 1000
@@ -175,25 +175,32 @@ def test_an_array_that_claims_to_be_huge_is_refused_before_memory_is_taken(tmp_p
     path = tmp_path / "bomb.h5"
     with new_file(path) as file:
         mark(file, "test", 1)
-        file.create_dataset("x", shape=(2**40,), dtype="f8", chunks=(2**10,), compression="gzip")
-        file.create_dataset("t", shape=(2**40,), dtype=h5py.string_dtype(), chunks=(2**10,))
-    assert path.stat().st_size < 1e5
+        file.create_dataset("x", shape=(2**40,), dtype="f8")
+        file.create_dataset("t", shape=(2**40,), dtype=h5py.string_dtype("utf-8", 8), chunks=(2**10,))
+        file.create_dataset("long", shape=(), dtype=h5py.string_dtype("utf-8", 2**30))
+        file.create_dataset("promised", shape=(2**20,), dtype="f8")
+        file.create_dataset("squeezed", shape=(2**20,), dtype="f8", chunks=(2**10,), compression="gzip")
+        file.attrs["x"] = np.zeros(2**18)
+    assert path.stat().st_size < 1e7
+    refused = {"x": "too large", "t": "too large", "long": "too large", "promised": "not whole", "squeezed": "in one piece"}
     tracemalloc.start()
-    for name in ("x", "t"):
-        with pytest.raises(StoreError, match="too large"), sealed_file(path, "test", 1) as file:
+    for name, why in refused.items():
+        with pytest.raises(StoreError, match=why), sealed_file(path, "test", 1) as file:
             array(file, name)
+    with pytest.raises(StoreError, match="too large"), sealed_file(path, "test", 1) as file:
+        attribute(file, "x")
     assert tracemalloc.get_traced_memory()[1] < 1e7
     tracemalloc.stop()
 
 
-def test_links_and_data_outside_the_file_are_not_followed(tmp_path):
+def test_links_data_outside_the_file_and_types_with_references_are_not_followed(tmp_path):
     secret = tmp_path / "secret"
     secret.write_bytes(np.arange(4.0).tobytes())
     other = tmp_path / "other.h5"
     with h5py.File(other, "w") as file:
         file["x"] = np.arange(4.0)
     path = tmp_path / "links.h5"
-    with h5py.File(path, "w") as file:
+    with h5py.File(path, "w", libver="v108") as file:
         mark(file, "test", 1)
         file["external"] = h5py.ExternalLink(str(other), "x")
         file["soft"] = h5py.SoftLink("/attributes")
@@ -202,10 +209,22 @@ def test_links_and_data_outside_the_file_are_not_followed(tmp_path):
         layout[:] = h5py.VirtualSource(str(other), "x", shape=(4,))
         file.create_virtual_dataset("virtual", layout)
         file["opaque"] = np.void(b"code")
+        file["reference"] = file["/"].ref
+        file["endless"] = "of variable length"
+        file["lists"] = np.array([np.arange(3), np.arange(2)], dtype=object).astype(h5py.vlen_dtype("i4"))
+        file["record"] = np.zeros(2, dtype=[("a", "f8"), ("b", "i4")])
+        file["nothing"] = h5py.Empty("f8")
+        for name in ("opaque", "reference", "endless", "lists", "record", "nothing"):
+            file.attrs[name] = file[name][()]
     seal(path)
-    for name in ("external", "soft", "raw", "virtual", "opaque", "missing"):
-        with pytest.raises(StoreError), sealed_file(path, "test", 1) as file:
+    types = dict.fromkeys(("opaque", "reference", "endless", "lists", "record"), "neither numbers nor texts")
+    refused = {"external": "a link", "soft": "a link", "raw": "in one piece", "virtual": "in one piece", "missing": "missing"}
+    for name, why in (refused | types | {"nothing": "is empty"}).items():
+        with pytest.raises(StoreError, match=why), sealed_file(path, "test", 1) as file:
             array(file, name)
+    for name, why in (types | {"nothing": "is empty", "missing": "missing"}).items():
+        with pytest.raises(StoreError, match=why), sealed_file(path, "test", 1) as file:
+            attribute(file, name)
 
 
 def test_nothing_is_unpickled_or_executed(samples, tmp_path, monkeypatch):
@@ -254,10 +273,10 @@ def test_a_problem_that_is_too_large_to_check_is_refused(tmp_path):
     save_archive(archive(), path)
     with h5py.File(path, "a") as file:
         del file["problem"]
-        file["problem"] = '{"body": {"lengths": [' + ", ".join(["1e-9"] * 3_000_000) + "]}}"
+        file["problem"] = np.bytes_('{"body": {"lengths": [' + ", ".join(["1e-9"] * 3_000_000) + "]}}")
     seal(path)
     begin = time.perf_counter()
-    with pytest.raises(StoreError, match="too long"):
+    with pytest.raises(StoreError, match="too large"):
         load_archive(path)
     assert time.perf_counter() - begin < 2.0
 
