@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from store_samples import Samples
+from store_samples import HDF5_KINDS, Samples
 
 from colloc.array_store import read_arrays, write_arrays
 from colloc.errors import StoreError
@@ -23,7 +23,6 @@ from colloc.store_file import (
     text,
 )
 
-HDF5_KINDS = ("solution", "archive", "arrays", "study")
 FOR_NETCDF = {"DIMENSION_LIST", "REFERENCE_LIST"}
 """References of dimension scales, which colloc writes for other readers and never reads."""
 TEXTS = ["", "1", "ä", "Reibung \N{GREEK SMALL LETTER MU}_t / µ_f", "tab\tand\nline", "nul\0inside", "\N{SNAKE}" * 500]
