@@ -39,7 +39,7 @@ LONGEST_IN_ARRAY = 2000
 """Characters of a text in an array, where each takes the room of the longest. The rest is left out, and an ellipsis says so."""
 
 _SIGNATURE, _CHECKED_SUPERBLOCKS = b"\x89HDF\r\n\x1a\n", (2, 3)
-_REMEDY = "Make it again with the command that wrote it"
+_REMEDY = "Move it away, and make it again with the command that wrote it"
 _NUMBERS = (h5t.INTEGER, h5t.FLOAT, h5t.ENUM)  # h5py keeps truth values as enumerations
 
 

@@ -159,7 +159,7 @@ def test_metadata_carry_checksums_of_their_own(samples, kind, name):
 
 def test_files_of_an_older_or_newer_colloc_are_told_apart_from_damage(tmp_path):
     path = tmp_path / "x.h5"
-    for version, age, remedy in ((1, "an older", "Make it again"), (3, "a newer", "Update colloc")):
+    for version, age, remedy in ((1, "an older", "Move it away, and make it again"), (3, "a newer", "Update colloc")):
         with new_file(path) as file:
             mark(file, "test", version)
         with pytest.raises(StoreError, match=f"{age} colloc: its format is {version}.*{remedy}"), sealed_file(path, "test", 2):
