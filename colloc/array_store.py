@@ -13,9 +13,9 @@ import numpy as np
 
 import colloc
 from colloc.errors import StoreError
-from colloc.store_file import array, mark, new_file, sealed_file
+from colloc.store_file import array, attribute, mark, new_file, put, put_attribute, sealed_file
 
-KIND, VERSION = "colloc arrays", 1
+KIND, VERSION = "colloc arrays", 2
 _LARGEST = 2**31
 """Bytes of a file, and of an array: velocity maps are large."""
 
@@ -54,12 +54,9 @@ def write_arrays(
     with new_file(path) as file:
         mark(file, KIND, VERSION)
         for key, value in arrays.items():
-            value = np.asarray(value)
-            plain = value.astype(h5py.string_dtype()) if value.dtype.kind in "US" else value
-            dataset = file.create_dataset(key, data=plain, compression="gzip" if plain.size > 1000 else None)
-            dataset.attrs["units"] = (units or {}).get(key, "1")
+            put(file, key, value, units=(units or {}).get(key, "1"))
         for key, value in described.items():
-            file.attrs[key] = value if isinstance(value, (str, int, float)) else json.dumps(value)
+            put_attribute(file, key, value if isinstance(value, (str, int, float)) else json.dumps(value))
 
 
 def read_arrays(path: Path) -> dict[str, Any]:
@@ -85,6 +82,6 @@ def read_attribute(path: Path, name: str) -> Any:
     """One attribute of the file, or None if the file or the attribute is missing, or the file is damaged."""
     try:
         with sealed_file(path, KIND, VERSION, largest=_LARGEST) as file:
-            return file.attrs.get(name)
+            return attribute(file, name)
     except StoreError:
         return None

@@ -24,9 +24,9 @@ from colloc.errors import StoreError
 from colloc.gait_fields import fields
 from colloc.problem import Problem
 from colloc.solution import Certificate, Check, Level, Solution
-from colloc.store_file import array, child, mark, new_file, plain, sealed_file, text
+from colloc.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text
 
-FORMAT, FORMAT_VERSION = "colloc solution", 2
+FORMAT, FORMAT_VERSION = "colloc solution", 3
 _MOTION_SAMPLES = 401
 _LEVEL_ARRAYS = {"edges": "period", "x": "see colloc.layout", "lam_x": "see colloc.layout", "lam_g": "see colloc.layout"}
 
@@ -68,25 +68,22 @@ def load(path: str | os.PathLike[str]) -> Solution:
         return _read(file)
 
 
-def _dataset(group: h5py.Group, name: str, value: np.ndarray, units: str, dims: str) -> None:
-    dataset = group.create_dataset(name, data=value)
-    dataset.attrs["units"], dataset.attrs["dims"] = units, dims
-
-
 def _write(file: h5py.File, solution: Solution) -> None:
     mark(file, FORMAT, FORMAT_VERSION)
-    file.attrs["name"], file.attrs["problem_hash"] = solution.problem.name, solution.problem.hash
-    file.attrs["status"], file.attrs["message"], file.attrs["seconds"] = solution.status, solution.message, solution.seconds
-    file["problem"] = json.dumps(solution.problem.to_dict())
-    file["source"] = solution.source
-    file["versions"] = json.dumps(solution.versions)
+    put_attribute(file, "name", solution.problem.name)
+    put_attribute(file, "problem_hash", solution.problem.hash)
+    for name in ("status", "message", "seconds"):
+        put_attribute(file, name, getattr(solution, name))
+    put(file, "problem", json.dumps(solution.problem.to_dict()))
+    put(file, "source", solution.source)
+    put(file, "versions", json.dumps(solution.versions))
     for index, level in enumerate(solution.levels):
         group = file.create_group(f"levels/{index:03d}")
         for name, units in _LEVEL_ARRAYS.items():
-            _dataset(group, name, getattr(level, name), units, "vector")
+            put(group, name, getattr(level, name), units=units, dims="vector")
         for field in dataclasses.fields(level):
             if field.name not in _LEVEL_ARRAYS:
-                group.attrs[field.name] = getattr(level, field.name)
+                put_attribute(group, field.name, getattr(level, field.name))
     if solution.levels:
         _write_motion(file, solution)
     if solution.certificate is not None:
@@ -97,60 +94,55 @@ def _write_motion(file: h5py.File, solution: Solution) -> None:
     gait = file.create_group("gait")
     for name, value in fields(solution.gait).items():
         if name in _GAIT_ARRAYS:
-            _dataset(gait, name, value, *_GAIT_ARRAYS[name])
+            units, dims = _GAIT_ARRAYS[name]
+            put(gait, name, value, units=units, dims=dims)
         else:
-            gait.attrs[name] = value
+            put_attribute(gait, name, value)
     motion = solution.sample(np.linspace(0.0, 1.0, _MOTION_SAMPLES))
     group = file.create_group("motion")
-    _dataset(group, "t", motion.t, "period", "time")
-    _dataset(group, "joint_angles", motion.angles, "rad", "joint, time")
-    _dataset(group, "joint_rates", motion.rates, "rad/period", "joint, time")
-    _dataset(group, "tail_velocity", motion.z, "length/period, length/period, rad/period", "(u, v, omega), time")
-    _dataset(group, "theta", motion.theta, "rad", "time")
-    _dataset(group, "centre", motion.centre, "length", "(x, y), time")
-    _dataset(group, "tail", motion.tail, "length", "(x, y), time")
-    _dataset(group, "power", solution.power(motion), "weight length/period", "time")
+    put(group, "t", motion.t, units="period", dims="time")
+    put(group, "joint_angles", motion.angles, units="rad", dims="joint, time")
+    put(group, "joint_rates", motion.rates, units="rad/period", dims="joint, time")
+    put(group, "tail_velocity", motion.z, units="length/period, length/period, rad/period", dims="(u, v, omega), time")
+    put(group, "theta", motion.theta, units="rad", dims="time")
+    put(group, "centre", motion.centre, units="length", dims="(x, y), time")
+    put(group, "tail", motion.tail, units="length", dims="(x, y), time")
+    put(group, "power", solution.power(motion), units="weight length/period", dims="time")
 
 
 def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
     for field in dataclasses.fields(certificate):
         if field.name != "checks":
-            group.attrs[field.name] = getattr(certificate, field.name)
-    text = h5py.string_dtype()
-    checks = certificate.checks
-    group.create_dataset("name", data=[check.name for check in checks], dtype=text)
-    group.create_dataset("meaning", data=[check.meaning for check in checks], dtype=text)
-    group["value"] = [check.value for check in checks]
-    group["threshold"] = [check.threshold for check in checks]
-    group["passed"] = [check.passed for check in checks]
+            put_attribute(group, field.name, getattr(certificate, field.name))
+    for name in ("name", "value", "threshold", "passed", "meaning"):
+        put(group, name, [getattr(check, name) for check in certificate.checks])
 
 
 def _read(file: h5py.File) -> Solution:
     problem = Problem.from_dict(json.loads(text(file, "problem")))
-    if problem.hash != file.attrs["problem_hash"]:
+    if problem.hash != attribute(file, "problem_hash"):
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
     levels = []
     found = child(file, "levels") if "levels" in file else ()
     for name in sorted(found):
         group = child(found, name)
         arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
-        # files of format version 1 may lack later fields, which have defaults
-        rest = {f.name: group.attrs[f.name] for f in dataclasses.fields(Level) if f.name in group.attrs}
-        levels.append(Level(**arrays, **{key: plain(value) for key, value in rest.items()}))
+        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Level) if f.name not in _LEVEL_ARRAYS}
+        levels.append(Level(**arrays, **rest))
     certificate = None
     if "certificate" in file:
         group = child(file, "certificate")
         columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
         checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-        rest = {f.name: plain(group.attrs[f.name]) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Certificate) if f.name != "checks"}
         certificate = Certificate(checks, **rest)
     solution = Solution(
         problem,
         levels,
         certificate,
-        float(file.attrs["seconds"]),
+        float(attribute(file, "seconds")),
         text(file, "source"),
-        str(file.attrs["message"]),
+        str(attribute(file, "message")),
         json.loads(text(file, "versions")),
     )
     if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):

@@ -25,9 +25,9 @@ from colloc.gait import Fourier
 from colloc.problem import Problem
 from colloc.sampling import on_speed_floor
 from colloc.solution import versions
-from colloc.store_file import array, child, mark, new_file, sealed_file, text
+from colloc.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text
 
-FORMAT, FORMAT_VERSION = "colloc archive", 1
+FORMAT, FORMAT_VERSION = "colloc archive", 2
 _NUMBERS = {
     "efficiency": "1/weight",
     "efficiency_error": "1/weight",
@@ -90,17 +90,17 @@ def load_archive(path: str | os.PathLike[str]) -> Archive:
 
 
 def _dataset(group: h5py.Group, name: str, value: list, units: str, dims: str = "start") -> None:
-    data = np.array(value, dtype=object) if units == "text" else np.array(value)
-    dataset = group.create_dataset(name, data=data, dtype=h5py.string_dtype() if units == "text" else None)
-    dataset.attrs["units"], dataset.attrs["dims"] = units, dims
+    put(group, name, np.array(value, dtype=object if units == "text" else None), units=units, dims=dims)
 
 
 def _write(file: h5py.File, archive: Archive) -> None:
     mark(file, FORMAT, FORMAT_VERSION)
-    file.attrs["name"], file.attrs["problem_hash"] = archive.problem.name, archive.problem.hash
-    file.attrs["sampler"], file.attrs["seed"], file.attrs["command"] = archive.sampler, archive.seed, archive.command
-    file["problem"] = json.dumps(archive.problem.to_dict())
-    file["versions"] = json.dumps(versions())
+    put_attribute(file, "name", archive.problem.name)
+    put_attribute(file, "problem_hash", archive.problem.hash)
+    for name in ("sampler", "seed", "command"):
+        put_attribute(file, name, getattr(archive, name))
+    put(file, "problem", json.dumps(archive.problem.to_dict()))
+    put(file, "versions", json.dumps(versions()))
     outcomes = archive.ordered()
     group = file.create_group("outcomes")
     _dataset(group, "start", [o.start for o in outcomes], "1")
@@ -123,9 +123,10 @@ def _write(file: h5py.File, archive: Archive) -> None:
 
 def _read(file: h5py.File) -> Archive:
     problem = Problem.from_dict(json.loads(text(file, "problem")))
-    if problem.hash != file.attrs["problem_hash"]:
+    if problem.hash != attribute(file, "problem_hash"):
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
-    archive = Archive(problem, str(file.attrs["sampler"]), int(file.attrs["seed"]), str(file.attrs["command"]))
+    sampler, seed, command = (attribute(file, name) for name in ("sampler", "seed", "command"))
+    archive = Archive(problem, str(sampler), int(seed), str(command))
     group = child(file, "outcomes")
     starts = array(group, "start")
     if not starts.size:

@@ -7,7 +7,7 @@ without a certified gait are NaN, and ``status`` and ``message`` say why. Layout
     wave, forward (axes)   winding, bilateral, antipodal, retraced, at_slowest, starts, starts_certified   (axes)
     status, message, origin, gait_class, problem_hash   (axes), texts
     mean (axes, joint)     cos, sin (axes, joint, harmonic)
-    attributes: format, format_version, name, source, command, versions (JSON), created_from
+    attributes: format, format_version, name, source, command, versions (JSON); dims and units of every variable
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from colloc.errors import StoreError
 from colloc.solution import versions
-from colloc.store_file import array, mark, new_file, plain, sealed_file
+from colloc.store_file import array, attribute, mark, new_file, put, put_attribute, sealed_file
 from colloc.study_table import UNITS, StudyTable
 
-KIND, VERSION = "colloc study", 1
+KIND, VERSION = "colloc study", 2
 _MOST_VARIABLES = 200
+_BETWEEN = ", "
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,28 +52,26 @@ def save_study(table: StudyTable, path: str | os.PathLike[str], *, source: str =
     path = Path(path)
     with new_file(path) as file:
         mark(file, KIND, VERSION)
-        file.attrs["name"], file.attrs["source"], file.attrs["command"] = table.name, source, command
-        file.attrs["versions"] = json.dumps(versions())
-        file.attrs["Conventions"] = "CF-1.8"
+        described = {"name": table.name, "source": source, "command": command, "versions": json.dumps(versions())}
+        for name, text in (described | {"Conventions": "CF-1.8"}).items():
+            put_attribute(file, name, text)
         for name, values in table.coordinates.items():
-            dataset = _dataset(file, name, values)
-            dataset.make_scale(name)
-            dataset.attrs["units"] = table.units.get(name, "1")
-            dataset.attrs["long_name"] = table.labels.get(name, name)
+            labels = {"units": table.units.get(name, "1"), "long_name": table.labels.get(name, name)}
+            put(file, name, _no_truth_values(values), dims=name, **labels).make_scale(name)
         for name, values in table.variables.items():
-            dataset = _dataset(file, name, values)
+            dimensions = table.dimensions[name]
+            dataset = put(file, name, _no_truth_values(values), dims=_BETWEEN.join(dimensions), units=UNITS.get(name, "1"))
             if dataset.dtype.kind == "f":
-                dataset.attrs["_FillValue"] = np.array([np.nan])
-            for k, dimension in enumerate(table.dimensions[name]):
+                put_attribute(dataset, "_FillValue", [np.nan])
+            # netCDF's way to say the same, which this module never reads: references of variable length
+            for k, dimension in enumerate(dimensions):
                 dataset.dims[k].attach_scale(file[dimension])
-            dataset.attrs["units"] = UNITS.get(name, "1")
     return path
 
 
-def _dataset(file: h5py.File, name: str, values: np.ndarray) -> h5py.Dataset:
-    if values.dtype.kind in "UO":
-        return file.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype())
-    return file.create_dataset(name, data=values.astype("i1") if values.dtype.kind == "b" else values)
+def _no_truth_values(values: np.ndarray) -> np.ndarray:
+    """As netCDF knows none."""
+    return values.astype("i1") if values.dtype.kind == "b" else values
 
 
 def load_study(path: str | os.PathLike[str]) -> StudyFile:
@@ -88,16 +86,11 @@ def load_study(path: str | os.PathLike[str]) -> StudyFile:
         if len(file) > _MOST_VARIABLES:
             raise StoreError(f"{path} holds {len(file)} variables, where {_MOST_VARIABLES} are allowed.")
         found = {name: array(file, name) for name in file}
-        scales = {name for name in file if file[name].is_scale}
-        dimensions = {}
-        for name in set(found) - scales:
-            owners = [list(dim.values()) for dim in file[name].dims]
-            if not all(owners):
-                raise StoreError(f"{path} is damaged: {name} has a dimension without a coordinate.")
-            dimensions[name] = tuple(owner[0].name.strip("/") for owner in owners)
-            if found[name].shape != tuple(found[d].size for d in dimensions[name] if d in scales):
-                raise StoreError(f"{path} is damaged: {name} does not fit its coordinates.")
-        attributes = {key: plain(value) for key, value in file.attrs.items()}
-    coordinates = {name: value for name, value in found.items() if name in scales}
-    variables = {name: value for name, value in found.items() if name not in scales}
-    return StudyFile(coordinates, variables, dimensions, attributes)
+        dimensions = {name: tuple(attribute(file[name], "dims").split(_BETWEEN)) for name in file}
+        attributes = {name: attribute(file, name) for name in file.attrs}
+    coordinates = {name: value for name, value in found.items() if dimensions[name] == (name,)}
+    variables = {name: value for name, value in found.items() if name not in coordinates}
+    for name, value in found.items():
+        if np.shape(value) != tuple(coordinates[d].size if d in coordinates else None for d in dimensions[name]):
+            raise StoreError(f"{path} is damaged: {name} does not fit its coordinates.")
+    return StudyFile(coordinates, variables, {name: dimensions[name] for name in variables}, attributes)

@@ -20,7 +20,8 @@ from colloc.study_run import StudyRun
 from colloc.study_table import study_table
 
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
-KINDS = ("solution", "archive", "arrays", "study", "journal", "cache")
+HDF5_KINDS = ("solution", "archive", "arrays", "study")
+KINDS = (*HDF5_KINDS, "journal", "cache")
 
 
 def problem(x=1.0):

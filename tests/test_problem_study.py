@@ -217,7 +217,7 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
     run = StudyRun(grid(axes=axes, problem=lambda x, kind: problem(x, 1.0, kind)), tmp_path)
     finished(run)
     table = study_table(run, lambda p: 0.5 / p.friction.mu_t)
-    path = save_study(table, tmp_path / "a b" / "ü.nc", source="text", command="command")
+    path = save_study(table, tmp_path / "a b" / "ü.nc", source="text", command="ä" * 70_000)
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert dict(data.sizes) == {"x": 3, "kind": 2, "joint": 2, "harmonic": 1}
         assert data.efficiency.sel(x=2.0, kind="bb").item() == table.variables["efficiency"][1, 1]
@@ -228,6 +228,14 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
         assert data.status.values[0, 0] == SOLVED
         np.testing.assert_allclose(data.upper_bound[:, 0], [0.5, 0.25, 0.5 / 3])
         assert data.attrs["source"] == "text"
+        assert data.attrs["command"] == "ä" * 70_000  # more than one block of HDF5 holds
+        assert json.loads(data.attrs["versions"])["numpy"] == np.__version__
+        assert data.joint.attrs["units"] == "1"
+        assert data.message.values[0, 0] == ""
+        assert {name: data[name].dtype.kind for name in ("kind", "status", "message", "gait_class")} == dict.fromkeys(
+            ("kind", "status", "message", "gait_class"), data.kind.dtype.kind
+        )
+        assert all(isinstance(value, str) for variable in data.variables.values() for value in variable.attrs.values())
     back = load_study(path)
     np.testing.assert_array_equal(back.variables["efficiency"], table.variables["efficiency"])
     assert back.dimensions["mean"] == ("x", "kind", "joint")

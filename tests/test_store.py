@@ -24,9 +24,9 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
 def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
     with h5py.File(save(three_link, tmp_path / "x.h5")) as file:
         angles = file["motion/joint_angles"]
-        assert angles.attrs["units"] == "rad"
+        assert angles.attrs["units"] == b"rad"
         assert angles.shape == (2, file["motion/t"].size)
-        assert file.attrs["status"] == "solved"
+        assert file.attrs["status"].decode() == "solved"
         assert "PROBLEM" in file["source"].asstr()[()]
         assert file["levels/000"].attrs["delta"] == three_link.levels[0].delta
 
