@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,10 @@ from colloc.smooth_period import Period, measured_period
 from colloc.solution import Check
 
 FIRST_RADIUS, NEXT_RADIUS = 0.2, 0.1
+ROUGH, ROUGH_ABOVE = {"panels": 4, "order": 6}, 2.5
+"""Quadrature of the bump at levels above so many times the last delta: they only have to come near, at a third of the cost."""
+OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "tol": 1e-7, "alpha_red_factor": 0.2, "watchdog_shortened_iter_trigger": 3}
+"""Half the processor time of a tight leash (theta_max_fact 1e-3) at epsilon = 0.1; with no leash the last level fails."""
 """Trust region of every coordinate [rad, and bump widths], at the first level and later ones."""
 GAP, ANGLE = 1e-3, 5e-3
 """Largest values that pass. GAP is that of chains times ten: fixed panels on the bump resolve its stick to this only."""
@@ -161,7 +165,7 @@ def optimise_bump(
     delta : float
         Regularisation speed to go down to, per period.
     delta_start : float, optional
-        By default 8 times that.
+        By default 4 times that.
     largest_angle : float
         Bound on |Theta| [rad].
     nodes : int
@@ -174,12 +178,19 @@ def optimise_bump(
     NotConvergedError
         If not even the first level converges.
     """
-    transcription = transcribe_bump(body, friction, vertices, nodes=nodes, largest_angle=largest_angle)
-    solver = Solver(transcription, {"max_iter": iterations, "theta_max_fact": 1e-3})
-    now, radius, reached, loss = delta_start or 8 * delta, FIRST_RADIUS, np.inf, np.inf
+
+    def prepared(body: BumpBody) -> tuple[BumpTranscription, Solver[BumpTranscription]]:
+        transcription = transcribe_bump(body, friction, vertices, nodes=nodes, largest_angle=largest_angle)
+        return transcription, Solver(transcription, OPTIONS | {"max_iter": iterations})
+
+    now, radius, reached, loss = delta_start or 4 * delta, FIRST_RADIUS, np.inf, np.inf
     levels: list[tuple[float, NlpResult]] = []
+    rough = now > ROUGH_ABOVE * delta
+    transcription, solver = prepared(replace(body, **ROUGH) if rough else body)
     while True:
         now = max(now, delta)
+        if rough and now <= ROUGH_ABOVE * delta:
+            rough, (transcription, solver) = False, prepared(body)
         result = solver.solve(feasible_bump(transcription, vertices, now), now, radius=radius)
         levels.append((now, result))
         if not result.optimal:

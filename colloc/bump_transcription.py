@@ -32,6 +32,10 @@ POSITION_SCALE = 1.3
 """What a bump's shift by its own width counts, against radians of amplitude, in the length of a piece."""
 
 
+ANGLES = 95
+"""Places along the bump at which its tangent angle is bounded: modes of low degree exceed the bound little in between."""
+
+
 @dataclass(frozen=True, eq=False)
 class BumpLayout:
     """Index arrays of the variables, ``(n_component, n_position)``; `parameters` are those a trust region bounds: all q."""
@@ -155,7 +159,7 @@ def transcribe_bump(
     nodes : int
         Gauss points on each piece.
     largest_angle : float
-        Bound on |Theta| at the bump's Gauss nodes [rad]; below pi/2 the body cannot cross itself.
+        Bound on |Theta| at `ANGLES` places of the bump [rad]; below pi/2 the body cannot cross itself.
     smallest_piece : float
         Lower bound on the length of a piece, which keeps speeds away from delta.
     """
@@ -175,7 +179,7 @@ def transcribe_bump(
     def outputs(which: range) -> sparse.csr_matrix:
         return pick((np.arange(mesh.n_point)[:, None] * n_out + np.array(which)).ravel(), n_source)
 
-    shape = body.angles(np.eye(body.modes))
+    shape = body.modes_at(np.linspace(-1.0, 1.0, ANGLES + 2)[1:-1])[0]
     angles = sparse.kron(sparse.identity(mesh.n + 1), shape) @ pick(layout.q[1:].ravel(order="F"), n)
     orient_state, orient_rate = mesh.integration()
     state, rate = mesh.quadrature()

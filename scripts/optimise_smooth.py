@@ -4,6 +4,7 @@ With problem files as arguments, each one's PROBLEM is solved; otherwise a table
 Results go to results/smooth/NAME.h5.
 """
 
+import argparse
 import runpy
 import sys
 import time
@@ -87,22 +88,32 @@ def row(problem: ModalProblem, starts: dict[str, Fourier], reference: float) -> 
     )
 
 
-print("mu_t, mu_f, mu_b | modes | harmonics | wave | optimised | +- | best start (certified) | iterations | CPU s | verdict")
-print("--- | --- | --- | --- | --- | --- | --- | --- | --- | ---")
-if sys.argv[1:]:
-    problems = [runpy.run_path(name)["PROBLEM"] for name in sys.argv[1:]]
-    cases = [(p, {"guess": p.guess}) for p in problems]
-else:
-    cases = []
-    for friction in FRICTIONS:
-        for modes, harmonics in CLASSES:
-            body = ModalBody(modes)
-            name = f"smooth_{friction.mu_t:g}_{friction.mu_f:g}_{friction.mu_b:g}_{modes}_{harmonics}"
-            problem = ModalProblem(name, body.wave(1.0), body, friction, Harmonic(harmonics, "antipodal"))
-            backward = Fourier(problem.guess.mean, problem.guess.cos, -problem.guess.sin)
-            chained = chain_start(body, friction)
-            cases.append((problem, {"wave": problem.guess, "backward wave": backward, "chain": chained}))
-for problem, starts in cases:
-    waves = (problem.body.motion(guess, True) for guess in (problem.body.wave(1.0), starts.get("backward wave")) if guess)
-    reference = max(measured_period(wave, problem.friction, problem.delta).efficiency for wave in waves)
-    row(problem, starts, reference)
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Optimised low-mode gaits of smooth bodies; see the top of this file.")
+    parser.add_argument("problems", nargs="*", help="problem files; by default a table over frictions and numbers of modes")
+    options = parser.parse_args()
+    print(
+        "mu_t, mu_f, mu_b | modes | harmonics | wave | optimised | +- | best start (certified) | iterations | CPU s | verdict"
+    )
+    print("--- | --- | --- | --- | --- | --- | --- | --- | --- | ---")
+    if options.problems:
+        problems = [runpy.run_path(name)["PROBLEM"] for name in options.problems]
+        cases = [(p, {"guess": p.guess}) for p in problems]
+    else:
+        cases = []
+        for friction in FRICTIONS:
+            for modes, harmonics in CLASSES:
+                body = ModalBody(modes)
+                name = f"smooth_{friction.mu_t:g}_{friction.mu_f:g}_{friction.mu_b:g}_{modes}_{harmonics}"
+                problem = ModalProblem(name, body.wave(1.0), body, friction, Harmonic(harmonics, "antipodal"))
+                backward = Fourier(problem.guess.mean, problem.guess.cos, -problem.guess.sin)
+                chained = chain_start(body, friction)
+                cases.append((problem, {"wave": problem.guess, "backward wave": backward, "chain": chained}))
+    for problem, starts in cases:
+        waves = (problem.body.motion(guess, True) for guess in (problem.body.wave(1.0), starts.get("backward wave")) if guess)
+        reference = max(measured_period(wave, problem.friction, problem.delta).efficiency for wave in waves)
+        row(problem, starts, reference)
+
+
+if __name__ == "__main__":
+    main()
