@@ -34,6 +34,44 @@ def _subtended(angle: Array, link: float, middle: float) -> Array:
     return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
 
 
+def crossing_sums(body: Chain, angles: Array) -> list[tuple[Array, Array]]:
+    """For links i and i + 2, the two sums that both exceed pi, or both fall below -pi, where they cross; ``(1, n_time)`` each.
+
+    Joint angles ``(n_joint, n_time)``.
+    """
+    sums = []
+    for i in range(body.n_link - 2):
+        before, middle, after = body.lengths[i : i + 3]
+        a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
+        sums.append((b + _subtended(a, before, middle), a + _subtended(b, after, middle)))
+    return sums
+
+
+def smooth_minimum(first: Array, second: Array) -> Array:
+    """The smaller of two values, or up to half of `SMOOTHING` more where they are equal."""
+    gap = first - second
+    spread = namespace(gap).sqrt(gap * gap + SMOOTHING * SMOOTHING) - SMOOTHING
+    return 0.5 * (first + second) - 0.5 * spread
+
+
+def share_of_first(first: Array, second: Array) -> Array:
+    """Derivative of `smooth_minimum` in its first argument; that in the second makes up 1."""
+    gap = first - second
+    return 0.5 - 0.5 * gap / namespace(gap).sqrt(gap * gap + SMOOTHING * SMOOTHING)
+
+
+def tangent_of_minimum(first: Array, second: Array, share: Array) -> Array:
+    """The tangent plane of `smooth_minimum` that has the slope `share` in the first argument; never below the minimum.
+
+    Where a path rounds the corner at which both sums are pi, the smaller sum has a peak with a kink, and the instant of the
+    peak moves with the path. By the envelope theorem the peak's height changes like the tangent plane at the peak, its
+    slope held; the minimum itself, at a fixed instant, falls whichever way the peak moves along the path.
+    """
+    share_of_second = 1.0 - share
+    bulge = 0.5 - namespace(share).sqrt(share * share_of_second)
+    return share * first + share_of_second * second + SMOOTHING * bulge
+
+
 def crossing_bounds(body: Chain, angles: Array) -> Array | None:
     """Smooth functions that are <= pi only at shapes where no links i and i + 2 cross, ``(2 (n_link - 2), n_time)``.
 
@@ -41,18 +79,10 @@ def crossing_bounds(body: Chain, angles: Array) -> Array | None:
     """
     if body.n_link < 3:
         return None
-    xp = namespace(angles)
     rows = []
-    for i in range(body.n_link - 2):
-        before, middle, after = body.lengths[i : i + 3]
-        a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
-        first = b + _subtended(a, before, middle)
-        second = a + _subtended(b, after, middle)
-        gap = first - second
-        spread = 0.5 * (xp.sqrt(gap * gap + SMOOTHING * SMOOTHING) - SMOOTHING)
-        mean = 0.5 * (first + second)
-        rows += [mean - spread, -mean - spread]
-    return xp.stack(rows)
+    for first, second in crossing_sums(body, angles):
+        rows += [smooth_minimum(first, second), smooth_minimum(-first, -second)]
+    return namespace(angles).stack(rows)
 
 
 def far_pairs(body: Chain) -> list[tuple[int, int]]:

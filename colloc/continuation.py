@@ -99,7 +99,7 @@ def _descend(run: Run, delta: float, target: float) -> NlpResult:
     """Levels from delta down to the target, with smaller steps after a failure; the last result."""
     factor, reached, failures, meshes = run.factor, None, 0, 1
     while True:
-        result = run.attempt(delta)
+        result = run.attempt(delta, patient=failures > 0)
         if result.optimal:
             reached = delta
             if delta <= target:

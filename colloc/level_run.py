@@ -31,8 +31,8 @@ steps of up to 0.1 rad the level at 3e-4 fails."""
 TRIVIAL, TRIVIAL_EFFICIENCY = "trivial gait", 1e-4
 """Status of a level whose gait goes nowhere: efficiency times the smallest friction coefficient (at most 1) below this."""
 NEXT_ITERATIONS = 15
-"""Iterations a condensed level of a one-harmonic gait may take that starts from a converged one. Near the optimum 4 to 12
-do; a solve that needs more follows a kink of stick-slip in tiny steps, and a smaller step in delta is cheaper than its end.
+"""Iterations a condensed level of a one-harmonic gait may take that starts from a converged one on the same mesh. 4 to 12
+do near an optimum; one that needs more follows a kink of stick-slip in tiny steps: a smaller step in delta is cheaper.
 Gaits of more parameters need more."""
 _RETRIES = 2
 """A gait of many parameters that has not converged on a refined mesh after a few dozen iterations follows a kink in tiny
@@ -63,6 +63,7 @@ class Run:
         self.rich = problem.has_path or problem.gait.harmonics > 1
         self.first_delta = problem.delta_start
         self.far: Pairs = ()
+        self.new_mesh = self.patient = True
         self.reached: NlpResult | None = None
         if problem.gait.symmetry == "none" and not problem.has_path:
             self.parameters = closed_parameters(problem, self.parameters, problem.delta_start)
@@ -84,8 +85,9 @@ class Run:
         self.multipliers, self.radius, self.first_delta = (last.lam_x, last.lam_g), self.next_radius, last.delta
         self.reached = _as_result(last)
 
-    def attempt(self, delta: float) -> NlpResult:
-        """Solve at delta from the last converged gait; take the result over if it is optimal."""
+    def attempt(self, delta: float, patient: bool = False) -> NlpResult:
+        """Solve at delta from the last converged gait, `patient` without `NEXT_ITERATIONS`; take an optimal result over."""
+        self.patient = patient or self.new_mesh or self.rich or self.problem.formulation != CONDENSED
         result = self._solve_apart(delta)
         if delta == self.problem.delta:
             # move the checks between nodes to the new gait's worst instants until none is exceeded
@@ -105,7 +107,7 @@ class Run:
         if result.optimal:
             before, self.parameters = self.parameters, result.x[self.solver.transcription.layout.parameters[:, 0]]
             self.multipliers = (result.lam_x, result.lam_g)
-            self.radius = self.next_radius
+            self.radius, self.new_mesh = self.next_radius, False
             if not self.problem.has_path:
                 self.velocities = result.x[self.solver.transcription.layout.z]
                 self.track.record(delta, self.parameters)
@@ -133,8 +135,7 @@ class Run:
         transcription, multipliers, radius = self.solver.transcription, self.multipliers, self.radius
         own = self.parameters + self.track.move(delta) if start is None else start
         x = feasible_point(transcription, own, delta, self.velocities)
-        hurried = self.track and self.problem.formulation == CONDENSED and not self.rich
-        iterations = NEXT_ITERATIONS if hurried else None
+        iterations = NEXT_ITERATIONS if self.track and not self.patient else None
         result = self.solver.solve(x, delta, multipliers, radius, iterations)
         stuck = self.rich and bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
         for _ in range(_RETRIES if stuck else 0):
@@ -152,7 +153,7 @@ class Run:
         self.solver = Solver(transcribed(self.problem.with_(scheme=scheme), gait, edges, self.far))
         self.parameters = nearest_parameters(self.solver.transcription, gait)
         self.multipliers = self.velocities = None
-        self.radius = radius
+        self.radius, self.new_mesh = radius, True
         self.track.remeshed()
 
     def other_mesh(self) -> None:

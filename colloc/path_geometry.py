@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from colloc.blocks import Block, LocalFunction
 from colloc.constraint_rows import Group, equalities, selector, stacked
 from colloc.contact import Pairs
-from colloc.kernels import shape_checks
+from colloc.kernels import ShapeCheck, shape_checks
 from colloc.mesh import Mesh
 from colloc.path_class import FreePath, Polygon
 from colloc.path_gait import ArcPath, Corners
@@ -42,7 +41,7 @@ class PathGeometry:
         The second instance parameter of the piece's points (see `colloc.path_kernels`).
     groups : list of Group
     blocks : dict of str to (function, gather, instance parameters)
-    checks : list of (name, function)
+    checks : list of ShapeCheck
     lower, upper : (n,)
     """
 
@@ -54,7 +53,7 @@ class PathGeometry:
     second: np.ndarray
     groups: list[Group]
     blocks: dict[str, tuple[LocalFunction, np.ndarray, np.ndarray]]
-    checks: list[tuple[str, ca.Function]]
+    checks: list[ShapeCheck]
     lower: np.ndarray
     upper: np.ndarray
 
@@ -79,10 +78,11 @@ def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndar
 
 def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
     n_cell = geometry.start.size
-    for name, check in geometry.checks:
+    for check in geometry.checks:
+        name = check.name
         joint = name.startswith("joint")
         limit = problem.joint_limit if joint else 0.0
-        function = placed_check(check, geometry.piece)
+        function = placed_check(check.value, geometry.piece)
         geometry.blocks[name] = (function, geometry.shape, geometry.given(np.full(n_cell, 0.5)))
         lower, upper = np.full(n_cell, -limit if joint else -np.inf), np.full(n_cell, limit)
         rows = sparse.csr_matrix((n_cell, n))

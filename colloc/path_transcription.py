@@ -18,7 +18,7 @@ from scipy import sparse
 from colloc.blocks import Assembly, Block
 from colloc.constraint_rows import Group, equalities, quadrature_group, rotation_groups, selector
 from colloc.contact import Pairs
-from colloc.kernels import minus_efficiency
+from colloc.kernels import ShapeCheck, minus_efficiency
 from colloc.layout import Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
 from colloc.path_class import FreePath
@@ -27,8 +27,8 @@ from colloc.path_geometry import PathGeometry, arc_geometry, side_geometry
 from colloc.path_kernels import ADVANCE, OMEGA, POWER, path_point, squared_distance
 from colloc.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.problem import Problem
-from colloc.transcription import worst_instants
 from colloc.velocity_callback import VelocityMap
+from colloc.worst_instants import check_values, worst_instants
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class PathTranscription:
         return 1.0
 
     @property
-    def checks(self) -> list[tuple[str, ca.Function]]:
+    def checks(self) -> list[ShapeCheck]:
         return self.geometry.checks
 
     def member(self, parameters: np.ndarray) -> ArcPath | Corners:
@@ -77,7 +77,7 @@ class PathTranscription:
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant."""
-        given = {name: self.geometry.given(tau) for (name, _), tau in zip(self.checks, self._worst(parameters), strict=True)}
+        given = {c.name: self.geometry.given(tau) for c, tau in zip(self.checks, self._worst(parameters), strict=True)}
         blocks = zip(self.geometry.blocks, self.assembly.blocks, strict=True)
         return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
 
@@ -91,9 +91,8 @@ class PathTranscription:
         """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
         gait = self.gait(x)
         excess = 0.0
-        for (name, check), times in zip(self.checks, worst_instants(gait, self.phase_mesh(gait), self.checks), strict=True):
-            rows = self.groups[name]
-            values = np.array(check.map(times.size)(gait.angles(times))).ravel()
+        for check, times in zip(self.checks, worst_instants(gait, self.phase_mesh(gait), self.checks), strict=True):
+            rows, values = self.groups[check.name], check_values(check, gait, times)
             excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
             excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
         return excess

@@ -23,7 +23,8 @@ DELTA_START, PATH_DELTA_START = 0.1, 0.01
 CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
 FORMULATIONS = (CONDENSED, MAP, LIFTED)
 _CHECKED_PHASES = 2000
-_SLACK = 1e-9
+_SLACK = 1e-6
+"""Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
 _AT_THE_BOUND = 1e-4
 """An optimum that lies on the lower bound of the shape speed is a good guess, although sampling makes it a little shorter."""
 

@@ -42,6 +42,8 @@ GRADE = 0.2
 x log|x|; cutting in the middle costs schemes of high order twice the points."""
 _ONE_KINK = 0.02
 """Kinks nearer to each other than this part of the first mesh's spacing share a knot."""
+_LEFT = 0.2
+"""How far, in mean intervals, a kink can have moved from the knot that it left."""
 _NARROWEST = 1e-7
 
 
@@ -146,12 +148,24 @@ def planned_mesh(
         on_knots = kinks[:0] if switches and (rule.left or rule.right) else kinks
         # knots of a path are where its arcs and sides end: there they may be added, not moved
         snap = 0.0 if problem.has_path else _SNAP
-        edges = moved_knots(np.union1d(_first_edges(problem, mesh), knots), on_knots, snap)
+        edges = moved_knots(np.union1d(_first_edges(problem, mesh), knots), np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
         plan = _split(problem, rule, edges, knots, on_knots, gait, delta, fine, tolerance, budget)
         if best is None or (plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best))):
             best = plan
     return best
+
+
+def _beside(mesh: Mesh, kinks: np.ndarray) -> np.ndarray:
+    """Knots of a mesh that the kinks have just left.
+
+    Where a kink leaves its knot, collocation errs in proportion to how far it went, and the optimiser takes what errs in its
+    favour: moving the knot after the kink only repeats the chase. Between the old knot and the new one it ends.
+    """
+    if kinks.size == 0:
+        return kinks
+    nearest = mesh.edges[np.abs(mesh.edges[:, None] - kinks).argmin(axis=0)]
+    return nearest[np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()]
 
 
 def violated_middles(mesh: Mesh, error: MeshError) -> np.ndarray:

@@ -31,14 +31,12 @@ from colloc.constraint_rows import (
 )
 from colloc.contact import Pairs
 from colloc.gait import Fourier
-from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function, shape_checks
+from colloc.kernels import N_RATE, ShapeCheck, gait_check, mean_square, minus_efficiency, point_function, shape_checks
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
-from colloc.path_samples import Gait
 from colloc.problem import LIFTED, Problem
 from colloc.velocity_callback import VelocityMap
-
-_SAMPLES_PER_CELL = 16
+from colloc.worst_instants import check_values, held_shares, worst_instants
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +54,7 @@ class Transcription:
     constraint_lower, constraint_upper : (m,)
     groups : dict of str to slice
         Names of the constraint rows, in order.
-    checks : list of (name, function)
+    checks : list of ShapeCheck
         Shape functions whose largest value in each mesh cell is constrained.
     velocity : VelocityMap
         Kept alive here for the functions that call it.
@@ -71,7 +69,7 @@ class Transcription:
     constraint_lower: np.ndarray
     constraint_upper: np.ndarray
     groups: dict[str, slice]
-    checks: list[tuple[str, ca.Function]]
+    checks: list[ShapeCheck]
     velocity: VelocityMap
 
     @property
@@ -99,9 +97,8 @@ class Transcription:
         gait = self.gait(x)
         worst = worst_instants(gait, self.mesh, self.checks)
         excess = 0.0
-        for (name, check), times in zip(self.checks, worst, strict=True):
-            rows = self.groups[name]
-            values = np.array(check.map(times.size)(gait.angles(times))).ravel()
+        for check, times in zip(self.checks, worst, strict=True):
+            rows, values = self.groups[check.name], check_values(check, gait, times)
             excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
             excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
         return excess
@@ -109,40 +106,18 @@ class Transcription:
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
 
-        An inequality between nodes is kept by constraining it where the gait `parameters` comes closest to it; repeated
-        at every solve this is the exchange method for semi-infinite programs.
+        An inequality between nodes is kept by constraining it where the gait `parameters` comes closest to it: see
+        `colloc.worst_instants`.
         """
-        blocks = (self.assembly.objective, *self.assembly.blocks)
-        worst = iter(worst_instants(self.member(parameters), self.mesh, self.checks))
-        return [_check_parameters(self.problem, next(worst)) if b.parameters.shape[0] else b.parameters for b in blocks]
+        gait, blocks = self.member(parameters), (self.assembly.objective, *self.assembly.blocks)
+        worst = zip(self.checks, worst_instants(gait, self.mesh, self.checks), strict=True)
+        moved = iter([_check_parameters(self.problem, times, held_shares(check, gait, times)) for check, times in worst])
+        return [next(moved) if b.parameters.shape[0] else b.parameters for b in blocks]
 
 
-def worst_instants(gait: Gait, mesh: Mesh, checks: list[tuple[str, ca.Function]]) -> list[np.ndarray]:
-    """For each check, the instant in every mesh cell where it comes closest to its bound, ``(n_interval,)``."""
-    fine = np.linspace(0.0, 1.0, _SAMPLES_PER_CELL + 1)
-    cells = np.arange(mesh.n)
-
-    result = []
-    for name, check in checks:
-        times = mesh.edges[:-1, None] + mesh.h[:, None] * fine
-        values = np.array(check.map(times.size)(gait.angles(times.ravel()))).reshape(times.shape)
-        if name.startswith("joint"):
-            values = np.abs(values)
-        best = np.argmax(values, axis=1)
-        # one parabola through the best sample and its neighbours places a maximum inside to O(step^4)
-        inner = np.clip(best, 1, _SAMPLES_PER_CELL - 1)
-        low, mid, high = (values[cells, inner + k] for k in (-1, 0, 1))
-        curvature = low - 2 * mid + high
-        with np.errstate(divide="ignore", invalid="ignore"):
-            offset = np.where(curvature < 0, 0.5 * (low - high) / curvature, 0.0)
-        offset = np.where(best == inner, np.clip(offset, -1, 1), 0.0)
-        result.append(times[cells, best] + offset * mesh.h / _SAMPLES_PER_CELL)
-    return result
-
-
-def _check_parameters(problem: Problem, times: np.ndarray) -> np.ndarray:
+def _check_parameters(problem: Problem, times: np.ndarray, shares: np.ndarray) -> np.ndarray:
     matrix = problem.gait.angle_matrix(times, problem.body.n_joint)
-    return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
+    return np.vstack([matrix.transpose(0, 2, 1).reshape(times.size, -1).T, shares])
 
 
 def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = ()) -> Transcription:
@@ -162,10 +137,10 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     sites[mesh.points] = mesh.sites
     point_gather = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces])
     blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
-    for name, check in checks:
+    for check in checks:
         function = gait_check(check, n_joint, n_parameter)
-        middles = _check_parameters(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]))
-        blocks[name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
+        middles = _check_parameters(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]), np.full(mesh.n, -1.0))
+        blocks[check.name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
     blocks["shape speed"] = (
         mean_square(ca.DM(problem.gait.mean_square_rate(n_joint) / RADIANS**2)),
         layout.parameters,
@@ -180,7 +155,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         *_orientation_groups(problem, mesh, layout),
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
         quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
-        *(_check_group(name, problem, mesh.n, layout.n) for name, _ in checks),
+        *(_check_group(check.name, problem, mesh.n, layout.n) for check in checks),
         Group(
             "shape speed",
             np.array([problem.smallest_shape_speed**2]),

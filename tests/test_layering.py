@@ -49,6 +49,7 @@ LEVELS = {
         "velocity_callback",
         "path_replay",
         "warm_start",
+        "worst_instants",
         "transcription",
         "smooth_balance",
         "bump_balance",
@@ -204,6 +205,7 @@ def test_the_numpy_side_never_loads_casadi():
         "path_geometry",
         "path_kernels",
         "path_transcription",
+        "worst_instants",
         "transcription",
         "velocity_callback",
     }
