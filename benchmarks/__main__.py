@@ -26,6 +26,7 @@ PARTS = {
     "mesh_tolerance": "The whole solve: error against time",
     "smooth_panels": "Smooth bodies",
     "map_resolution": "The tabulated velocity map",
+    "formulations": "Three formulations, the same starts",
     "cost": "Where the time goes",
     "scaling": "Growth with mesh, links and harmonics",
     "peer_table": "Other tools on the same problem",

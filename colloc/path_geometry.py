@@ -10,12 +10,12 @@ from scipy import sparse
 from colloc.blocks import Block, LocalFunction
 from colloc.constraint_rows import Group, equalities, selector, stacked
 from colloc.contact import Pairs
-from colloc.kernels import ShapeCheck, shape_checks
 from colloc.mesh import Mesh
 from colloc.path_class import FreePath, Polygon
 from colloc.path_gait import ArcPath, Corners
 from colloc.path_kernels import Piece, arc, chord, excess_turn, placed_check, side, side_lengths, unit_norm
 from colloc.problem import Problem
+from colloc.shape_checks import ShapeCheck, shape_checks
 from colloc.symmetry import BILATERAL, end_conditions, tangent_conditions
 
 _FASTEST = 30.0
@@ -82,8 +82,9 @@ def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
         name = check.name
         joint = name.startswith("joint")
         limit = problem.joint_limit if joint else 0.0
-        function = placed_check(check.value, geometry.piece)
-        geometry.blocks[name] = (function, geometry.shape, geometry.given(np.full(n_cell, 0.5)))
+        function = placed_check(check, geometry.piece)
+        given = np.vstack([geometry.given(np.full(n_cell, 0.5)), np.full(n_cell, -1.0)])
+        geometry.blocks[name] = (function, geometry.shape, given)
         lower, upper = np.full(n_cell, -limit if joint else -np.inf), np.full(n_cell, limit)
         rows = sparse.csr_matrix((n_cell, n))
         geometry.groups.append(Group(name, lower, upper, rows, {name: sparse.eye(n_cell, format="csr")}))

@@ -17,6 +17,7 @@ from colloc.balance import instant, net_force, total_power
 from colloc.blocks import LocalFunction, implicit_function, local_function
 from colloc.body import Chain
 from colloc.friction import Friction
+from colloc.shape_checks import ShapeCheck
 
 OMEGA, ADVANCE, POWER = range(3)
 """Outputs of `path_point`, per unit of phase."""
@@ -80,9 +81,11 @@ def chord(piece: Piece) -> LocalFunction:
     return local_function("chord", piece.shape, piece.given[1], ca.SX.sym("delta"), whole)
 
 
-def placed_check(check: ca.Function, piece: Piece) -> LocalFunction:
-    """A shape check at a point of a piece."""
-    return local_function("check", piece.shape, piece.given, ca.SX.sym("delta"), check(piece.angles))
+def placed_check(check: ShapeCheck, piece: Piece) -> LocalFunction:
+    """A shape check at a point of a piece; given are those of the piece and the share of the cut."""
+    share = ca.SX.sym("share")
+    given = ca.vertcat(piece.given, share)
+    return local_function("check", piece.shape, given, ca.SX.sym("delta"), check.cut(piece.angles, share))
 
 
 def side_lengths(n_joint: int, n_piece: int) -> LocalFunction:

@@ -18,7 +18,7 @@ from scipy import sparse
 from colloc.blocks import Assembly, Block
 from colloc.constraint_rows import Group, equalities, quadrature_group, rotation_groups, selector
 from colloc.contact import Pairs
-from colloc.kernels import ShapeCheck, minus_efficiency
+from colloc.kernels import minus_efficiency
 from colloc.layout import Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
 from colloc.path_class import FreePath
@@ -27,8 +27,9 @@ from colloc.path_geometry import PathGeometry, arc_geometry, side_geometry
 from colloc.path_kernels import ADVANCE, OMEGA, POWER, path_point, squared_distance
 from colloc.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.problem import Problem
+from colloc.shape_checks import ShapeCheck
 from colloc.velocity_callback import VelocityMap
-from colloc.worst_instants import check_values, worst_instants
+from colloc.worst_instants import check_values, held_shares, worst_instants
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +78,13 @@ class PathTranscription:
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant."""
-        given = {c.name: self.geometry.given(tau) for c, tau in zip(self.checks, self._worst(parameters), strict=True)}
+        gait = self.member(parameters)
+        mesh, given = self.phase_mesh(gait), {}
+        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks), strict=True):
+            tau = np.clip((times - mesh.edges[:-1]) / mesh.h, 0.0, 1.0)
+            given[check.name] = np.vstack([self.geometry.given(tau), held_shares(check, gait, times)])
         blocks = zip(self.geometry.blocks, self.assembly.blocks, strict=True)
         return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
-
-    def _worst(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """For each check, the fraction of every interval where it comes closest to its bound."""
-        gait = self.member(parameters)
-        mesh = self.phase_mesh(gait)
-        return [np.clip((t - mesh.edges[:-1]) / mesh.h, 0.0, 1.0) for t in worst_instants(gait, mesh, self.checks)]
 
     def check_excess(self, x: np.ndarray) -> float:
         """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""

@@ -31,10 +31,11 @@ from colloc.constraint_rows import (
 )
 from colloc.contact import Pairs
 from colloc.gait import Fourier
-from colloc.kernels import N_RATE, ShapeCheck, gait_check, mean_square, minus_efficiency, point_function, shape_checks
+from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
 from colloc.problem import LIFTED, Problem
+from colloc.shape_checks import ShapeCheck, shape_checks
 from colloc.velocity_callback import VelocityMap
 from colloc.worst_instants import check_values, held_shares, worst_instants
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from colloc.kernels import ShapeCheck
 from colloc.mesh import Mesh
 from colloc.path_samples import Gait
+from colloc.shape_checks import ShapeCheck
 
 _SAMPLES = 16
 _ZOOMS = 3

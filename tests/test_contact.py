@@ -6,9 +6,9 @@ import pytest
 from colloc.body import Chain
 from colloc.contact import SMOOTHING, crossing_bounds, crossing_depth, share_of_first, smooth_minimum, tangent_of_minimum
 from colloc.gait import Fourier
-from colloc.kernels import shape_checks
 from colloc.layout import problem_mesh
 from colloc.problem import Problem
+from colloc.shape_checks import shape_checks
 from colloc.worst_instants import check_values, held_shares, worst_instants
 
 AROUND_THE_CORNER = Fourier(np.zeros(2), np.array([[2.877], [0.172]]), np.array([[0.0], [-2.872]]))
