@@ -20,6 +20,7 @@ from colloc.schemes import Scheme, scheme
 
 PANEL_RULE = scheme("gauss-5")
 _TO_MIDDLE = PANEL_RULE.integrals(np.array([0.5]))[0]
+_TO_HALVES = PANEL_RULE.lagrange(0.5 * np.concatenate([PANEL_RULE.c, 1.0 + PANEL_RULE.c]))
 _NARROWEST = 1e-9
 _MOST_PANELS = 20_000
 
@@ -34,10 +35,11 @@ class Rates:
     power: np.ndarray
 
 
-def rates_at(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray) -> Rates:
-    """Solved velocities of a path at phases t of any shape, per period."""
+def rates_at(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None) -> Rates:
+    """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
-    z = solve_balance(body, friction, angles, rates, delta).require().z
+    start = None if near is None else near.reshape(3, -1)
+    z = solve_balance(body, friction, angles, rates, delta, start=start).require().z
     now = instant(body, friction, angles, rates, z, delta)
     cx, cy = body.centre_velocity(now.posture, now.velocity)
     power = total_power(now.velocity, now.force)
@@ -86,6 +88,12 @@ class FineMotion:
         """Phases of the panel nodes, ``(n, s)``."""
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
+    def velocity(self, t: np.ndarray) -> np.ndarray:
+        """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``: good to start a solve from."""
+        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
+        weights = PANEL_RULE.lagrange(((t - self.edges[k]) / np.diff(self.edges)[k]).ravel()).reshape(*t.shape, -1)
+        return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
+
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Orientation, displacement and work at phases t ``(n_time,)``, by the panels' polynomials."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
@@ -122,8 +130,8 @@ def fine_motion(body: Chain, friction: Friction, path: Path, delta: float, edges
         If the balance cannot be solved at some instant.
     """
 
-    def solved(left: np.ndarray, width: np.ndarray) -> tuple[Rates, Increments]:
-        rates = rates_at(body, friction, path, delta, left[:, None] + width[:, None] * PANEL_RULE.c)
+    def solved(left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None) -> tuple[Rates, Increments]:
+        rates = rates_at(body, friction, path, delta, left[:, None] + width[:, None] * PANEL_RULE.c, near)
         return rates, increments(PANEL_RULE, width, rates)
 
     left, width = edges[:-1], np.diff(edges)
@@ -140,7 +148,7 @@ def fine_motion(body: Chain, friction: Friction, path: Path, delta: float, edges
         half = 0.5 * np.repeat(width[chosen], 2)
         start = np.repeat(left[chosen], 2)
         start[1::2] += half[1::2]
-        new_rates, new = solved(start, half)
+        new_rates, new = solved(start, half, (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1))
         before = Rates(rates.z[:, chosen], rates.centre[chosen], rates.power[chosen])
         middle = increments(PANEL_RULE, width[chosen], before, _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves

@@ -130,7 +130,9 @@ def _collocated_intervals(
     problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
 ) -> _Own:
     nodes = left[:, None] + (right - left)[:, None] * rule.c
-    rates = rates_at(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, nodes)
+    rates = rates_at(
+        problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, nodes, fine.velocity(nodes)
+    )
     turned, moved, spent = increments(rule, right - left, rates)
     (theta, path, work), (theta_right, path_right, work_right) = fine.at(left), fine.at(right)
     rotation, energy = turned - (theta_right - theta), spent - (work_right - work)
