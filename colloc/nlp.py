@@ -9,11 +9,11 @@ from typing import Generic, TypeVar
 import casadi as ca
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
 from colloc.blocks import Oracles, oracles
 from colloc.condensed_program import CondensedProgram
 from colloc.interruption import interruptible
+from colloc.multiplier_estimate import estimated_multipliers
 from colloc.problem import CONDENSED
 from colloc.program import Program
 from colloc.transcription import Transcription
@@ -231,10 +231,8 @@ class Solver(Generic[AnyProgram]):
         t = self.transcription
         jacobian, equality = self._equality_jacobian(x, parameters)
         gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel()[t.lower < t.upper]
-        m, n = jacobian.shape
-        system = sparse.bmat([[sparse.eye(n), jacobian.T], [jacobian, -1e-12 * sparse.eye(m)]], format="csc")
         multipliers = np.zeros(t.assembly.m)
-        multipliers[equality] = spsolve(system, np.concatenate([-gradient, np.zeros(m)]))[n:]
+        multipliers[equality] = estimated_multipliers(jacobian, gradient)
         return multipliers
 
     def _equality_jacobian(self, x: np.ndarray, parameters: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:

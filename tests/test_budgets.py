@@ -10,8 +10,11 @@ from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
 from colloc.blocks import oracles
 from colloc.kernels import point_function
 from colloc.motion import sine_wave
+from colloc.multiplier_estimate import estimated_multipliers, quasi_definite_factors
+from colloc.nlp import Solver
 from colloc.smooth_balance import solve_smooth
 from colloc.transcription import transcribe
+from colloc.warm_start import feasible_point
 
 
 @pytest.mark.parametrize(
@@ -43,6 +46,24 @@ def test_nonzeros_grow_by_so_many_for_every_interval(formulation, jacobian, hess
     growth = np.diff(counts, axis=0)[0] / 20
     assert growth[0] <= jacobian
     assert growth[1] <= hessian
+
+
+@pytest.mark.parametrize("formulation", ["map", "lifted"])
+def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_mesh_only(formulation):
+    """No symmetry: the net rotation couples all intervals."""
+    fill = []
+    for intervals in (20, 40):
+        problem = Problem("p", ellipse(0.3, 1, 0.5), intervals=intervals, formulation=formulation)
+        solver = Solver(transcribe(problem))
+        t = solver.transcription
+        x = feasible_point(t, problem.gait.parameters(problem.guess), 0.1)
+        jacobian, _ = solver.equality_jacobian(x, 0.1)
+        gradient = np.random.default_rng(1).normal(size=jacobian.shape[1])
+        left = gradient + jacobian.T @ estimated_multipliers(jacobian, gradient)
+        # what is left is orthogonal to every equation
+        assert np.abs(jacobian @ left).max() < 1e-8 * np.abs(gradient).max()
+        fill.append(quasi_definite_factors(jacobian).L.nnz)
+    assert fill[1] < 2.3 * fill[0]
 
 
 @pytest.mark.parametrize(

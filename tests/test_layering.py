@@ -21,6 +21,7 @@ LEVELS = {
         "sealed_file",
         "file_lock",
         "minimax_program",
+        "multiplier_estimate",
     ],
     1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: [
