@@ -62,7 +62,7 @@ def document(sections: dict[str, dict]) -> str:
                 "",
             ]
             text += [section["text"], ""]
-    text += ["## Robustness over random starts", "", "See `python benchmarks/robustness.py` and its table robustness.md.", ""]
+    text += ["## Robustness over random starts", "", "See `python -m benchmarks.robustness` and its table robustness.md.", ""]
     return "\n".join(text)
 
 

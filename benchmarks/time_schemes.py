@@ -33,7 +33,8 @@ def adaptive_efficiency(gait: Fourier, delta: float, tolerance: float = 1e-11) -
     body, friction = Chain(), Friction()
 
     def rate(t: float, state: np.ndarray) -> list[float]:
-        angles, rates = gait.angles([t]), gait.rates([t])
+        when = np.array([t])
+        angles, rates = gait.angles(when), gait.rates(when)
         solved = solve_balance(body, friction, angles, rates, delta, tolerance=1e-12)
         now = instant(body, friction, angles, rates, solved.z, delta)
         cx, cy = (c.item() for c in body.centre_velocity(now.posture, now.velocity))
@@ -79,8 +80,8 @@ def report(quick: bool, folder: Path) -> str:
         figure, axes = plt.subplots(1, len(deltas), figsize=(3.0 * len(deltas), 3.2), squeeze=False)
         for axis, delta in zip(axes[0], deltas, strict=True):
             for name in SCHEMES:
-                points, _, errors = zip(*curves[delta, name], strict=True)
-                axis.loglog(points, np.maximum(errors, 1e-15), color=COLOURS[name], marker="o", ms=3, label=name)
+                points, _, missed = zip(*curves[delta, name], strict=True)
+                axis.loglog(points, np.maximum(missed, 1e-15), color=COLOURS[name], marker="o", ms=3, label=name)
             n = np.array([30, 300])
             axis.loglog(n, 3.0 * n**-2.0, color=VERMILION, ls=":", lw=1, label="second order")
             axis.set(xlabel="points on half a period", title=f"delta = {delta:g}")

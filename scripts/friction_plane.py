@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from colloc.body import Chain
-from colloc.bound import Budget, efficiency_bound, known_bound
+from colloc.bound import Bound, Budget, efficiency_bound, known_bound
 from colloc.figures_studies import friction_plane_figure
 from colloc.figures_style import save
 from colloc.friction import Friction
 from colloc.store_study import StudyFile, load_study
 from colloc.study_table import best_over
 
-SMALL_BASIS = Budget(intervals=(4,), shapes=20, directions=20, refinements=1, linear_rounds=6)
+SMALL_BASIS = Budget(intervals=6, shapes=12, directions=24, rounds=12, starts=60, tolerance=5e-3)
 COMMAND = "python -m colloc.sweep_study studies/friction_plane.py && python -m scripts.friction_plane"
 
 
@@ -33,6 +33,7 @@ def bounds(mu_t: np.ndarray, mu_b: np.ndarray, count: int, cache: Path) -> np.nd
     for i, t in enumerate(mu_t):
         for j, b in enumerate(mu_b):
             law = Friction(float(t), 1.0, float(b))
+            bound: Bound | None
             if count and i in rows and j in columns:
                 bound = efficiency_bound(Chain(), law, budget=SMALL_BASIS, cache=cache)
                 print(f"bound at mu_t {t:.3f}, mu_b {b:.3f}: {bound.sampled:.4f} ({bound.seconds:.0f} s)", flush=True)

@@ -25,7 +25,8 @@ def main() -> None:
     parser.add_argument("epsilons", nargs="*", type=float, default=EPSILONS, help="half-widths of the region, falling")
     parser.add_argument("--output", type=Path, default=Path("results/figures"), help="folder of the figure")
     options = parser.parse_args()
-    friction, starts, rows = Friction(), [], []
+    friction, rows = Friction(), []
+    starts: list[np.ndarray] = []
     print(f"{'epsilon':>8} {'prescribed':>11} {'+-':>8} {'optimised':>11} {'+-':>8} {'loss ratio':>10} {'CPU s':>8}  optimum")
     for epsilon in options.epsilons:
         body, delta = BumpBody(epsilon, modes=4, panels=6), delta_for(epsilon)
