@@ -131,6 +131,8 @@ def _figure(curves: list, folder: Path) -> None:
             for name, points in lines.items():
                 axis.loglog(*zip(*points, strict=True), color=COLOURS[name], marker=MARKERS.get(name, "o"), ms=4, label=name)
             axis.set(xlabel="nodes (or links) on the body", title=title)
+            axis.set_xticks([10, 30, 100, 300], labels=["10", "30", "100", "300"])
+            axis.minorticks_off()
         axes[0][0].set_ylabel("relative error of the power")
         axes[0][0].legend(fontsize=7)
         save(figure, folder, "smooth_panels")
