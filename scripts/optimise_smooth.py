@@ -89,7 +89,7 @@ def row(problem: ModalProblem, starts: dict[str, Fourier], reference: float) -> 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Optimised low-mode gaits of smooth bodies; see the top of this file.")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("problems", nargs="*", help="problem files; by default a table over frictions and numbers of modes")
     options = parser.parse_args()
     print(
