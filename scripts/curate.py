@@ -62,7 +62,9 @@ def main() -> None:
         written = subprocess.run(
             ["git", "log", "-1", "--format=%H", "--", str(target / name)], capture_output=True, text=True, check=True
         ).stdout.strip()
-        entries[name] = {"command": command, "added in commit": written, "versions": versions()}
+        if entries.get(name, {}).get("added in commit") != written:  # else what made it was something older
+            entries[name] = {"added in commit": written, "versions": versions()}
+        entries[name]["command"] = command
     manifest.write_text(json.dumps(entries, indent=1, sort_keys=True) + "\n")
 
 
