@@ -68,7 +68,7 @@ def document(sections: dict[str, dict]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure speed against error; see the top of this file.")
-    parser.add_argument("--quick", action="store_true", help="fewer sizes and repetitions: two minutes instead of ten")
+    parser.add_argument("--quick", action="store_true", help="fewer sizes and repetitions: minutes instead of half an hour")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
