@@ -62,13 +62,13 @@ def document(sections: dict[str, dict]) -> str:
                 "",
             ]
             text += [section["text"], ""]
-    text += ["## Robustness over random starts", "", "See `python benchmarks/robustness.py` and its table robustness.md.", ""]
+    text += ["## Robustness over random starts", "", "See `python -m benchmarks.robustness` and its table robustness.md.", ""]
     return "\n".join(text)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure speed against error; see the top of this file.")
-    parser.add_argument("--quick", action="store_true", help="fewer sizes and repetitions: two minutes instead of ten")
+    parser.add_argument("--quick", action="store_true", help="fewer sizes and repetitions: minutes instead of half an hour")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()

@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from unittest import mock
 
 from benchmarks.tables import markdown_table
 
@@ -41,8 +42,8 @@ def anatomy(name: str) -> dict[str, float]:
         seconds[part] = seconds.get(part, 0.0) + now - mark
         mark = now
 
-    import colloc.continuation as continuation
-    from colloc import nlp, velocity_callback
+    from colloc import continuation, level_run, nlp
+    from colloc.condensed import Condensed
     from colloc.figures import save_figure, solution_figure
     from colloc.problem_file import read_problem_file
     from colloc.store import save
@@ -56,24 +57,33 @@ def anatomy(name: str) -> dict[str, float]:
     kinds = {"nlp_f": "value", "nlp_g": "value", "nlp_grad_f": "gradient", "nlp_jac_g": "Jacobian", "nlp_hess_l": "Hessian"}
 
     spent = {"IPOPT": 0.0, "build": 0.0}
-    plain_balance = velocity_callback.solve_balance
+    plain_balance = Condensed._balanced
 
-    def timed_balance(*arguments, **settings):
+    def timed_balance(self, *arguments):
         begin = time.process_time()
-        result = plain_balance(*arguments, **settings)
+        result = plain_balance(self, *arguments)
         inside["balance solver"] += time.process_time() - begin
         return result
 
     class LoggedSolver(nlp.Solver):
         def __init__(self, transcription, options=None):
+            begin = time.process_time()
             logging = {"print_timing_statistics": "yes", "output_file": str(log), "file_print_level": 5}
             super().__init__(transcription, {**(options or {}), **logging})
+            spent["build"] += time.process_time() - begin
 
-        def _solve_within(self, *arguments):
+        def _solver(self, iterations):
             begin = time.process_time()
-            result = super()._solve_within(*arguments)
+            solver = super()._solver(iterations)
+            spent["build"] += time.process_time() - begin
+            return solver
+
+        def _solve_within(self, x, delta, multipliers, radius, iterations):
+            solver = self._solver(iterations)
+            begin = time.process_time()
+            result = super()._solve_within(x, delta, multipliers, radius, iterations)
             spent["IPOPT"] += time.process_time() - begin
-            stats = self._solver.stats()
+            stats = solver.stats()
             for key, kind in kinds.items():
                 inside[kind] += stats.get(f"t_proc_{key}", 0.0)
             text = log.read_text(encoding="utf-8")
@@ -82,17 +92,12 @@ def anatomy(name: str) -> dict[str, float]:
                 inside["linear algebra"] += float(found.group(1)) if found else 0.0
             return result
 
-    velocity_callback.solve_balance = timed_balance
-    continuation.Solver = LoggedSolver
-    plain_init = LoggedSolver.__init__
-
-    def timed_init(self, *arguments, **settings):
-        begin = time.process_time()
-        plain_init(self, *arguments, **settings)
-        spent["build"] += time.process_time() - begin
-
-    LoggedSolver.__init__ = timed_init  # type: ignore[method-assign]
-    solution = continuation.continue_delta(problem)
+    with (
+        mock.patch.object(Condensed, "_balanced", timed_balance),
+        mock.patch.object(continuation, "Solver", LoggedSolver),
+        mock.patch.object(level_run, "Solver", LoggedSolver),
+    ):
+        solution = continuation.continue_delta(problem)
     lap("search")
     solution.certificate = certify(solution)
     lap("verification")

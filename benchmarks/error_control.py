@@ -30,10 +30,16 @@ OPTIMISM = 2.0
 FLOOR = 3e-8
 """Relative accuracy of the references: errors below cannot be told."""
 
-FOUR = Fourier(np.zeros(3), [[1.2], [0.3], [-1.2]], [[0.6], [0.6], [0.6]])
-SMALL_LOOP = Fourier([1.8, -1.8], [[0.3, -0.1], [-0.3, 0.1]], [[-0.4, -0.1], [-0.4, -0.1]])
-FIVE = Fourier(np.zeros(4), [[-0.6], [0.8], [-0.8], [0.6]], [[-1.0], [1.2], [1.2], [-1.0]])
-WAVE = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.0], [0.8], [0.0]])
+
+def one_harmonic(cos: list[float], sin: list[float]) -> Fourier:
+    """A gait about the straight shape."""
+    return Fourier(np.zeros(len(cos)), np.array(cos)[:, None], np.array(sin)[:, None])
+
+
+FOUR = one_harmonic([1.2, 0.3, -1.2], [0.6, 0.6, 0.6])
+SMALL_LOOP = Fourier(np.array([1.8, -1.8]), np.array([[0.3, -0.1], [-0.3, 0.1]]), np.array([[-0.4, -0.1], [-0.4, -0.1]]))
+FIVE = one_harmonic([-0.6, 0.8, -0.8, 0.6], [-1.0, 1.2, 1.2, -1.0])
+WAVE = one_harmonic([0.8, 0.0, -0.8], [0.0, 0.8, 0.0])
 BILATERAL, ANTIPODAL = Harmonic(1, "bilateral"), Harmonic(1, "antipodal")
 UNEQUAL = Chain((0.25, 0.45, 0.3))
 
@@ -59,7 +65,7 @@ CASES = (
     ("(1.7, 1, 1.3) lobatto", Chain(), (1.7, 1, 1.3), BILATERAL, ellipse(0, 2.8, 1.2), 1e-3, "hermite-simpson", 20, 0.0),
     ("(10, 1, 1)", Chain(), (10, 1, 1), BILATERAL, ellipse(0, 1.0, 1.0), 1e-4, "gauss-4", 14, 0.0),
     ("(0.5, 1, 5)", Chain(), (0.5, 1, 5), BILATERAL, ellipse(0.3, 1.0, 0.5), 1e-3, "gauss-3", 20, 0.0),
-    ("two links", Chain((0.5, 0.5)), (1, 1, 5), ANTIPODAL, Fourier([0.0], [[1.0]], [[0.0]]), 1e-4, "gauss-2", 10, 0.0),
+    ("two links", Chain((0.5, 0.5)), (1, 1, 5), ANTIPODAL, one_harmonic([1.0], [0.0]), 1e-4, "gauss-2", 10, 0.0),
     ("unequal links", UNEQUAL, (3, 1, 1), ANTIPODAL, ellipse(0, 1.5, 1.0), 1e-3, "radau-2", 30, 0.0),
     ("four links", Chain((0.25,) * 4), (1, 1, 1), BILATERAL, FOUR, 1e-4, "gauss-3", 16, 0.0),
     ("four-link wave", Chain((0.25,) * 4), (10, 1, 1), ANTIPODAL, WAVE, 1e-4, "gauss-3", 12, 0.0),

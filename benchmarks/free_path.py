@@ -4,6 +4,7 @@ Processor time to build the program on 60 and 240 intervals of order 3, and of t
 on 60 intervals without refinement (design target: 0.5 s and 5 s). Certificates are not part of it: 60 intervals over-report.
 """
 
+import argparse
 import time
 
 from colloc import FreePath, Problem, ellipse
@@ -13,6 +14,7 @@ from colloc.path_start import transcribed
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     print("intervals  build [s]  continuation [s]  levels  iterations  efficiency")
     for intervals in (60, 240):
         problem = Problem(

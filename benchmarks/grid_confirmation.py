@@ -9,8 +9,8 @@ Beside them stands the best certified bilateral optimum of the robustness table.
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,11 @@ DELTA = 1e-4
 
 
 def main() -> None:
-    table = Path(sys.argv[1] if len(sys.argv) > 1 else "results/robustness.json")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", nargs="?", type=Path, default=Path("results/robustness.json"), help="of benchmarks.robustness")
+    table = parser.parse_args().table
+    if not table.exists():
+        parser.error(f"there is no {table}; python -m benchmarks.robustness writes one, results/curated holds a run.")
     rows = json.loads(table.read_text(encoding="utf-8"))["rows"]
     lines = [
         "# Grid sweeps against the multi-start",

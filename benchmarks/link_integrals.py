@@ -6,6 +6,8 @@ of the tangential integral I0 and of the couple's I2, over their exact values; t
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -41,7 +43,7 @@ def links(kind: str, count: int, delta: float) -> tuple[np.ndarray, np.ndarray, 
 def worst_errors(kind: str, delta: float, count: int) -> dict[str, tuple[float, float]]:
     """Worst and median relative error of every method over the links."""
     vs, vn, w = links(kind, count, delta)
-    exact = [exact_moments(*(float(x) for x in row), LENGTH, delta) for row in zip(vs, vn, w, strict=True)]
+    exact = [exact_moments(float(a), float(b), float(c), LENGTH, delta) for a, b, c in zip(vs, vn, w, strict=True)]
     reference = np.array([[float(m[0]), float(m[2])] for m in exact]).T
     found = {CLOSED: link_moments(vs[None], vn[None], w[None], LENGTH, delta)}
     values = {CLOSED: np.array([found[CLOSED].I0[0], found[CLOSED].I2[0]])}
@@ -53,8 +55,8 @@ def worst_errors(kind: str, delta: float, count: int) -> dict[str, tuple[float, 
 def nanoseconds_per_link(count: int = 20_000) -> dict[str, float]:
     """Processor time of the three moments (two for Gauss) of one link, in a batch."""
     vs, vn, w = links("sliding", count, 1e-4)
-    works = {CLOSED: lambda: link_moments(vs[None], vn[None], w[None], LENGTH, 1e-4)}
-    works |= {f"Gauss {n}": (lambda n=n: gauss_moments(n, vs, vn, w, 1e-4)) for n in POINTS}
+    works: dict[str, Callable[[], object]] = {CLOSED: partial(link_moments, vs[None], vn[None], w[None], LENGTH, 1e-4)}
+    works |= {f"Gauss {n}": partial(gauss_moments, n, vs, vn, w, 1e-4) for n in POINTS}
     return {name: 1e9 * seconds / count for name, seconds in interleaved_seconds(works).items()}
 
 

@@ -91,7 +91,8 @@ def report(quick: bool, folder: Path) -> str:
     missing = [name for name, file in OTHERS.items() if not recorded(file)]
     if missing:
         text += f"\n\nNot recorded: {', '.join(missing)}."
-    others = [r[4] for r in rows[2:] if isinstance(r[4], float)]
-    if others:
-        text += f"\n\nProcessor seconds an optimum: the best of the others takes {min(others) / rows[0][4]:.1f} times ours."
+    ours, *others = (r[4] for r in (rows[0], *rows[2:]))
+    measured = [seconds for seconds in others if isinstance(seconds, float)]
+    if measured and isinstance(ours, float):
+        text += f"\n\nProcessor seconds an optimum: the best of the others takes {min(measured) / ours:.1f} times ours."
     return text

@@ -7,6 +7,8 @@ and finds the balance by Newton's method with difference quotients: no panels, n
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -22,15 +24,18 @@ from colloc.smooth_balance import solve_smooth
 
 PHASES = np.array([0.03, 0.11, 0.2, 0.31, 0.44])
 MOTION = sine_wave()
-ORDERS = {4: ORANGE, 8: BLUE, 12: GREEN}
+ORDERS = {"4 nodes a panel": 4, "8 nodes a panel": 8, "12 nodes a panel": 12}
+CHAIN, ADAPTIVE = "chain of links", "adaptive panels"
+COLOURS = dict(zip((*ORDERS, CHAIN, ADAPTIVE), (ORANGE, BLUE, GREEN, "#999999", VERMILION), strict=True))
+MARKERS = {CHAIN: "s", ADAPTIVE: "x"}
 
 
 def loads(motion: Motion, friction: Friction, t: float, z: np.ndarray, delta: float) -> np.ndarray:
     """Net force, torque about the tail and power at phase t for tail velocity z, by integration along the body."""
     when = np.array([t])
 
-    def field(f: object, s: float) -> float:
-        return float(f(np.array([[s]]), when).item())  # type: ignore[operator]
+    def field(f: Callable[[np.ndarray, np.ndarray], np.ndarray], s: float) -> float:
+        return float(f(np.array([[s]]), when).item())
 
     turn = z[2] - field(motion.rate, 0.0)
 
@@ -74,6 +79,11 @@ def chain_power(friction: Friction, delta: float, n: int) -> np.ndarray:
     return total_power(now.velocity, now.force)[0]
 
 
+def milliseconds(work: Callable[[], object]) -> float:
+    """Processor time of a solve of all phases, an instant."""
+    return 1e3 * cpu_seconds(work, 0.02) / PHASES.size
+
+
 def report(quick: bool, folder: Path) -> str:
     """Relative error of the power against panels, order and tolerance, with time an instant; and a figure."""
     cases = [(Friction(), 1e-2), (Friction(100, 1, 1), 1e-3)]
@@ -86,30 +96,29 @@ def report(quick: bool, folder: Path) -> str:
         def error(power: np.ndarray, exact: np.ndarray = exact) -> float:
             return float(np.max(np.abs(power / exact - 1)))
 
-        def milliseconds(friction: Friction = friction, delta: float = delta, **settings: object) -> float:
-            work = cpu_seconds(lambda: solve_smooth(MOTION, friction, PHASES, delta, **settings), 0.02)  # type: ignore[arg-type]
-            return 1e3 * work / PHASES.size
-
-        rows, lines = [], {}
-        for order in ORDERS:
-            fixed = [{"panels": n, "order": order, "quadrature_tolerance": 0} for n in panels]
-            found = [solve_smooth(MOTION, friction, PHASES, delta, **f) for f in fixed]  # type: ignore[arg-type]
-            errors = [error(f.power) for f in found]
-            lines[order] = [(n * order, e) for n, e in zip(panels, errors, strict=True)]
-            rows.append([f"{order} nodes a panel", *errors, milliseconds(**fixed[-1])])
+        solve = partial(solve_smooth, MOTION, friction, PHASES, delta)
+        rows: list[list[object]] = []
+        lines: dict[str, list[tuple[int, float]]] = {}
+        for name, order in ORDERS.items():
+            fixed = [partial(solve, panels=n, order=order, quadrature_tolerance=0.0) for n in panels]
+            errors = [error(work().power) for work in fixed]
+            lines[name] = [(n * order, e) for n, e in zip(panels, errors, strict=True)]
+            rows.append([name, *errors, milliseconds(fixed[-1])])
         chains = [error(chain_power(friction, delta, 4 * n)) for n in panels]
-        lines["chain"] = [(4 * n, e) for n, e in zip(panels, chains, strict=True)]
+        lines[CHAIN] = [(4 * n, e) for n, e in zip(panels, chains, strict=True)]
         rows.append(["chain, 4 links a panel", *chains, ""])
-        adaptive = []
+        adaptive: list[list[object]] = []
+        lines[ADAPTIVE] = []
         for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
-            found = solve_smooth(MOTION, friction, PHASES, delta, quadrature_tolerance=tolerance)
-            spent = milliseconds(quadrature_tolerance=tolerance)
-            adaptive.append([f"{tolerance:.0e}", error(found.power), int(found.panels.max()), spent])
+            work = partial(solve, quadrature_tolerance=tolerance)
+            found = work()
+            most, missed = int(found.panels.max()), error(found.power)
+            adaptive.append([f"{tolerance:.0e}", missed, most, milliseconds(work)])
+            lines[ADAPTIVE].append((8 * most, missed))
         title = f"({friction.mu_t:g}, {friction.mu_f:g}, {friction.mu_b:g}), delta = {delta:g}"
         header = ["uniform panels", *map(str, panels), "ms an instant, last"]
         text = markdown_table(["tolerance", "error", "panels", "ms an instant"], adaptive)
         parts.append(f"{title}: largest relative error of the power.\n\n{markdown_table(header, rows)}\n\nAdaptive:\n\n{text}")
-        lines["adaptive"] = [(8 * row[2], row[1]) for row in adaptive]
         curves.append((title, lines))
     _figure(curves, folder)
     return "\n\n".join(parts)
@@ -119,11 +128,11 @@ def _figure(curves: list, folder: Path) -> None:
     with styled():
         figure, axes = plt.subplots(1, len(curves), figsize=(3.1 * len(curves), 3.2), squeeze=False)
         for axis, (title, lines) in zip(axes[0], curves, strict=True):
-            for order, colour in ORDERS.items():
-                axis.loglog(*zip(*lines[order], strict=True), color=colour, marker="o", ms=3, label=f"{order} nodes a panel")
-            axis.loglog(*zip(*lines["chain"], strict=True), color="#999999", marker="s", ms=3, label="chain of links")
-            axis.loglog(*zip(*lines["adaptive"], strict=True), color=VERMILION, marker="x", label="adaptive panels")
+            for name, points in lines.items():
+                axis.loglog(*zip(*points, strict=True), color=COLOURS[name], marker=MARKERS.get(name, "o"), ms=4, label=name)
             axis.set(xlabel="nodes (or links) on the body", title=title)
+            axis.set_xticks([10, 30, 100, 300], labels=["10", "30", "100", "300"])
+            axis.minorticks_off()
         axes[0][0].set_ylabel("relative error of the power")
         axes[0][0].legend(fontsize=7)
         save(figure, folder, "smooth_panels")

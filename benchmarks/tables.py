@@ -36,8 +36,8 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> s
 
 
 def _cell(value: object) -> str:
-    if isinstance(value, (float, np.floating)):
-        if value != 0 and (abs(value) < 1e-2 or abs(value) >= 1e5):
-            return f"{value:.1e}"
-        return f"{value:.3g}"
-    return str(value)
+    if not isinstance(value, (float, np.floating)):
+        return str(value)
+    number = float(value)
+    plain = number == 0 or not (abs(number) < 1e-2 or abs(number) >= 1e5)
+    return f"{number:.3g}" if plain else f"{number:.1e}"

@@ -87,13 +87,13 @@ def main() -> None:
     for scheme in SCHEMES:
         for refined in (False, True):
             rows = []
-            for value in REFINED if refined else UNIFORM:
-                if refined and scheme == SECOND_ORDER and value < 1e-4:
+            for intervals, tolerance in [(20, t) for t in REFINED] if refined else [(n, 0.0) for n in UNIFORM]:
+                if refined and scheme == SECOND_ORDER and tolerance < 1e-4:
                     continue  # thousands of intervals
-                result = kept(cache, run_problem(scheme, 20 if refined else value, value if refined else 0.0))
+                result = kept(cache, run_problem(scheme, intervals, tolerance))
                 error = result["efficiency"] / reference - 1
                 own = result["efficiency"] / result["replayed"] - 1
-                mesh = f"to {value:.0e}" if refined else "uniform"
+                mesh = f"to {tolerance:.0e}" if refined else "uniform"
                 note = "" if result["optimal"] else " (not converged)"
                 lines.append(
                     f"| {scheme} | {mesh}{note} | {result['scheme']} x {result['intervals']} | {result['points']} "
@@ -103,7 +103,7 @@ def main() -> None:
                 print(lines[-1], flush=True)
                 if result["optimal"]:
                     rows.append((result["seconds"], abs(error)))
-            curves[refined][scheme] = tuple(np.array(rows).T)  # type: ignore[assignment]
+            curves[refined][scheme] = tuple(np.array(rows).T)
     (options.output / "work_precision.md").write_text("\n".join(lines) + "\n")
     title = "Three links, isotropic, one harmonic"
     save_work_precision(options.output, "work_precision", curves[False], curves[True], title)

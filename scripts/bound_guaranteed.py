@@ -1,6 +1,6 @@
 """Guarantee an upper bound for the isotropic three-link body; writes what was proved as JSON.
 
-python scripts/bound_guaranteed.py --target 0.55 --seconds 300 [--limit 3.14159265] [--out results]
+python -m scripts.bound_guaranteed --target 0.55 --seconds 300 [--limit 3.14159265] [--out results]
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ BUDGET = Budget(intervals=12, harmonics=(1,), shapes=24)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--target", type=float, required=True)
     parser.add_argument("--seconds", type=float, default=300.0)
     parser.add_argument("--limit", type=float, default=float(np.pi))

@@ -64,7 +64,7 @@ def small(friction: Friction, limit: float, cache: Path) -> dict:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("results"))
     parser.add_argument("--limits", type=float, nargs="+", default=[float(np.pi), 3.0, 2.5])
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin no new bound after so much processor time")

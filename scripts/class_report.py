@@ -1,7 +1,12 @@
-"""The table and figure of `scripts.class_table`."""
+"""The table and figure of `scripts.class_table`, from the attempts kept so far: python -m scripts.class_report
+
+Reads results/class_table.json; writes results/curated/gait_classes.md and gait_classes.png and .pdf beside it.
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +18,14 @@ from colloc.gait_fields import gait_from
 from colloc.infinitesimal import small_gait
 from scripts.bound_table import BUDGET
 
+STORE = Path("results/class_table.json")
 CURATED = Path("results/curated")
 SHOWN = ("harmonics 1", "harmonics 2", "harmonics 4", "curvature 2", "curvature 8", "corners 3", "corners 4 free")
+
+
+def load() -> dict:
+    """The attempts kept so far, by friction, row and start."""
+    return json.loads(STORE.read_text()) if STORE.exists() else {}
 
 
 def order(row: str) -> tuple[int, int, str]:
@@ -34,6 +45,7 @@ def class_words(row: str) -> str:
 
 
 def best(attempts: dict) -> dict | None:
+    """The most efficient certified attempt of a row."""
     solved = [a for a in attempts.values() if a["status"] == "solved"]
     return max(solved, key=lambda a: a["efficiency"]) if solved else None
 
@@ -97,3 +109,16 @@ def write(known: dict) -> None:
             panels.append(GaitPanel(title, gait_from(found["gait"])))
     if panels:
         save_gait_panels(panels, CURATED / "gait_classes.png")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args()
+    known = load()
+    if not known:
+        parser.error(f"there is no {STORE}; python -m scripts.class_table makes it.")
+    write(known)
+
+
+if __name__ == "__main__":
+    main()

@@ -2,7 +2,7 @@
 
 Solves one class after another, each from a few starts: optima of neighbouring classes (prolongation), hand-made ones, and
 the best infinitesimal gaits. Resumable: attempts are kept in results/class_table.json and not repeated. Writes
-results/curated/gait_classes.md and the figure beside it (--table only writes them).
+results/curated/gait_classes.md and the figure beside it (--table only writes them, like python -m scripts.class_report).
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from colloc.path_samples import path_length
 from colloc.prolongation import delta_in
 from colloc.replaced_file import replaced_file
 from colloc.sampling import LATIN_HYPERCUBE, start_gait
+from scripts.class_report import STORE, best, load, write
 
-STORE = Path("results/class_table.json")
 DELTA = 1e-4
 """At unit shape speed, for every class."""
 
@@ -109,16 +109,6 @@ def attempt(gait_class: object, guess: object, friction: Friction, intervals: in
     return result | {"cpu seconds": time.process_time() - begin}
 
 
-def best(attempts: dict) -> dict | None:
-    """The most efficient certified attempt of a row."""
-    solved = [a for a in attempts.values() if a["status"] == "solved"]
-    return max(solved, key=lambda a: a["efficiency"]) if solved else None
-
-
-def load() -> dict:
-    return json.loads(STORE.read_text()) if STORE.exists() else {}
-
-
 def keep(friction: str, row: str, seed: str, result: dict) -> dict:
     """Adds an attempt to the store; what other runs have added meanwhile stays."""
     known = load()
@@ -155,8 +145,6 @@ def main() -> None:
                     f"{result.get('efficiency', np.nan):.6f} {result['cpu seconds']:6.1f} s {result['message'][:90]}",
                     flush=True,
                 )
-    from scripts.class_report import write
-
     write(load())
 
 

@@ -5,9 +5,11 @@ import sys
 
 from colloc.epsilon_study import delta_for, epsilon_point, fitted_orders, table
 
-study = runpy.run_path(sys.argv[1] if len(sys.argv) > 1 else "problems/concertina.py")
-for crawler in study.get("PROBLEMS", (study["PROBLEM"],)):
-    points = [epsilon_point(crawler.with_(epsilon=e, delta=delta_for(e))) for e in study["EPSILONS"]]
-    small = [p for p in points if p.epsilon <= 0.02]
-    orders = ", ".join(f"{name} {order:.3f}" for name, order in fitted_orders(small, crawler.bound).items())
-    print(f"\n{crawler.name}: {crawler.friction}, bound {crawler.bound:g}\n{table(points)}\norders (epsilon <= 0.02): {orders}")
+if __name__ == "__main__":
+    study = runpy.run_path(sys.argv[1] if len(sys.argv) > 1 else "problems/concertina.py")
+    for crawler in study.get("PROBLEMS", (study["PROBLEM"],)):
+        points = [epsilon_point(crawler.with_(epsilon=e, delta=delta_for(e))) for e in study["EPSILONS"]]
+        small = [p for p in points if p.epsilon <= 0.02]
+        orders = ", ".join(f"{name} {order:.3f}" for name, order in fitted_orders(small, crawler.bound).items())
+        print(f"\n{crawler.name}: {crawler.friction}, bound {crawler.bound:g}\n{table(points)}")
+        print(f"orders (epsilon <= 0.02): {orders}")

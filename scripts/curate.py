@@ -4,10 +4,10 @@ Keeps the paper's table and figures (PNG) and the main figure under results/cura
 the command of each file.
 """
 
+import argparse
 import json
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 from colloc.solution import versions
@@ -26,12 +26,16 @@ KEPT = {
     "mesh_tolerance.md": "python -m benchmarks --only mesh_tolerance",
     "gait_classes.md": "python -m scripts.class_table",
     "gait_classes.png": "python -m scripts.class_table",
+    "gait_classes.pdf": "python -m scripts.class_table",
     "chains.md": "python -m benchmarks.chains --starts 4",
     "error_control.md": "python -m benchmarks.error_control",
     "work_precision.png": "python -m benchmarks.work_precision",
     "robustness.md": "python -m benchmarks.robustness --starts 100",
     "grid_confirmation.md": "python -m benchmarks.grid_confirmation",
     "robustness.json": "python -m benchmarks.robustness --starts 100",
+    "crawlers.md": "python -m scripts.optimise_crawlers",
+    "smooth_low_mode.md": "python -m scripts.optimise_smooth",
+    "sweep_scaling.md": "python -m benchmarks.sweep_scaling --cells 8 --tasks 500",
     "bound_table.md": "python -m scripts.bound_table",
     "cycles.md": "python -m scripts.search_cycles --cases 32,1 24,2 24,4 24,7",
     "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
@@ -39,7 +43,9 @@ KEPT = {
 
 
 def main() -> None:
-    source = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("source", nargs="?", type=Path, default=Path("results"), help="folder of results (default: results)")
+    source = parser.parse_args().source
     target = Path("results/curated")
     commit = subprocess.run(
         ["git", "-C", source, "rev-parse", "HEAD"], capture_output=True, text=True, check=True
@@ -56,7 +62,9 @@ def main() -> None:
         written = subprocess.run(
             ["git", "log", "-1", "--format=%H", "--", str(target / name)], capture_output=True, text=True, check=True
         ).stdout.strip()
-        entries[name] = {"command": command, "added in commit": written, "versions": versions()}
+        if entries.get(name, {}).get("added in commit") != written:  # else what made it was something older
+            entries[name] = {"added in commit": written, "versions": versions()}
+        entries[name]["command"] = command
     manifest.write_text(json.dumps(entries, indent=1, sort_keys=True) + "\n")
 
 

@@ -4,10 +4,13 @@
 - Generated: the gallery (problems/ with results/curated/gallery.json), the commands (their own --help), the API.
 - Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
 - Links to files of the repository outside docs/ become their names; pictures of results/curated are copied.
+
+`python -m scripts.docs_site PAGE` prints a generated page, to read without building the site.
 """
 
 from __future__ import annotations
 
+import argparse
 import ast
 import contextlib
 import importlib
@@ -29,7 +32,6 @@ ORDER = (
     ("Theory", ("theory.md", "bound.md", "gait_classes.md", "bodies.md")),
     ("Reference", ("commands.md", "api.md", "modules.md", "cite.md")),
 )
-GENERATED = ("gallery.md", "commands.md", "api.md", "modules.md")
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _MATH_INLINE = re.compile(r"\$`([^`\n]+)`\$")
 _OUTSIDE = re.compile(r"(!?)\[([^\]]*)\]\(((?:\.\./)+)([^)#\s]+)(#[^)]*)?\)")
@@ -49,8 +51,7 @@ def on_config(config: Any) -> Any:
 
 def on_files(files: Any, config: Any) -> Any:
     """Add the generated pages and the curated pictures."""
-    makers = {"gallery.md": gallery_page, "commands.md": commands_page, "api.md": api_page, "modules.md": modules_page}
-    for name, make in makers.items():
+    for name, make in GENERATED.items():
         files.append(File.generated(config, name, content=make()))
     for picture in sorted((ROOT / "results/curated").rglob("*.png")):
         name = f"curated/{picture.relative_to(ROOT / 'results/curated').as_posix()}"
@@ -160,3 +161,16 @@ def modules_page() -> str:
         rows.append(f"| `{path.stem}` | {first.replace('|', chr(92) + '|')} |")
     text = "Imports point down from level to level; `tests/test_layering.py` holds the levels."
     return "# Modules\n\n" + text + "\n\n" + "\n".join(rows) + "\n"
+
+
+GENERATED = {"gallery.md": gallery_page, "commands.md": commands_page, "api.md": api_page, "modules.md": modules_page}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("page", choices=GENERATED)
+    print(GENERATED[parser.parse_args().page](), end="")
+
+
+if __name__ == "__main__":
+    main()

@@ -15,14 +15,15 @@ from pathlib import Path
 import numpy as np
 
 from colloc.body import Chain
-from colloc.bound import Budget, efficiency_bound, known_bound
+from colloc.bound import Bound, Budget, efficiency_bound, known_bound
+from colloc.errors import StoreError
 from colloc.figures_studies import friction_plane_figure
 from colloc.figures_style import save
 from colloc.friction import Friction
 from colloc.store_study import StudyFile, load_study
 from colloc.study_table import best_over
 
-SMALL_BASIS = Budget(intervals=(4,), shapes=20, directions=20, refinements=1, linear_rounds=6)
+SMALL_BASIS = Budget(intervals=6, shapes=12, directions=24, rounds=12, starts=60, tolerance=5e-3)
 COMMAND = "python -m colloc.sweep_study studies/friction_plane.py && python -m scripts.friction_plane"
 
 
@@ -33,9 +34,11 @@ def bounds(mu_t: np.ndarray, mu_b: np.ndarray, count: int, cache: Path) -> np.nd
     for i, t in enumerate(mu_t):
         for j, b in enumerate(mu_b):
             law = Friction(float(t), 1.0, float(b))
+            bound: Bound | None
             if count and i in rows and j in columns:
                 bound = efficiency_bound(Chain(), law, budget=SMALL_BASIS, cache=cache)
-                print(f"bound at mu_t {t:.3f}, mu_b {b:.3f}: {bound.sampled:.4f} ({bound.seconds:.0f} s)", flush=True)
+                doubt = "" if bound.converged else ", not converged"
+                print(f"bound at mu_t {t:.3f}, mu_b {b:.3f}: {bound.sampled:.4f} ({bound.seconds:.0f} s{doubt})", flush=True)
             else:
                 bound = known_bound(Chain(), law, budget=SMALL_BASIS, cache=cache) if cache.exists() else None
             if bound is not None:
@@ -78,12 +81,15 @@ def table(mu_t: np.ndarray, mu_b: np.ndarray, efficiency: np.ndarray, rest: dict
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Figure and table of the friction plane; see the top of this file.")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path("results"))
     parser.add_argument("--output", type=Path, help="folder (default: the same)")
     parser.add_argument("--bounds", type=int, default=0, metavar="N")
     options = parser.parse_args()
-    study = load_study(options.results / "friction_plane.nc")
+    try:
+        study = load_study(options.results / "friction_plane.nc")
+    except StoreError as error:
+        parser.error(f"{error} python -m colloc.sweep_study studies/friction_plane.py makes it.")
     mu_t, mu_b = study.coordinates["mu_t"], study.coordinates["mu_b"]
     efficiency, rest = winners(study)
     bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.json")

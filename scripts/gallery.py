@@ -6,9 +6,9 @@ tests/test_gallery.py solves the same files and holds them against these numbers
 
 from __future__ import annotations
 
+import argparse
 import json
 import runpy
-import sys
 import time
 from dataclasses import dataclass
 from functools import cache
@@ -55,8 +55,11 @@ class Example:
 
 def examples() -> list[Example]:
     """All files in problems/."""
-    paths = sorted((ROOT / "problems").glob("[!_]*.py"))
-    return [Example(path.stem, runpy.run_path(str(path))) for path in paths]
+    return [Example(path.stem, runpy.run_path(str(path))) for path in _problem_files()]
+
+
+def _problem_files() -> list[Path]:
+    return sorted((ROOT / "problems").glob("[!_]*.py"))
 
 
 @cache
@@ -141,7 +144,13 @@ def _draw_snapshots(figure: Figure, stated: dict[str, Any]) -> None:
     axes.set_ylim(low - 0.12, max(0.2, float(shown.y.max()) + 0.05))
 
 
-def main(names: list[str]) -> None:
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    known = [path.stem for path in _problem_files()]
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"files to solve (default: all): {', '.join(known)}")
+    names = parser.parse_args().names
+    if unknown := set(names) - set(known):
+        parser.error(f"no file in problems/ is called {', '.join(sorted(unknown))}.")
     table = json.loads(TABLE.read_text()) if TABLE.exists() else {}
     for example in examples():
         if names and example.name not in names:
@@ -158,4 +167,4 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -19,7 +19,7 @@ from colloc.infinitesimal import small_gait
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--mu", type=float, nargs=3, default=(1.0, 1.0, 1.0))
     parser.add_argument("--steps", type=int, default=32)
     parser.add_argument("--out", type=Path, default=Path("results"))
@@ -40,7 +40,8 @@ def main() -> None:
     name = "small-gaits-{:g}-{:g}-{:g}".format(*arguments.mu)
     best = np.unravel_index(np.nanargmax(table), table.shape)
     print(f"best small gait {table[best]:.4f} at ({axis[best[0]]:.3f}, {axis[best[1]]:.3f})")
-    entries = {"mu": list(arguments.mu), "axis": axis.tolist(), "efficiency": np.where(np.isnan(table), None, table).tolist()}
+    rows = [[None if np.isnan(value) else value for value in line] for line in table.tolist()]
+    entries = {"mu": list(arguments.mu), "axis": axis.tolist(), "efficiency": rows}
     (arguments.out / f"{name}.json").write_text(json.dumps(entries))
     save_small_gait_map(arguments.out / name, axis, table, "friction (t, f, b) = ({:g}, {:g}, {:g})".format(*arguments.mu))
 

@@ -21,11 +21,12 @@ EPSILONS, PIECES, ANGLE, SOFTER = (0.1, 0.05, 0.02, 0.01), 12, 1.5, 32
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Optimised against prescribed concertina crawlers; see the top of this file.")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("epsilons", nargs="*", type=float, default=EPSILONS, help="half-widths of the region, falling")
     parser.add_argument("--output", type=Path, default=Path("results/figures"), help="folder of the figure")
     options = parser.parse_args()
-    friction, starts, rows = Friction(), [], []
+    friction, rows = Friction(), []
+    starts: list[np.ndarray] = []
     print(f"{'epsilon':>8} {'prescribed':>11} {'+-':>8} {'optimised':>11} {'+-':>8} {'loss ratio':>10} {'CPU s':>8}  optimum")
     for epsilon in options.epsilons:
         body, delta = BumpBody(epsilon, modes=4, panels=6), delta_for(epsilon)

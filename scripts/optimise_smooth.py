@@ -36,7 +36,7 @@ def chain_start(body: ModalBody, friction: Friction) -> Fourier:
     guess = Fourier(np.zeros(LINKS - 1), 0.8 * np.cos(2 * np.pi * s)[:, None], -0.8 * np.sin(2 * np.pi * s)[:, None])
     chain = Chain((1.0 / LINKS,) * LINKS)
     problem = Problem("chain", guess, chain, friction, Harmonic(1, "antipodal"), delta=1e-2, mesh_tolerance=0)
-    return body.prolonged(chain.lengths, continue_delta(problem).gait)
+    return body.prolonged(np.array(chain.lengths), continue_delta(problem).gait)
 
 
 def admissible(problem: ModalProblem, guess: Fourier) -> Fourier:
@@ -89,7 +89,7 @@ def row(problem: ModalProblem, starts: dict[str, Fourier], reference: float) -> 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Optimised low-mode gaits of smooth bodies; see the top of this file.")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("problems", nargs="*", help="problem files; by default a table over frictions and numbers of modes")
     options = parser.parse_args()
     print(

@@ -11,7 +11,7 @@ from colloc.fixed_point import solve_balance
 from colloc.gait import ellipse
 from colloc.motion_record import record
 from colloc.parallel import parallel_map
-from colloc.path_replay import replay
+from colloc.path_replay import Path, replay
 from colloc.study import Arrays, Context
 from colloc.sweep import Route, distinct_maxima, performance
 from colloc.velocity_map import STENCILS
@@ -119,10 +119,14 @@ def optima(context: Context) -> Arrays:
     return result
 
 
+def _path(A0: float, A1: float, B1: float) -> Path:
+    gait = ellipse(A0, A1, B1)
+    return lambda t: (gait.angles(t), gait.rates(t))
+
+
 def _replayed(task: tuple[tuple[float, float, float], float]) -> tuple[float, float, float]:
     gait, delta = task
-    path = ellipse(*gait)
-    done = replay(BODY, ISOTROPIC, lambda t: (path.angles(t), path.rates(t)), delta)
+    done = replay(BODY, ISOTROPIC, _path(*gait), delta)
     return done.distance, done.work, done.efficiency
 
 
@@ -151,8 +155,7 @@ def motions(context: Context) -> Arrays:
     result: Arrays = {}
     order = [int(np.argmin(np.abs(found["gaits"][:, 0] - a))) for a in (0.0, 1.1)]
     for name, index in zip("DF", order, strict=True):
-        path = ellipse(*found["gaits"][index])
-        made = record(BODY, ISOTROPIC, lambda t, p=path: (p.angles(t), p.rates(t)), settings["delta"], settings["instants"])
+        made = record(BODY, ISOTROPIC, _path(*found["gaits"][index]), settings["delta"], settings["instants"])
         result |= {
             f"{name}/t": made.t,
             f"{name}/speeds": made.speeds,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import brentq
 
@@ -20,10 +22,15 @@ WAVES: dict[str, tuple[str, Friction]] = {
     "6B": ("sine", Friction()),
     "6C": ("standing", Friction()),
 }
+Task = tuple[str, dict, tuple[float, float, float], float, dict]
+"""Kind of wave, its parameters, (mu_t, mu_f, mu_b), delta, and settings of the quadrature."""
+
+
+_MAKERS: dict[str, Callable[..., Motion]] = {"triangular": tanh_wave, "sine": sine_wave, "standing": standing_wave}
 
 
 def _motion(kind: str, **parameters: float) -> Motion:
-    return {"triangular": tanh_wave, "sine": sine_wave, "standing": standing_wave}[kind](**parameters)
+    return _MAKERS[kind](**parameters)
 
 
 def _wave(task: tuple[str, float, int]) -> dict:
@@ -60,7 +67,7 @@ def waves(context: Context) -> Arrays:
     return result
 
 
-def _efficiency(task: tuple[str, dict, tuple[float, float, float], float, dict]) -> float:
+def _efficiency(task: Task) -> float:
     kind, parameters, mu, delta, quadrature = task
     return float(period(_motion(kind, **parameters), Friction(*mu), delta, **quadrature).efficiency)
 
@@ -68,7 +75,8 @@ def _efficiency(task: tuple[str, dict, tuple[float, float, float], float, dict])
 def wave_parameters(context: Context) -> Arrays:
     """Which parameters would give the efficiencies printed for waves A (0.93) and B (0.76): one changed at a time."""
     delta = context.settings["delta"]
-    tasks, names = [], []
+    tasks: list[Task] = []
+    names = []
     for steepness in context.settings["steepness"]:
         tasks.append(("triangular", {"steepness": steepness}, (1, 100, 100), delta, {}))
         names.append(f"A: steepness {steepness:g} instead of 20")

@@ -5,6 +5,7 @@ Needs chromium or google-chrome. Writes results/curated/report.png.
 
 from __future__ import annotations
 
+import argparse
 import re
 import shutil
 import subprocess
@@ -43,6 +44,7 @@ def tutorial_problem() -> str:
 
 
 def main() -> int:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     browser = next((found for found in map(shutil.which, BROWSERS) if found), None)
     if browser is None:
         print(f"no browser: install one of {', '.join(BROWSERS)}.", file=sys.stderr)

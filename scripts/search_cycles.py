@@ -49,7 +49,7 @@ def polished(cycle: Cycle, friction: Friction, limit: float, harmonics: int, del
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--mu", type=float, nargs=3, default=(1.0, 1.0, 1.0))
     parser.add_argument("--limit", type=float, default=float(np.pi))
     parser.add_argument("--cases", nargs="+", default=["24,2", "24,4", "24,7"])

@@ -1,5 +1,7 @@
 """The paper's waves (figures 5 and 6), converged, and which parameters come near what it prints: python -m scripts.waves."""
 
+import argparse
+
 from colloc.friction import Friction
 from colloc.motion import sine_wave, standing_wave, tanh_wave
 from colloc.smooth_period import measured_period
@@ -18,7 +20,15 @@ CASES = [
     *((f"A, mu_f = mu_b = {m:g}", tanh_wave(), Friction(1.0, m, m), 8) for m in (2.0, 5.0, 10.0)),
     *((f"A, {w:g} waves", tanh_wave(1.3, 20.0, w), SIDEWAYS, 8) for w in (1.0, 4.0)),
 ]
-print(f"{'wave':30} {'d':>12} {'W':>12} {'efficiency':>12} {'+-':>8}")
-for name, motion, friction, intervals in CASES:
-    p = measured_period(motion, friction, 1e-4, intervals=intervals)
-    print(f"{name:30} {p.d:12.8f} {p.W:12.8f} {p.efficiency:12.8f} {p.errors['efficiency']:8.1e}", flush=True)
+
+
+def main() -> None:
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    print(f"{'wave':30} {'d':>12} {'W':>12} {'efficiency':>12} {'+-':>8}")
+    for name, motion, friction, intervals in CASES:
+        p = measured_period(motion, friction, 1e-4, intervals=intervals)
+        print(f"{name:30} {p.d:12.8f} {p.W:12.8f} {p.efficiency:12.8f} {p.errors['efficiency']:8.1e}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""The modules of scripts/ and benchmarks/ fit the library as it is: each imports without doing anything and explains itself."""
+
+import ast
+import importlib
+import pkgutil
+import re
+import runpy
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import PARTS
+from scripts.curate import COMMANDS, KEPT
+
+ROOT = Path(__file__).resolve().parents[1]
+MODULES = sorted(path for folder in ("scripts", "benchmarks") for path in (ROOT / folder).glob("*.py"))
+OPTIONAL = {"docs_site": "mkdocs"}
+"""Modules that need more than the tests do."""
+EXAMPLES = ("continue_delta", "continue_epsilon")
+"""A dozen lines without a function, to be read."""
+LONGEST_IMPORT = 5.0
+"""Processor seconds; the libraries take one or two, the shortest of the studies ten."""
+
+
+def needed(path):
+    if path.stem in OPTIONAL:
+        pytest.importorskip(OPTIONAL[path.stem])
+
+
+def name_of(path):
+    return f"{path.parent.name}.{path.stem}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_importing_a_module_does_nothing_else(path, tmp_path, monkeypatch, capfd):
+    needed(path)
+    monkeypatch.chdir(tmp_path)
+    before = time.process_time()
+    # a fresh run of the file, whoever imported the module before
+    runpy.run_path(str(path), run_name="imported")
+    spent = time.process_time() - before
+    assert capfd.readouterr() == ("", "")
+    assert not list(tmp_path.iterdir())
+    assert spent < LONGEST_IMPORT
+
+
+def starts_itself(path):
+    """Whether a module does something when it is run."""
+    last = ast.parse(path.read_text(encoding="utf-8")).body[-1:]
+    return bool(last) and isinstance(last[0], ast.If) and "__main__" in ast.unparse(last[0].test)
+
+
+PROGRAMS = [path for path in MODULES if starts_itself(path) and path.stem not in EXAMPLES]
+
+
+@pytest.mark.parametrize("path", PROGRAMS, ids=name_of)
+def test_a_program_answers_help_before_it_does_anything(path, tmp_path, monkeypatch, capfd):
+    needed(path)
+    module = importlib.import_module(name_of(path))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(path), "--help"])
+    with pytest.raises(SystemExit) as ended:
+        module.main()
+    assert ended.value.code == 0
+    said, complaints = capfd.readouterr()
+    assert said.startswith("usage:")
+    assert len(said.split()) > 10, "says nothing but its usage"
+    assert complaints == ""
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("path", PROGRAMS, ids=name_of)
+def test_a_program_refuses_what_it_does_not_understand(path, tmp_path, monkeypatch, capfd):
+    needed(path)
+    module = importlib.import_module(name_of(path))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(path), "--no-such-option"])
+    with pytest.raises(SystemExit) as ended:
+        module.main()
+    assert ended.value.code == 2
+    assert capfd.readouterr().err.startswith("usage:")
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_that_can_be_started_is_left_out():
+    names = {path.stem for path in PROGRAMS}
+    assert {"friction_plane", "reproduce_paper", "waves", "class_report", "grid_confirmation", "__main__"} <= names
+    assert {path.stem for path in MODULES if path.stem in PARTS} == set(PARTS)
+    assert {path.stem for path in MODULES if not path.stem.startswith("__") and has_main(path)} <= names
+
+
+def has_main(path):
+    return any(isinstance(n, ast.FunctionDef) and n.name == "main" for n in ast.parse(path.read_text(encoding="utf-8")).body)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_a_module_says_how_it_is_started_and_names_what_exists(path):
+    text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+    assert text
+    if starts_itself(path):
+        assert f"python -m {name_of(path).removesuffix('.__main__')}" in text
+    if path.parent.name == "benchmarks" and path.stem in PARTS:
+        assert f"python -m benchmarks --only {path.stem}" in text
+    for name in re.findall(r"(?<![/\w])(?:scripts|benchmarks|colloc)(?:\.\w+)+", text):
+        if not is_module(name):
+            pkgutil.resolve_name(name)  # raises if there is no such thing
+
+
+def is_module(name):
+    path = ROOT.joinpath(*name.split("."))
+    return path.with_suffix(".py").exists() or (path / "__init__.py").exists()
+
+
+def test_the_commands_of_the_curated_results_exist():
+    for command in (*COMMANDS.values(), *KEPT.values()):
+        assert is_module(command.split()[2]), command
