@@ -19,6 +19,7 @@ from colloc.bound import Bound, Budget, efficiency_bound, known_bound
 from colloc.friction import Friction
 from colloc.infinitesimal import best_small_gait
 from colloc.json_cache import hash_of, load_entries, save_entry
+from scripts.certified_gaits import best_efficiency
 
 COEFFICIENTS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
 """(mu_t, mu_f, mu_b)"""
@@ -29,21 +30,24 @@ HEAD = """# Upper bounds on the efficiency of every gait of three equal links
 anywhere, after climbs between the samples found nothing that exceeds the program's value by 0.002 ("converged"); it
 is a sampled value, not a proof. *Program*: value of the last program (no potential of this space does better on its
 samples). *Small gait*: efficiency of the best infinitesimal gait found, so a lower end for the best possible gait; *at* its
-shape. A bound for a larger limit holds for a smaller one; the smallest valid value stands in *gap*. Angles in rad,
-delta = 1e-6 at unit shape speed, CPU seconds on a loaded machine.
+shape. *Gait*: efficiency of the best certified gait of finite size that random starts with one harmonic and the table of
+classes left under results/ and that keeps the limit. *Gap*: from the better of the two to the smallest valid bound; a bound
+for a larger limit holds for a smaller one. Angles in rad, delta = 1e-6 at unit shape speed (gaits: 1e-4), CPU seconds on a
+loaded machine.
 
-| mu_t, mu_f, mu_b | limit | 1/min(mu) | bound | program | converged | small gait | at | gap | motions | CPU s |
-|---|---|---|---|---|---|---|---|---|---|---|
+| mu_t, mu_f, mu_b | limit | 1/min(mu) | bound | program | converged | small gait | at | gait | gap | motions | CPU s |
+|---|---|---|---|---|---|---|---|---|---|---|---|
 """
 
 
-def row(mu: tuple[float, ...], limit: float, bound: Bound, least: float, gait: dict) -> str:
-    """A line of the table; `least` is the smallest bound valid for this limit."""
+def row(mu: tuple[float, ...], limit: float, bound: Bound, least: float, gait: dict, found: float) -> str:
+    """A line of the table; `least` is the smallest bound valid for this limit, `found` the best certified gait or NaN."""
     place = "({:.3f}, {:.3f})".format(*gait["angles"])
-    done = "yes" if bound.converged else "no"
+    done, known = "yes" if bound.converged else "no", "" if np.isnan(found) else f"{found:.4f}"
+    gap = least - np.nanmax([gait["efficiency"], found])
     return (
         f"| {mu[0]:g}, {mu[1]:g}, {mu[2]:g} | {limit:.4g} | {1 / min(mu):g} | {bound.sampled:.4f} | {bound.floor:.4f} | {done} "
-        f"| {gait['efficiency']:.4f} | {place} | {least - gait['efficiency']:.4f} | {bound.samples} | {bound.seconds:.0f} |"
+        f"| {gait['efficiency']:.4f} | {place} | {known} | {gap:.4f} | {bound.samples} | {bound.seconds:.0f} |"
     )
 
 
@@ -82,7 +86,8 @@ def main() -> None:
                     continue
                 bound = known
             least[mu] = min(least[mu], bound.sampled)
-            rows.append(row(mu, limit, bound, least[mu], small(friction, limit, arguments.out / "small_gaits.json")))
+            smallest = small(friction, limit, arguments.out / "small_gaits.json")
+            rows.append(row(mu, limit, bound, least[mu], smallest, best_efficiency(mu, limit, arguments.out)))
             print(rows[-1], flush=True)
     (arguments.out / "bound_table.md").write_text(HEAD + "\n".join(rows) + "\n")
 
