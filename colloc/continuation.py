@@ -20,7 +20,7 @@ from colloc.nlp import NlpResult, Solver
 from colloc.path_start import transcribed
 from colloc.problem import Problem
 from colloc.program import GaitProgram
-from colloc.refinement import MOST_POINTS, MeshPlan, planned_mesh
+from colloc.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 from colloc.solution import Level, Solution
 from colloc.warm_start import feasible_point
 
@@ -36,7 +36,9 @@ _FIRST_DELTAS = 5
 """Where the first level fails, the next lower delta is tried, up to so many first levels in all."""
 _FEASIBLE = 1e-6
 """A first level that fails with all equations satisfied to this has stalled on a kink; one that does not has lost its way."""
-_REFINEMENTS = 5
+_REFINEMENTS, _SAME_AIM = 5, 2
+"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
+half, then a quarter of it."""
 _BUILT_IN = ("body", "friction", "gait", "joint_limit", "smallest_shape_speed", "intervals", "scheme", "formulation")
 _MOST_KEPT = 4
 _kept = threading.local()
@@ -144,9 +146,10 @@ def _refine(run: Run) -> tuple[NlpResult, str]:
         result = _descend(run, first, target)
     else:
         result = run.reached if first <= target else _descend(run, _next_delta(first, run.factor, target), target)
-    for _ in range(_REFINEMENTS):
+    for count in range(_REFINEMENTS):
         at = run.levels[-1].delta
-        plan = _plan(run, kept) if result.optimal and problem.mesh_tolerance > 0 else None
+        aim = AIM * 0.5 ** max(0, count - _SAME_AIM)
+        plan = _plan(run, kept, aim) if result.optimal and problem.mesh_tolerance > 0 else None
         if plan is not None:
             kept = np.concatenate([kept, plan.kept])
             again = problem.has_path and at <= problem.delta
@@ -173,8 +176,8 @@ def _refine(run: Run) -> tuple[NlpResult, str]:
     )
 
 
-def _plan(run: Run, kept: np.ndarray) -> MeshPlan | None:
+def _plan(run: Run, kept: np.ndarray, aim: float) -> MeshPlan | None:
     """A mesh on which the gait found is accurate at the problem's delta; None if the present one will do."""
     problem, gait = run.problem, run.gait
     mesh = run.solver.transcription.phase_mesh(gait)
-    return planned_mesh(problem, mesh, gait, problem.delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
+    return planned_mesh(problem, mesh, gait, problem.delta * gait.delta_unit, problem.mesh_tolerance, kept=kept, aim=aim)

@@ -111,17 +111,25 @@ def solve(
     budget: int,
     method: str,
 ) -> None:
-    """Bring every instant of `state` to a residual below `tolerance`, in up to three attempts of `budget` steps each.
+    """Bring every instant of `state` to a residual below `tolerance`, in up to four attempts of `budget` steps each.
 
-    "auto" first damps Newton from where the state is, then follows the regularisation down from 1 to `delta`
-    ``(1, n_time)``, then takes fixed-point steps only; the other methods are for comparison.
+    "auto" first damps Newton from where the state is; then, for instants that fail, from rest; then it follows the
+    regularisation down from 1 to `delta` ``(1, n_time)``, and at last takes fixed-point steps only. The second attempt begins
+    with the first anchor, since the failed one may have moved it to a link from which nothing converges. The other methods
+    are for comparison.
     """
-    everything = np.arange(state.residual.size)
+    everything, first_anchor = np.arange(state.residual.size), state.anchor.copy()
     few = not friction.isotropic and friction.mu_f == friction.mu_b
     direct = budget if method != "auto" else min(budget, _FEWER_DIRECT_ITERATIONS if few else _DIRECT_ITERATIONS)
+    at_rest = ~state.velocity.any(axis=0)
     _advance(state, make_batch, n_reference, everything, delta, tolerance, direct, method)
     if method != "auto":
         return
+
+    bad = np.flatnonzero((state.residual > tolerance) & ~at_rest)
+    if bad.size:
+        state.velocity[:, bad], state.anchor[bad] = 0.0, first_anchor[bad]
+        _advance(state, make_batch, n_reference, bad, delta, tolerance, direct, method)
     bad = np.flatnonzero(state.residual > tolerance)
     if bad.size:
         state.velocity[:, bad] = 0.0

@@ -149,7 +149,7 @@ def solve_balance(
     tolerance : float
         Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
-        Steps allowed to an instant in each of at most three attempts.
+        Steps allowed to an instant in each of at most four attempts.
     method : {"auto", "newton", "fixed_point"}
         "auto" damps Newton and falls back on the paper's fixed point; the others are for comparison.
 

@@ -30,7 +30,7 @@ from colloc.schemes import Scheme, scheme
 VIOLATION = 5e-7
 """Largest violation of a joint limit or of self-contact between nodes that needs no refinement [rad, body lengths]."""
 MOST_POINTS = 12_000
-_AIM = 0.4
+AIM = 0.4
 """The planned error is this fraction of the request: the gait, and its kinks with it, will still move."""
 _MORE_NODES, _MOST_NODES = (0, 2, 4), 9
 _HANDICAP = 1.1
@@ -108,6 +108,7 @@ def planned_mesh(
     tolerance: float,
     *,
     kept: np.ndarray | None = None,
+    aim: float = AIM,
     most_points: int = MOST_POINTS,
 ) -> MeshPlan | None:
     """A mesh for `gait`, or None if `mesh` is good already.
@@ -124,6 +125,8 @@ def planned_mesh(
         Largest relative efficiency error.
     kept : array, optional
         Phases that have to be knots.
+    aim : float
+        The planned error is this fraction of the tolerance.
     most_points : int
         Budget of collocation points.
 
@@ -150,7 +153,7 @@ def planned_mesh(
         snap = 0.0 if problem.has_path else _SNAP
         edges = moved_knots(np.union1d(_first_edges(problem, mesh), knots), np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
-        plan = _split(problem, rule, edges, knots, on_knots, gait, delta, fine, tolerance, budget)
+        plan = _split(problem, rule, edges, knots, on_knots, gait, delta, fine, tolerance, aim, budget)
         if best is None or (plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best))):
             best = plan
     return best
@@ -207,17 +210,18 @@ def _split(
     delta: float,
     fine: FineMotion,
     tolerance: float,
+    aim: float,
     budget: float,
 ) -> MeshPlan:
     """Cut the intervals with the largest errors until all together are small enough, or the budget is exhausted."""
     left, right = edges[:-1], edges[1:]
     shares = np.abs(efficiency_shares(problem, rule, left, right, gait, delta, fine))
     unresolved = float(fine.unresolved.sum())
-    aim = max(_AIM * tolerance - unresolved, 0.1 * tolerance)
-    while shares.sum() > aim and left.size * (rule.s - rule.left) < budget:
+    wanted = max(aim * tolerance - unresolved, 0.25 * aim * tolerance)
+    while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
         order = np.argsort(shares)[::-1]
         # those that hold the excess, half of them at a time: what they leave behind is not known yet
-        excess = np.cumsum(shares[order]) < shares.sum() - 0.3 * aim
+        excess = np.cumsum(shares[order]) < shares.sum() - 0.3 * wanted
         chosen = order[: max(1, int(excess.sum()) // 2)]
         chosen = chosen[right[chosen] - left[chosen] > 2 * _NARROWEST]
         if chosen.size == 0:

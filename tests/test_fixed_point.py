@@ -92,6 +92,17 @@ def test_the_solution_does_not_depend_on_the_start():
         np.testing.assert_allclose(other.z, reference.z, atol=1e-9)
 
 
+def test_a_start_next_to_the_answer_does_not_lose_it():
+    """One joint moves 4e-5 times as fast as the other. From here the anchor goes to a link from which nothing converges."""
+    angles = np.array([[-2.450491783538704], [3.0288778624868327]])
+    rates = np.array([[-11.194977583218439], [4.929179798711658e-04]])
+    start = np.array([[6.882907034601281e-04], [-3.7304329219234784], [11.192336543699575]])
+    law = Friction(3, 1, 1)
+    from_rest, from_start = (solve_balance(Chain(), law, angles, rates, 1e-6, start=s).require() for s in (None, start))
+    assert np.abs(from_start.z - from_rest.z).max() < 1e-9
+    assert np.abs(start - from_rest.z).max() < 1e-3
+
+
 @pytest.mark.parametrize("friction", FRICTIONS)
 def test_scaling_the_rates_and_delta_scales_the_solution(friction):
     angles, rates = random_instants(16, 60)
