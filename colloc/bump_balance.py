@@ -145,5 +145,5 @@ def solve_bump(
     def make(members: np.ndarray, reference: int) -> _Batch:
         return _Batch(body, friction, q[:, members], rates[:, members])
 
-    solve(friction, state, make, 1, np.full((1, n), delta / body.width), tolerance, 1000, "auto")
+    solve(state, make, 1, np.full((1, n), delta / body.width), tolerance, 1000, "auto")
     return state

@@ -22,15 +22,15 @@ from colloc.friction import Friction
 
 _ARMIJO = 1e-4
 _BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
-_SHORT_BACKTRACKING = (0.25, 0.1)
-"""Without a potential a Newton direction may not descend at all: the fixed point takes over sooner (2 to 3 times fewer
-evaluations at (0.5, 1, 5) and (1, 1, 3))."""
+_SHORT_BACKTRACKING = (0.5, 0.25)
+"""Without a potential a Newton direction may not descend at all, and shorter steps than these creep along a valley of the
+residual for a hundred iterations; the fixed point leaves it (2 to 3 times less time at (10, 1, 1), (0.5, 1, 5), (1.7, 1, 1.3)
+than with 0.25 and 0.1)."""
 _ROUNDING = 8e-16
-_FIXED_POINT_STEPS_AFTER_FAILURE = 3
-_DIRECT_ITERATIONS, _FEWER_DIRECT_ITERATIONS = 60, 20
-"""Steps before the regularisation is followed down instead; the smaller number where mu_f = mu_b, but mu_t differs. There a few
-instants creep for more than a hundred steps, and following takes 40; with mu_b > mu_f creeping ends sooner than following
-(3,000 random instants, delta = 1e-4: 1.2 s become 0.6 s at (10, 1, 1), 0.7 s become 1.3 s at (0.5, 1, 5))."""
+_FIXED_POINT_STEPS_AFTER_FAILURE = 5
+_DIRECT_ITERATIONS = 40
+"""Steps before the regularisation is followed down instead."""
+_LADDER_ITERATIONS = 240
 _DRY, _VISCOUS = 1e-100, 1e8
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
 METHODS = ("auto", "newton", "fixed_point")
@@ -102,14 +102,7 @@ def starting_state(anchor: np.ndarray, velocity: np.ndarray) -> State:
 
 
 def solve(
-    friction: Friction,
-    state: State,
-    make_batch: MakeBatch,
-    n_reference: int,
-    delta: np.ndarray,
-    tolerance: float,
-    budget: int,
-    method: str,
+    state: State, make_batch: MakeBatch, n_reference: int, delta: np.ndarray, tolerance: float, budget: int, method: str
 ) -> None:
     """Bring every instant of `state` to a residual below `tolerance`, in up to four attempts of `budget` steps each.
 
@@ -119,8 +112,7 @@ def solve(
     are for comparison.
     """
     everything, first_anchor = np.arange(state.residual.size), state.anchor.copy()
-    few = not friction.isotropic and friction.mu_f == friction.mu_b
-    direct = budget if method != "auto" else min(budget, _FEWER_DIRECT_ITERATIONS if few else _DIRECT_ITERATIONS)
+    direct = budget if method != "auto" else min(budget, _DIRECT_ITERATIONS)
     at_rest = ~state.velocity.any(axis=0)
     _advance(state, make_batch, n_reference, everything, delta, tolerance, direct, method)
     if method != "auto":
@@ -135,7 +127,7 @@ def solve(
         state.velocity[:, bad] = 0.0
         for level in _ladder(float(delta[0, bad].min())):
             now = np.maximum(delta, level)
-            _advance(state, make_batch, n_reference, bad, now, tolerance, min(budget, 4 * _DIRECT_ITERATIONS), method)
+            _advance(state, make_batch, n_reference, bad, now, tolerance, min(budget, _LADDER_ITERATIONS), method)
         bad = np.flatnonzero(state.residual > tolerance)
         if bad.size:
             _advance(state, make_batch, n_reference, bad, delta, tolerance, budget, "fixed_point")

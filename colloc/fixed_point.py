@@ -195,7 +195,7 @@ def solve_balance(
     def batch(members: np.ndarray, link: int) -> _Batch:
         return _Batch(body, friction, angles[:, members], scaled_rates[:, members], link)
 
-    solve(friction, state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
+    solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
 
     tail_z = np.empty((3, n_time))
     for link in np.unique(state.anchor):

@@ -73,7 +73,7 @@ def solve_modal(
     velocity = np.zeros((3, n)) if start is None else np.nan_to_num(start)
     velocity = velocity + np.array([[0.0], [0.0], [1.0]]) * fields.edge_rate[TAIL]  # a batch's omega is that of the tangent
     state = starting_state(np.full(n, TAIL), velocity)
-    solve(friction, state, make, _ANCHOR_MOVES, np.full((1, n), delta), tolerance, 1000, "auto")
+    solve(state, make, _ANCHOR_MOVES, np.full((1, n), delta), tolerance, 1000, "auto")
     for reference in np.unique(state.anchor):
         members = np.flatnonzero(state.anchor == reference)
         tail = make(members, int(reference)).edge_velocity(state.velocity[:, members])[:, TAIL]

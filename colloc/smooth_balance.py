@@ -163,13 +163,13 @@ def solve_smooth(
         if level == 0:
             # one cheap pass finds what rests, so that the anchor is right before anything is judged
             state = starting_state(anchor, velocity / speed)
-            solve(friction, state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
+            solve(state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
             for members, batch in _groups(state.anchor, make):
                 state.anchor[members], state.velocity[:, members] = batch.slowest(state.velocity[:, members], d[:, members])
             state = starting_state(state.anchor, state.velocity)
         else:
             state = starting_state(anchor, velocity / speed)
-        solve(friction, state, make, 5, d, tolerance, max_iterations, method)
+        solve(state, make, 5, d, tolerance, max_iterations, method)
         iterations[active] += state.iterations
         velocity = state.velocity * speed
 

@@ -72,9 +72,10 @@ def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_m
         ((1, 1, 1), 1e-1, 5.5, 12),
         ((1, 1, 1), 1e-4, 9.7, 24),
         ((1, 1, 1), 1e-12, 13.5, 80),
-        ((1.7, 1, 1.3), 1e-4, 10, 60),
-        ((10, 1, 1), 1e-4, 11, 190),
-        ((10, 1, 1), 1e-12, 14, 260),
+        ((1.7, 1, 1.3), 1e-4, 10, 30),
+        ((0.5, 1, 5), 1e-4, 11, 34),
+        ((10, 1, 1), 1e-4, 10, 150),
+        ((10, 1, 1), 1e-12, 12.5, 140),
     ],
 )
 def test_steps_of_the_balance_solver(law, delta, mean, largest):
