@@ -1,28 +1,47 @@
-"""Work and precision of schemes, on uniform and on refined meshes: python -m benchmarks.work_precision
+"""Work and precision of schemes, on uniform and on refined meshes: python -m benchmarks.work_precision [--path]
 
 The isotropic one-harmonic three-link optimum at delta = 1e-4, from a good guess and delta = 1e-3 on. Every solve is held
 against the optimum itself, as the finest refined solve finds it by independent replay, and against a replay of its own
 gait. Outcomes are kept in results/work_precision.json, so an interrupted run goes on where it stopped. Writes
 results/work_precision.md and results/work_precision.png and .pdf.
+
+With --path the free path of curvature 8 instead, from an ellipse; into work_precision_path.md, .png and .pdf. There every
+mesh has a class of paths of its own, so errors are those against a replay of the same path.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from colloc import Harmonic, Problem, certify, ellipse
+from colloc import FreePath, Harmonic, Problem, certify, ellipse
 from colloc.continuation import continue_delta
 from colloc.figures_precision import save_work_precision
 from colloc.json_cache import load_entries, save_entry
 
-SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
-UNIFORM, REFINED = (10, 20, 40, 80, 160), (1e-3, 1e-4, 1e-5, 1e-6)
 SECOND_ORDER = "trapezoid"
 REFERENCE = ("gauss-5", 20, 1e-7)
+
+
+class Picture(NamedTuple):
+    """What is solved for one picture: schemes, uniform meshes, and tolerances to refine a mesh of `first` intervals to."""
+
+    name: str
+    title: str
+    problem: Callable[[str, int, float], Problem]
+    schemes: tuple[str, ...]
+    uniform: tuple[int, ...]
+    refined: tuple[float, ...]
+    first: int
+
+    def meshes(self, refine: bool) -> list[tuple[int, float]]:
+        """Intervals and mesh tolerance of each solve; 0 for a uniform mesh."""
+        return [(self.first, tolerance) for tolerance in self.refined] if refine else [(n, 0.0) for n in self.uniform]
 
 
 def run_problem(scheme: str, intervals: int, tolerance: float) -> Problem:
@@ -36,6 +55,38 @@ def run_problem(scheme: str, intervals: int, tolerance: float) -> Problem:
         scheme=scheme,
         mesh_tolerance=tolerance,
     )
+
+
+def path_problem(scheme: str, intervals: int, tolerance: float) -> Problem:
+    """One solve of the picture of free paths."""
+    return Problem(
+        "path",
+        ellipse(0, 2.8, 1.3),
+        gait=FreePath(8, "bilateral"),
+        intervals=intervals,
+        scheme=scheme,
+        mesh_tolerance=tolerance,
+    )
+
+
+ELLIPSE = Picture(
+    "work_precision",
+    "Three links, isotropic, one harmonic",
+    run_problem,
+    ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3"),
+    (10, 20, 40, 80, 160),
+    (1e-3, 1e-4, 1e-5, 1e-6),
+    20,
+)
+PATH = Picture(
+    "work_precision_path",
+    "Three links, isotropic, free path of curvature 8",
+    path_problem,
+    ("gauss-1", "gauss-2", "gauss-3", "gauss-5", "radau-3"),
+    (30, 60, 120, 240),
+    (1e-3, 3e-4, 1e-4, 3e-5),
+    40,
+)
 
 
 def outcome(problem: Problem) -> dict:
@@ -75,38 +126,50 @@ a replay of the same gait.
 |---|---|---|---|---|---|---|---|---|"""
 
 
+PATH_HEADER = """# Schemes, mesh tolerance and error on a free path
+
+Written by `python -m benchmarks.work_precision --path`: isotropic friction, curvature at most 8, bilateral, delta = 1e-4 at
+unit shape speed, the whole continuation from an ellipse. Processor seconds (certificate not included), one run on a machine
+that other work shared. Error: collocated efficiency over that of a replay of the same path, less 1.
+
+| scheme | mesh | ended with | points | efficiency | replayed | error | iterations | CPU s |
+|---|---|---|---|---|---|---|---|---|"""
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Work and precision of schemes; see the top of this file.")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--path", action="store_true", help="the free path instead of one harmonic")
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     cache = options.output / "work_precision.json"
-    reference = kept(cache, run_problem(*REFERENCE))["replayed"]
-    lines = [HEADER.format(reference=reference)]
+    picture = PATH if options.path else ELLIPSE
+    reference = np.nan if options.path else kept(cache, run_problem(*REFERENCE))["replayed"]
+    lines = [PATH_HEADER if options.path else HEADER.format(reference=reference)]
     curves: dict[bool, dict[str, tuple[np.ndarray, np.ndarray]]] = {False: {}, True: {}}
-    for scheme in SCHEMES:
-        for refined in (False, True):
+    for scheme in picture.schemes:
+        for refine in (False, True):
             rows = []
-            for intervals, tolerance in [(20, t) for t in REFINED] if refined else [(n, 0.0) for n in UNIFORM]:
-                if refined and scheme == SECOND_ORDER and tolerance < 1e-4:
+            for intervals, tolerance in picture.meshes(refine):
+                if scheme == SECOND_ORDER and 0 < tolerance < 1e-4:
                     continue  # thousands of intervals
-                result = kept(cache, run_problem(scheme, intervals, tolerance))
-                error = result["efficiency"] / reference - 1
+                result = kept(cache, picture.problem(scheme, intervals, tolerance))
                 own = result["efficiency"] / result["replayed"] - 1
-                mesh = f"to {tolerance:.0e}" if refined else "uniform"
+                error = own if options.path else result["efficiency"] / reference - 1
+                mesh = f"to {tolerance:.0e}" if refine else "uniform"
                 note = "" if result["optimal"] else " (not converged)"
+                errors = f"{result['replayed']:.7f} | {own:+.1e}" if options.path else f"{error:+.1e} | {own:+.1e}"
                 lines.append(
                     f"| {scheme} | {mesh}{note} | {result['scheme']} x {result['intervals']} | {result['points']} "
-                    f"| {result['efficiency']:.7f} | {error:+.1e} | {own:+.1e} "
-                    f"| {result['iterations']} | {result['seconds']:.1f} |"
+                    f"| {result['efficiency']:.7f} | {errors} | {result['iterations']} | {result['seconds']:.1f} |"
                 )
                 print(lines[-1], flush=True)
                 if result["optimal"]:
                     rows.append((result["seconds"], abs(error)))
-            curves[refined][scheme] = tuple(np.array(rows).T)
-    (options.output / "work_precision.md").write_text("\n".join(lines) + "\n")
-    title = "Three links, isotropic, one harmonic"
-    save_work_precision(options.output, "work_precision", curves[False], curves[True], title)
+            if rows:
+                curves[refine][scheme] = tuple(np.array(rows).T)
+    (options.output / f"{picture.name}.md").write_text("\n".join(lines) + "\n")
+    save_work_precision(options.output, picture.name, curves[False], curves[True], picture.title)
 
 
 if __name__ == "__main__":
