@@ -12,6 +12,19 @@ from colloc.program import GaitProgram
 _SATISFIED = 1e-8
 _COMPONENTS = ("force along the tail", "force across the tail", "torque about the tail")
 _LAWS = ("tangential force", "normal force", "couple")
+_PATH = {
+    "path": "the joining of arcs to a path",
+    "closure": "closure of the path",
+    "smooth closure": "closure of the path's direction",
+    "curvature": "the bound on curvature",
+    "curvature to the left": "the bound on curvature",
+    "curvature to the right": "the bound on curvature",
+    "turn": "the most that one arc may turn",
+    "winding": "the winding of the path",
+    "unit tangent": "the unit length of the path's direction",
+    "start": "the start of the path",
+    "sides": "the least length of sides and path",
+}
 _SMALLEST_PIVOT = 1e-9
 
 
@@ -44,8 +57,10 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         return f"the {name} gained over an interval", float(mesh.edges[index])
     if name == "shape speed":
         return "the lower bound on the shape speed", 0.0
-    kind = "the limit of " if name.startswith("joint") else "contact of "
-    return kind + name, float(mesh.edges[index])
+    phase = float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
+    if name.startswith(("joint", "links")):
+        return ("the limit of " if name.startswith("joint") else "contact of ") + name, phase
+    return _PATH.get(name, f"the {name}"), phase
 
 
 def time_window(transcription: GaitProgram, excess: np.ndarray, group: str) -> tuple[float, float]:

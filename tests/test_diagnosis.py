@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from colloc.body import Chain
 from colloc.diagnosis import explanation, redundant_equations, row_meaning
-from colloc.gait import Harmonic, ellipse
+from colloc.gait import Fourier, Harmonic, ellipse
 from colloc.nlp import Solver
+from colloc.path_class import FreePath, Polygon
+from colloc.path_start import transcribed
 from colloc.problem import FORMULATIONS, Problem
 from colloc.transcription import transcribe
 from colloc.warm_start import feasible_point
@@ -24,6 +27,28 @@ def test_every_row_has_a_meaning_and_a_phase(formulation):
         assert what.startswith(("the ", "closure", "contact"))
         phases.append(phase)
     assert 0 <= min(phases) <= max(phases) <= 1
+
+
+@pytest.mark.parametrize(
+    ("gait", "links"),
+    [
+        (FreePath(8.0, "bilateral"), 3),
+        (FreePath(8.0, "none"), 3),
+        (FreePath(8.0, "antipodal"), 4),
+        (Polygon(4, "bilateral", "side"), 3),
+        (Polygon(3, "none"), 3),
+    ],
+)
+def test_every_row_of_a_path_has_a_meaning_of_its_own_and_a_phase(gait, links):
+    guess = ellipse(0.0, 1.0, 0.6) if links == 3 else Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
+    problem = Problem("path", guess, Chain((1 / links,) * links), gait=gait, intervals=24)
+    transcription = transcribed(problem)
+    said = {row_meaning(transcription, row)[0] for row in range(transcription.assembly.m)}
+    phases = [row_meaning(transcription, row)[1] for row in range(transcription.assembly.m)]
+    assert min(phases) >= 0.0
+    assert max(phases) <= gait.fraction + 1e-12
+    assert not any(what.startswith("contact of") and "links" not in what for what in said)
+    assert not said & set(transcription.groups)
 
 
 def test_a_broken_balance_is_named_with_its_window():
