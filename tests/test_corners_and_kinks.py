@@ -28,7 +28,7 @@ def test_an_optimum_that_rounds_the_corner_of_the_contact_region_is_certified():
 @pytest.mark.slow
 def test_refinement_encloses_a_kink_instead_of_following_it():
     """Five meshes, each with its knot moved after the kink, had ended at an error of 3.1e-5."""
-    first = maximise_efficiency(from_start(6, Friction(1.7, 1.0, 1.3), "none"))
+    first = maximise_efficiency(from_start(6, Friction(1.7, 1.0, 1.3), "none", intervals=40))
     problem = first.problem.with_(guess=first.gait, delta=1e-6, delta_start=4e-3)
     solution = maximise_efficiency(problem)
     assert solution.status == "solved", solution.message
