@@ -100,6 +100,8 @@ def report(quick: bool, folder: Path) -> str:
             axis.loglog(n, [r["an iteration"] for r in runs], "s-", color=BLUE, label="an iteration [s]")
             axis.loglog(n, [r["MB"] / 1000 for r in runs], "^-", color=GREEN, label="memory [GB]")
             axis.set(xlabel=name)
+            axis.set_xticks(n, [f"{size:g}" for size in n])
+            axis.set_xticks([], minor=True)
         axes[0].legend(fontsize=7)
         save(figure, folder, "scaling")
     return "\n\n".join(parts)

@@ -19,11 +19,11 @@ from colloc.smooth_period import Period, measured_period
 from colloc.solution import Check
 
 FIRST_RADIUS, NEXT_RADIUS = 0.2, 0.1
+"""Trust region of every coordinate [rad, and bump widths], at the first level and later ones."""
 ROUGH, ROUGH_ABOVE = {"panels": 4, "order": 6}, 2.5
 """Quadrature of the bump at levels above so many times the last delta: they only have to come near, at a third of the cost."""
 OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "tol": 1e-7, "alpha_red_factor": 0.2, "watchdog_shortened_iter_trigger": 3}
 """Half the processor time of a tight leash (theta_max_fact 1e-3) at epsilon = 0.1; with no leash the last level fails."""
-"""Trust region of every coordinate [rad, and bump widths], at the first level and later ones."""
 GAP, ANGLE = 1e-3, 5e-3
 """Largest values that pass. GAP is that of chains times ten: fixed panels on the bump resolve its stick to this only."""
 
