@@ -19,6 +19,8 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from colloc.machine_code import machine_code
+
 
 @dataclass(frozen=True, eq=False)
 class LocalFunction:
@@ -55,13 +57,19 @@ def _packed(
     hess_row, hess_col = (np.array(a, dtype=int) for a in upper.sparsity().get_triplet())
     options = {"cse": True}
     arguments = [local, parameter, delta]
+    functions = (
+        ca.Function(name, arguments, [ca.densify(out)], options),
+        ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))], options),
+        ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))], options),
+    )
+    value, jac, hess = machine_code(functions)
     return LocalFunction(
         local.shape[0],
         out.shape[0],
         parameter.shape[0],
-        ca.Function(name, arguments, [ca.densify(out)], options),
-        ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))], options),
-        ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))], options),
+        value,
+        jac,
+        hess,
         jac_row,
         jac_col,
         hess_row,

@@ -5,10 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import replace
 
 from colloc.basins import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
+from colloc.compiled_problem import compile_problem
+from colloc.errors import CollocError
 from colloc.gait import Fourier, Harmonic
+from colloc.machine_code import compiler
 from colloc.optimise import is_trivial, maximise_efficiency
 from colloc.path_samples import fourier_through
 from colloc.problem import Problem
@@ -16,6 +20,8 @@ from colloc.sampling import LATIN_HYPERCUBE, seed_class, start_gait
 from colloc.solution import Certificate, Level, Solution
 from colloc.task_pool import Lost, Task, completed, process_pool
 
+_MANY = 8
+"""Starts that are worth compiling for."""
 ARCHIVED_HARMONICS = 16
 """Free paths and polygons are archived and told apart by their Fourier series in arc length."""
 
@@ -91,6 +97,8 @@ def run_starts(
 ) -> Iterator[Outcome]:
     """Outcomes of the given starts, each as soon as it is there.
 
+    For 8 starts or more, what they evaluate is compiled first if there is a C compiler (see `colloc.machine_code`).
+
     Parameters
     ----------
     problem : Problem
@@ -109,6 +117,10 @@ def run_starts(
     known : mapping of int to Fourier, optional
         Gaits from which starts of these numbers begin instead of a sample: results of an earlier run to go on from.
     """
+    starts = list(starts)
+    if len(starts) >= _MANY and compiler() is not None:
+        with suppress(CollocError):  # whatever is wrong with the problem, its starts will say
+            compile_problem(problem)
     waiting = iter(starts)
 
     def ready() -> Task | None:

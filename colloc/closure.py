@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.fixed_point import solve_balance
 from colloc.gait import Fourier
+from colloc.newton_balance import balanced_near
 from colloc.problem import Problem
 from colloc.sampling import is_admissible, largest_amplitude
 
@@ -20,6 +20,7 @@ _STEPS = 30
 _DIFFERENCE = 1e-5
 _LONGEST_STEP = 0.3
 _CLOSED = 1e-4
+_TOLERANCE = 1e-9
 _WIDER, _WIDE = 5.0, 0.3
 
 
@@ -30,19 +31,23 @@ def enclosed_area(gait: Fourier) -> float:
     return float(np.triu(areas, 1).sum())
 
 
-def net_rotations(problem: Problem, parameters: np.ndarray, delta: float) -> np.ndarray:
+def net_rotations(
+    problem: Problem, parameters: np.ndarray, delta: float, near: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Rotation over a period [rad] of gaits with the given parameters ``(n_gait, n_parameter)``, ``(n_gait,)``.
 
-    By the trapezoidal rule on a coarse uniform grid, which is enough for a start.
+    By the trapezoidal rule on a coarse uniform grid, which is enough for a start. `near`: tail velocities ``(3, n_time)`` of a
+    gait near all of them, to save steps; those of the first gait are returned too.
     """
     t = np.arange(_INSTANTS) / _INSTANTS
     n_joint = problem.body.n_joint
     angles = np.einsum("tjp,gp->jgt", problem.gait.angle_matrix(t, n_joint), parameters)
     rates = np.einsum("tjp,gp->jgt", problem.gait.rate_matrix(t, n_joint), parameters)
-    solved = solve_balance(
-        problem.body, problem.friction, angles.reshape(n_joint, -1), rates.reshape(n_joint, -1), delta, tolerance=1e-9
+    start = None if near is None else np.tile(near, (1, len(parameters)))
+    z, _ = balanced_near(
+        problem.body, problem.friction, angles.reshape(n_joint, -1), rates.reshape(n_joint, -1), delta, start, _TOLERANCE
     )
-    return solved.z[2].reshape(len(parameters), _INSTANTS).mean(axis=1)
+    return z[2].reshape(len(parameters), _INSTANTS).mean(axis=1), z[:, :_INSTANTS]
 
 
 def closed_parameters(problem: Problem, parameters: np.ndarray, delta: float) -> np.ndarray:
@@ -57,8 +62,11 @@ def closed_parameters(problem: Problem, parameters: np.ndarray, delta: float) ->
     def area(p: np.ndarray) -> float:
         return enclosed_area(problem.gait.fourier(p, n_joint))
 
+    near = None
     for _ in range(_STEPS):
-        rotations = net_rotations(problem, parameters + probes, delta)
+        if near is None:
+            _, near = net_rotations(problem, parameters[None], delta)
+        rotations, near = net_rotations(problem, parameters + probes, delta, near)
         rotation, slope = rotations[0], (rotations[1:] - rotations[0]) / _DIFFERENCE
         if abs(rotation) < _CLOSED:
             break
@@ -71,7 +79,7 @@ def closed_parameters(problem: Problem, parameters: np.ndarray, delta: float) ->
         step *= min(1.0, _LONGEST_STEP / np.linalg.norm(step))
         fractions = 0.5 ** np.arange(6)
         trials = np.array([_admissible(problem, parameters + f * step) for f in fractions])
-        reached = np.abs(net_rotations(problem, trials, delta))
+        reached = np.abs(net_rotations(problem, trials, delta, near)[0])
         best = int(np.argmax(reached < (1 - 0.1 * fractions) * abs(rotation)))
         if reached[best] >= abs(rotation):
             break

@@ -17,14 +17,11 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from colloc.fixed_point import solve_balance
-from colloc.kernels import newton_step
 from colloc.layout import RADIANS
+from colloc.newton_balance import balanced_near
 from colloc.transcription import Transcription
 
 _TOLERANCE = 1e-12
-_ACCEPTED = 1e-9
-_ROUNDING = 1e-16
-_NEWTON_STEPS = 8
 _ADVANCE, _POWER = 3, 4
 
 
@@ -77,7 +74,6 @@ class Condensed:
         self._n_site = mesh.n_site
         self._weight = RADIANS * np.asarray(mesh.quadrature()[1].sum(axis=0)).ravel()
         n = mesh.n_point
-        self._newton = newton_step(self._body, self._friction).map(n)
         self._value = self._function.value.map(n)
         self._jacobian = self._function.jacobian.map(n)
         self._hessian = self._function.hessian.map(n)
@@ -127,26 +123,10 @@ class Condensed:
         return self._last
 
     def _balanced(self, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None) -> np.ndarray:
-        """Tail velocities in balance: a few Newton steps from the start, then the damped solver where they do not arrive."""
+        """Tail velocities in balance, NaN where there are none."""
         self.solves += 1
-        bad = np.ones(angles.shape[1], dtype=bool)
-        z = np.zeros((3, angles.shape[1])) if start is None else start
-        # a tail velocity of order one cannot represent speeds of order delta any better
-        tolerance = max(_TOLERANCE, _ROUNDING / delta)
-        if start is not None:
-            deltas = np.full((1, bad.size), delta)
-            for _ in range(_NEWTON_STEPS):
-                new, residual = (a.full() for a in self._newton(angles, rates, z, deltas))
-                bad = ~(residual[0] <= tolerance)
-                if not bad.any():
-                    return z
-                z = np.where(bad & np.isfinite(new).all(axis=0), new, z)
-        near = None if start is None else start[:, bad]
-        solved = solve_balance(
-            self._body, self._friction, angles[:, bad], rates[:, bad], delta, start=near, tolerance=_TOLERANCE
-        )
-        z[:, bad] = np.where(solved.residual < _ACCEPTED, solved.z, np.nan)
-        return z
+        z, converged = balanced_near(self._body, self._friction, angles, rates, delta, start, _TOLERANCE)
+        return np.where(converged, z, np.nan)
 
     def _differentiated(self, v: np.ndarray, delta: float) -> tuple[_State, np.ndarray, np.ndarray]:
         """The state, with d(locals)/dv ``(n_point, n_local, n)`` and the outputs' derivatives ``(n_point, 5, n_local)``."""

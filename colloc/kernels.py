@@ -23,6 +23,7 @@ from colloc.balance import instant, net_force, total_power
 from colloc.blocks import LocalFunction, local_function, total_function
 from colloc.body import Chain
 from colloc.friction import Friction, LinkForce, link_moments
+from colloc.machine_code import machine_code
 from colloc.problem import LIFTED
 from colloc.shape_checks import ShapeCheck
 
@@ -122,7 +123,8 @@ def newton_step(body: Chain, friction: Friction) -> ca.Function:
     now = instant(body, friction, angles, rates, z, delta)
     balance = net_force(now.posture, now.force) / friction.largest
     step = ca.solve(ca.jacobian(balance, z), balance)
-    return ca.Function("newton", [angles, rates, z, delta], [z - step, ca.norm_inf(balance)], {"cse": True})
+    function = ca.Function("newton", [angles, rates, z, delta], [z - step, ca.norm_inf(balance)], {"cse": True})
+    return machine_code([function])[0]
 
 
 def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:

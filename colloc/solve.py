@@ -60,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
     parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
     add_bound(parser)
+    parser.add_argument("--compile", action="store_true", help="first compile what solves of this body and friction evaluate")
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
     add_printing(parser)
     return parser
@@ -168,6 +169,12 @@ def _solve(options: argparse.Namespace) -> int:
     from colloc.store import save
 
     quiet = options.quiet or options.json
+    if options.compile:
+        from colloc.compiled_problem import compile_problem
+
+        with StatusLine(enabled=not quiet) as line:
+            line.say("compiling")
+            compile_problem(problem)
     solution = _solved(problem, stated.source, path, options.fresh, quiet)
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")

@@ -6,9 +6,11 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from colloc.balance import instant, total_power
-from colloc.fixed_point import solve_balance
 from colloc.layout import RADIANS
+from colloc.newton_balance import balanced_near
 from colloc.program import GaitProgram
+
+_TOLERANCE = 1e-11
 
 
 def feasible_point(
@@ -36,13 +38,13 @@ def feasible_point(
     x[layout.parameters[:, 0]] = parameters
     slow = delta * gait.delta_unit / RADIANS
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
-    solved = solve_balance(problem.body, problem.friction, angles, rates, slow, start=start)
-    now = instant(problem.body, problem.friction, angles, rates, solved.z, slow)
+    z, _ = balanced_near(problem.body, problem.friction, angles, rates, slow, start, _TOLERANCE)
+    now = instant(problem.body, problem.friction, angles, rates, z, slow)
 
     state, rate = mesh.integration()
     # theta_0 = 0 closes the system; the matrix is block bidiagonal
     theta = np.zeros(mesh.n_site)
-    theta[1:] = spsolve(state[:, 1:].tocsc(), RADIANS * (rate @ solved.z[2]))
+    theta[1:] = spsolve(state[:, 1:].tocsc(), RADIANS * (rate @ z[2]))
     site_of_point = np.empty(mesh.n_point, dtype=int)
     site_of_point[mesh.points] = mesh.sites
     cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
@@ -60,7 +62,7 @@ def feasible_point(
     x[layout.work[0, 1:]] = np.cumsum(RADIANS * (quadrature @ total_power(now.velocity, now.force)[0]))
     x[layout.theta[0]] = theta
     if layout.z.size:
-        x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, solved.z
+        x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     if layout.forces.size:
         x[layout.forces] = np.concatenate(now.force)
     return x
