@@ -1,13 +1,15 @@
 """Where the time of a solve goes, as shares: python -m benchmarks --only cost
 
-Every problem is solved once in a process of its own. IPOPT's own timing statistics give the linear algebra (MUMPS
-factorisation and back solves); the functions' time is CasADi's, split by kind, with the balance solver inside them timed
-separately. What is left of IPOPT's time is its own overhead and the estimate of multipliers. All is processor time.
+Every problem is solved once in a process of its own, interpreted, and the first also with compiled derivatives. IPOPT's own
+timing statistics give the linear algebra (MUMPS factorisation and back solves); the functions' time is CasADi's, split by
+kind, with the balance solver inside them timed separately. What is left of IPOPT's time is its own overhead and the estimate
+of multipliers. All is processor time.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -17,6 +19,9 @@ from pathlib import Path
 from unittest import mock
 
 from benchmarks.tables import markdown_table
+from colloc.compiled_problem import compile_problem
+from colloc.machine_code import FOLDER, OFF, compiler
+from colloc.problem_file import read_problem_file
 
 PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")
 MODULES = (
@@ -45,7 +50,6 @@ def anatomy(name: str) -> dict[str, float]:
     from colloc import continuation, level_run, nlp
     from colloc.condensed import Condensed
     from colloc.figures import save_figure, solution_figure
-    from colloc.problem_file import read_problem_file
     from colloc.store import save
     from colloc.verify import certify
 
@@ -126,18 +130,22 @@ def import_seconds(module: str) -> float:
     return spent(f"import {module}") - spent("pass")
 
 
+def _anatomy_apart(name: str, code: str) -> dict[str, float]:
+    """`anatomy` in a fresh process that looks for compiled code in the folder `code`."""
+    command = [sys.executable, "-c", f"import json; from benchmarks.cost import anatomy; print(json.dumps(anatomy({name!r})))"]
+    environment = {**os.environ, FOLDER: code}
+    output = subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
+    return json.loads(output.splitlines()[-1])
+
+
 def report(quick: bool, folder: Path) -> str:
     """Shares of the parts of three solves, and import times."""
-    names = PROBLEMS[:1] if quick else PROBLEMS
-    columns = {}
-    for name in names:
-        command = [
-            sys.executable,
-            "-c",
-            f"import json; from benchmarks.cost import anatomy; print(json.dumps(anatomy({name!r})))",
-        ]
-        output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        columns[name] = json.loads(output.splitlines()[-1])
+    columns = {name: _anatomy_apart(name, OFF) for name in (PROBLEMS[:1] if quick else PROBLEMS)}
+    if compiler() is not None:
+        with tempfile.TemporaryDirectory() as code, mock.patch.dict(os.environ, {FOLDER: code}):
+            compile_problem(read_problem_file(Path("problems") / f"{PROBLEMS[0]}.py").problem)
+            columns[f"{PROBLEMS[0]}, compiled"] = _anatomy_apart(PROBLEMS[0], code)
+    names = list(columns)
     parts = [part for part in columns[names[0]] if not part.startswith("(")]
     totals = {name: sum(columns[name][part] for part in parts) for name in names}
     rows = [[part, *(f"{columns[n][part]:.2f} ({columns[n][part] / totals[n]:.0%})" for n in names)] for part in parts]

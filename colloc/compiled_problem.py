@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from colloc.kernels import newton_step, point_function
+from colloc.kernels import balance_steps, point_function
 from colloc.machine_code import compiling
 from colloc.path_start import transcribed
 from colloc.problem import Problem
@@ -21,8 +21,8 @@ def compile_problem(problem: Problem) -> None:
     StoreError
         If it fails, or the folder cannot be written.
     """
-    for function in (point_function, newton_step):
+    for function in (point_function, balance_steps):
         function.cache_clear()
     with compiling():
         transcribed(problem)
-        newton_step(problem.body, problem.friction)
+        balance_steps(problem.body, problem.friction)

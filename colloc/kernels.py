@@ -114,17 +114,28 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
 
 
 @lru_cache(maxsize=32)
-def newton_step(body: Chain, friction: Friction) -> ca.Function:
-    """One Newton step on the balance, (angles, rates, z, delta) to (z, largest residual before the step).
+def balance_steps(body: Chain, friction: Friction) -> ca.Function:
+    """Steps on the balance, (angles, rates, z, delta) to (z by Newton, z by the paper's fixed point, residual before the step).
 
     Undamped, and in the tail's velocity: to finish what starts close by. `colloc.fixed_point` converges from anywhere.
     """
     _, angles, rates, z, delta = _symbols(body)
     now = instant(body, friction, angles, rates, z, delta)
     balance = net_force(now.posture, now.force) / friction.largest
-    step = ca.solve(ca.jacobian(balance, z), balance)
-    function = ca.Function("newton", [angles, rates, z, delta], [z - step, ca.norm_inf(balance)], {"cse": True})
-    return machine_code([function])[0]
+    newton = z - ca.solve(ca.jacobian(balance, z), balance)
+
+    # link speeds frozen (paper, eqs. ftbtilde to deltatilde): forces linear in the velocities, with these moments
+    frozen = [ca.SX.sym(name, body.n_link) for name in ("I0", "I1", "I2")]
+    I0, I1, I2 = frozen
+    vs, vn, w = now.velocity
+    mu_s, mu_t = friction.tangential(vs), friction.mu_t
+    linear = LinkForce(-mu_s * vs * I0, -mu_t * (vn * I0 + w * I1), -mu_t * (vn * I1 + w * I2))
+    slope = ca.jacobian(net_force(now.posture, linear), z) / friction.largest
+    moments = link_moments(vs, vn, w, ca.DM(body.length_column()), delta)
+    secant = ca.substitute([slope], frozen, list(moments))[0]
+    fixed_point = z - ca.solve(secant, balance)
+    outputs = [newton, fixed_point, ca.norm_inf(balance)]
+    return machine_code([ca.Function("balance_steps", [angles, rates, z, delta], outputs, {"cse": True})])[0]
 
 
 def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:

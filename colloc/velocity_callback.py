@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 
 from colloc.body import Chain
-from colloc.fixed_point import solve_balance
 from colloc.friction import Friction
+from colloc.newton_balance import balanced_near
 
 _TOLERANCE = 1e-12
 
@@ -51,11 +51,9 @@ class VelocityMap(ca.Callback):
             return [ca.DM(np.full((3, self._n_time), np.nan))]
         if np.isnan(start).any() and self._z is not None:
             start = self._z
-        solved = solve_balance(
-            self._body, self._friction, angles, rates, delta, start=np.nan_to_num(start), tolerance=_TOLERANCE
-        )
+        z, converged = balanced_near(self._body, self._friction, angles, rates, delta, np.nan_to_num(start), _TOLERANCE)
         self.solves += 1
-        z = np.where(solved.residual < 1e3 * _TOLERANCE, solved.z, np.nan)
+        z = np.where(converged, z, np.nan)
         self._last = (angles, rates, delta)
         self._z = z
         return [ca.DM(z)]

@@ -9,7 +9,7 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.compiled_problem import compile_problem
 from colloc.errors import ProblemError, StoreError
-from colloc.kernels import newton_step, point_function
+from colloc.kernels import balance_steps, point_function
 from colloc.machine_code import FOLDER, code_folder, compiler, compiling, machine_code
 
 needs_compiler = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
@@ -19,10 +19,10 @@ THIRD = Chain((1 / 3,) * 3)
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER, str(tmp_path / "code"))
-    for function in (point_function, newton_step):
+    for function in (point_function, balance_steps):
         function.cache_clear()
     yield tmp_path / "code"
-    for function in (point_function, newton_step):
+    for function in (point_function, balance_steps):
         function.cache_clear()
 
 
@@ -42,7 +42,7 @@ def is_compiled(function):
 def test_derivatives_are_equal_to_the_last_bit_at_random_and_at_hard_points(folder):
     law = Friction(1.7, 1, 1.3)
     interpreted = point_function("condensed", THIRD, law)
-    newton = newton_step(THIRD, law)
+    newton = balance_steps(THIRD, law)
     compile_problem(Problem("any", friction=law, gait=Harmonic(1), guess=ellipse(0.3, 1.0, 0.5)))
     compiled = point_function("condensed", THIRD, law)
     assert is_compiled(compiled.hessian)
@@ -58,7 +58,7 @@ def test_derivatives_are_equal_to_the_last_bit_at_random_and_at_hard_points(fold
             (interpreted.value(local, z, deltas), compiled.value(local, z, deltas)),
             (interpreted.jacobian(local, z, deltas), compiled.jacobian(local, z, deltas)),
             (interpreted.hessian(local, z, deltas, weight), compiled.hessian(local, z, deltas, weight)),
-            *zip(newton(*instants), newton_step(THIRD, law)(*instants), strict=True),
+            *zip(newton(*instants), balance_steps(THIRD, law)(*instants), strict=True),
         ]
         for a, b in pairs:
             np.testing.assert_array_equal(a.full(), b.full())
