@@ -15,7 +15,6 @@ from colloc.balance import instant, total_power
 from colloc.body import Chain
 from colloc.fixed_point import solve_balance
 from colloc.friction import Friction
-from colloc.newton_balance import balanced_near
 from colloc.path_replay import Path
 from colloc.schemes import Scheme, scheme
 
@@ -23,7 +22,6 @@ PANEL_RULE = scheme("gauss-5")
 _TO_MIDDLE = PANEL_RULE.integrals(np.array([0.5]))[0]
 _TO_HALVES = PANEL_RULE.lagrange(0.5 * np.concatenate([PANEL_RULE.c, 1.0 + PANEL_RULE.c]))
 _NARROWEST = 1e-9
-_TOLERANCE = 1e-11
 _MOST_PANELS = 20_000
 
 
@@ -41,9 +39,7 @@ def rates_at(body: Chain, friction: Friction, path: Path, delta: float, t: np.nd
     """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
     start = None if near is None else near.reshape(3, -1)
-    z, converged = balanced_near(body, friction, angles, rates, delta, start, _TOLERANCE)
-    if not converged.all():
-        z = solve_balance(body, friction, angles, rates, delta, tolerance=_TOLERANCE).require().z
+    z = solve_balance(body, friction, angles, rates, delta, start=start).require().z
     now = instant(body, friction, angles, rates, z, delta)
     cx, cy = body.centre_velocity(now.posture, now.velocity)
     power = total_power(now.velocity, now.force)
