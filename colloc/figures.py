@@ -173,3 +173,4 @@ def save_figure(figure: Figure, path: Path) -> None:
     with matplotlib.rc_context(STYLE):
         for suffix in (".png", ".pdf"):
             figure.savefig(path.with_suffix(suffix))
+            figure.set_layout_engine("none")  # what the first saving laid out holds for the second

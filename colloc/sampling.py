@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import qmc
 
 from colloc.contact import crossing_depth
 from colloc.errors import ProblemError
@@ -86,6 +85,8 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
     n_joint, harmonics = problem.body.n_joint, seed_class(problem).harmonics
     dimension = n_joint * (2 * harmonics + 1) + 1
     rng = np.random.default_rng([seed, block])
+    from scipy.stats import qmc  # half a second to load, which a single solve need not wait for
+
     unit = qmc.LatinHypercube(dimension, seed=rng).random(BLOCK)[row]
     again = np.random.default_rng([seed, block, row + 1])
     for _ in range(_ATTEMPTS):
