@@ -6,9 +6,12 @@ import pytest
 
 from colloc import Chain, Corners, Fourier, FreePath, Friction, Polygon, Problem, ellipse, load, save
 from colloc.blocks import oracles
+from colloc.infinitesimal import small_gait
 from colloc.optimise import maximise_efficiency
+from colloc.path_samples import path_length
 from colloc.path_start import nearest_parameters, transcribed
 from colloc.prolongation import continue_classes
+from colloc.solution import SOLVED
 from colloc.warm_start import feasible_point
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
@@ -144,3 +147,20 @@ def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
     assert checks["self-contact"].passed
     assert abs(checks["replay gap"].value) < 1e-3
     assert {check.name for check in certificate.failures} <= {"replay gap", "delta influence", "delta step"}
+
+
+@pytest.mark.slow
+def test_triangles_at_the_fold_approach_the_best_infinitesimal_gait_in_proportion_to_their_length():
+    limit = small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
+    shortfalls = []
+    for speed in (0.1, 0.04):
+        shape, length = np.array([3.0, -0.03]), 2 * np.pi * speed
+        guess = Corners(small_gait(Chain(), Friction(), shape).path(shape, 1.1 * length))
+        delta = 1e-3 * speed
+        stated = Problem("small", guess, gait=Polygon(3, "none"), delta=delta, intervals=30, smallest_shape_speed=speed)
+        solution = maximise_efficiency(stated.with_(delta_start=100 * delta))
+        assert solution.status == SOLVED
+        assert path_length(solution.gait) == pytest.approx(length, rel=1e-3)
+        shortfalls.append((limit - solution.certificate.efficiency) / length)
+    assert 0.4560 < limit < 0.4563
+    assert shortfalls[1] == pytest.approx(shortfalls[0], rel=0.15)
