@@ -34,11 +34,16 @@ _asked: ContextVar[bool] = ContextVar("compiling", default=False)
 
 
 def code_folder() -> Path | None:
-    """Where compiled code is kept: ``$COLLOC_CODE`` (None if that is "off"), else ``colloc`` in the user's cache folder."""
+    """Where compiled code is kept: ``$COLLOC_CODE``, else ``colloc`` in the user's cache folder; None: nowhere ("off")."""
     named = os.environ.get(FOLDER)
     if named == OFF:
         return None
-    return Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "colloc"
+    if named:
+        return Path(named).absolute()
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "colloc"
+    except RuntimeError:  # a user without a home
+        return None
 
 
 def compiler() -> str | None:
@@ -87,7 +92,7 @@ def machine_code(functions: Sequence[ca.Function]) -> list[ca.Function]:
         return list(functions)
     content = "\n".join([ca.__version__, platform.machine(), *_FLAGS, *(f.serialize() for f in functions)])
     library = folder / f"{hashlib.sha256(content.encode()).hexdigest()[:32]}.so"
-    loaded = _loaded(functions, library) if library.exists() else None
+    loaded = _loaded(functions, library) if os.path.exists(library) else None  # False where one may not look
     if loaded is None and _asked.get():
         _compile(functions, library)
         loaded = _loaded(functions, library)
@@ -95,19 +100,31 @@ def machine_code(functions: Sequence[ca.Function]) -> list[ca.Function]:
 
 
 def _compile(functions: Sequence[ca.Function], library: Path) -> None:
-    with tempfile.TemporaryDirectory(prefix="colloc-") as folder, replaced_file(library) as unfinished:
+    command = [str(compiler()), *_FLAGS]
+    with _scratch_folder() as folder, replaced_file(library) as unfinished:
         generator = ca.CodeGenerator("functions.c")
         for function in functions:
             generator.add(function)
-        source = generator.generate(f"{folder}{os.sep}")
-        command = [str(compiler()), *_FLAGS, source, "-o", unfinished, "-lm"]
+        command += [generator.generate(f"{folder}{os.sep}"), "-o", unfinished, "-lm"]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+            failure = (done.stderr.strip().splitlines() or ["no message"])[-1] if done.returncode != 0 else ""
         except subprocess.TimeoutExpired:
-            raise StoreError(f"the C compiler {command[0]} took longer than {_PATIENCE:g} s; do without its code.") from None
-        if done.returncode != 0:
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            raise StoreError(f"the C compiler {command[0]} failed ({last}); set CC to another, or do without compiled code.")
+            failure = f"took longer than {_PATIENCE:g} s"
+        except OSError as error:
+            failure = f"could not be run: {error.strerror or error}"
+        if failure:
+            raise StoreError(f"the C compiler {command[0]} failed ({failure}); set CC to another, or do without compiled code.")
+
+
+@contextlib.contextmanager
+def _scratch_folder() -> Iterator[str]:
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="colloc-")
+    except OSError as error:
+        raise StoreError(f"cannot make a temporary folder to compile in: {error.strerror or error}.") from None
+    with folder as name:
+        yield name
 
 
 def _loaded(functions: Sequence[ca.Function], library: Path) -> list[ca.Function] | None:

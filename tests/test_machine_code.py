@@ -1,6 +1,7 @@
 """Compiled code computes what CasADi interprets, to the last bit, and whatever is wrong with it costs speed only."""
 
 import shutil
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -122,3 +123,38 @@ def test_a_compiler_that_fails_is_quoted_and_leaves_nothing(folder, monkeypatch,
     with compiling(), pytest.raises(StoreError, match="out of patience"):
         machine_code([long_function()])
     assert not list(folder.glob("*.so"))
+
+
+def test_a_user_without_a_home_or_a_readable_cache_has_no_code(monkeypatch, tmp_path):
+    for name in (FOLDER, "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    with monkeypatch.context() as without:
+        without.setattr(Path, "home", homeless)
+        assert code_folder() is None
+    a_file = tmp_path / "file"
+    a_file.write_text("")
+    monkeypatch.setenv(FOLDER, str(a_file / "below"))
+    function = long_function()
+    assert machine_code([function]) == [function]
+
+
+@needs_compiler
+def test_a_folder_that_cannot_be_written_is_named(monkeypatch, tmp_path):
+    a_file = tmp_path / "file"
+    a_file.write_text("")
+    monkeypatch.setenv(FOLDER, str(a_file / "below"))
+    with compiling(), pytest.raises(StoreError, match="below"):
+        machine_code([long_function()])
+
+
+def test_a_program_that_is_no_compiler_is_named(folder, monkeypatch, tmp_path):
+    broken = tmp_path / "cc"
+    broken.write_bytes(b"\x00\x01")
+    broken.chmod(0o755)
+    monkeypatch.setenv("CC", str(broken))
+    with compiling(), pytest.raises(StoreError, match="could not be run"):
+        machine_code([long_function()])
