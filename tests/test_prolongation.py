@@ -1,0 +1,123 @@
+"""From class to class and from chain to chain: what an optimum keeps on the way."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Harmonic, Polygon, Problem, ellipse, prolongation
+from colloc.contact import crossing_depth
+from colloc.optimise import maximise_efficiency
+from colloc.path_start import nearest_parameters, transcribed
+from colloc.prolongation import maximise_from, over_links, prolonged
+from colloc.symmetry import SYMMETRIES
+
+THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
+PHASES = np.linspace(0.0, 1.0, 101)
+FIVE_HARMONICS = Fourier(
+    [0.00357, -0.00357],
+    [[2.50125, -0.00401, -0.12198, 0.00064, -0.03095], [-2.50125, 0.00401, 0.12198, -0.00064, 0.03095]],
+    [[0.84175, -0.00217, -0.2703, 0.00101, -0.0018]] * 2,
+)
+"""The optimum of five harmonics (`scripts.class_table`), efficiency 0.40044."""
+
+
+def arcs(symmetry="bilateral"):
+    problem = Problem("p", ellipse(0, 1.8, 1.2), gait=FreePath(4.0, symmetry), intervals=20)
+    program = transcribed(problem)
+    return program.member(nearest_parameters(program, problem.guess))
+
+
+GAITS = {
+    "Fourier": ellipse(0.2, 1.5, 1.0),
+    "Corners": Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]])),
+    "bilateral Corners": Corners(np.array([[2.0, 2.5, 2.2], [-2.0, -2.1, -2.2]]), "bilateral"),
+}
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_links_cut_in_two_move_as_before(name):
+    """New joints in the middles of links stay straight, old ones keep their angles; joining the halves undoes it."""
+    gait = GAITS[name]
+    cut = over_links(gait, THREE, SIX)
+    np.testing.assert_allclose(cut.angles(PHASES)[1::2], gait.angles(PHASES), atol=1e-12)
+    np.testing.assert_allclose(cut.angles(PHASES)[::2], 0, atol=1e-12)
+    x, y = THREE.joints(gait.angles(PHASES))
+    x6, y6 = SIX.joints(cut.angles(PHASES))
+    np.testing.assert_allclose([x6[::2], y6[::2]], [x, y], atol=1e-12)
+    np.testing.assert_allclose(over_links(cut, SIX, THREE).angles(PHASES), gait.angles(PHASES), atol=1e-12)
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def test_a_path_of_arcs_keeps_its_symmetry_in_another_chain(symmetry):
+    gait = arcs(symmetry)
+    assert isinstance(gait, ArcPath)
+    laid = over_links(gait, THREE, Chain((0.25,) * 4))
+    assert laid.symmetry == symmetry
+    # the polygon is paced by its own length, so sets of points are compared
+    same = over_links(gait, THREE, THREE)
+    points, path = same.angles(np.linspace(0, 1, 4001)), gait.angles(PHASES)
+    distance = np.linalg.norm(points[:, :, None] - path[:, None, :], axis=0).min(axis=0)
+    assert distance.max() < 2e-3
+
+
+@pytest.mark.parametrize("lengths", [(0.25,) * 4, (0.2,) * 5, (0.1, 0.4, 0.4, 0.1)])
+def test_a_large_gait_is_admissible_in_any_chain(lengths):
+    laid = over_links(ellipse(0, 2.8, 1.3), THREE, Chain(lengths))
+    angles = laid.angles(np.linspace(0, 1, 2001))
+    assert np.abs(angles).max() <= np.pi
+    assert crossing_depth(Chain(lengths), angles).max() == 0
+    np.testing.assert_allclose(angles, -angles[::-1, ::-1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("results", "tried", "kept"),
+    [
+        ({10: 0.40035, 100: 0.9}, [10], 0.40035),  # keeps the optimum to 1e-4: no other trial
+        ({10: 0.39, 100: 0.38}, [10, 100], 0.39),
+        ({10: 0.39, 100: 0.41}, [10, 100], 0.41),
+        ({10: None, 100: 0.3}, [10, 100], 0.3),
+        ({10: 0.3, 100: None}, [10, 100], 0.3),
+        ({10: None, 100: None}, [10, 100], None),
+    ],
+)
+def test_the_best_certified_search_is_kept_and_none_is_made_in_vain(monkeypatch, results, tried, kept):
+    begun = []
+
+    def solve(stated, on_level):
+        factor = round(stated.delta_start / stated.delta)
+        begun.append(factor)
+        value = results[factor]
+        return SimpleNamespace(
+            status="solved" if value else "not converged", certificate=SimpleNamespace(efficiency=value) if value else None
+        )
+
+    monkeypatch.setattr(prolongation, "maximise_efficiency", solve)
+    problem = Problem("p", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"))
+    solution = maximise_from(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 0.40037)
+    assert begun == tried
+    assert (solution.certificate and solution.certificate.efficiency) == kept
+
+
+@pytest.mark.slow
+def test_a_richer_class_keeps_what_its_seed_had():
+    """From 100 times the final delta, where friction is regularised most, the search leaves this optimum: 0.3998."""
+    problem = Problem("five", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60)
+    from_afar = maximise_efficiency(prolonged(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 100.0))
+    assert from_afar.status == "solved"
+    assert from_afar.certificate.efficiency < 0.4003
+    solution = maximise_from(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 0.40044)
+    assert solution.status == "solved"
+    assert solution.certificate.efficiency > 0.4010
+
+
+@pytest.mark.slow
+def test_where_a_near_start_fails_one_from_afar_is_tried():
+    """A hexagon as an octagon has corners on its sides, where its first level at 10 times the final delta loses its way."""
+    hexagon = Corners(np.array([[2.58068, 3.11378, 2.97774, 2.81594], [-2.58068, -2.58089, -2.67289, -2.81594]]), "bilateral")
+    problem = Problem("six", hexagon, gait=Polygon(6, "bilateral"), intervals=60)
+    near = maximise_efficiency(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80))
+    assert near.status != "solved"
+    solution = maximise_from(problem, hexagon, Polygon(8, "bilateral"), 0.40154, intervals=80)
+    assert solution.status == "solved"
+    assert solution.certificate.efficiency > 0.4015
