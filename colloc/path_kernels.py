@@ -7,6 +7,8 @@ body, from the NumPy solver, with derivatives by the implicit function theorem (
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -64,8 +66,13 @@ def side(n_joint: int) -> Piece:
     return Piece(ca.vertcat(a, b), ca.vertcat(sigma, gain), a + sigma * step, step / length, gain * length)
 
 
-def path_point(body: Chain, friction: Friction, piece: Piece) -> LocalFunction:
-    """Rotation rate, velocity of the centre of mass along the lab's x, and power. Locals: theta, then the piece's shape."""
+@lru_cache(maxsize=32)
+def path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+    """Rotation rate, velocity of the centre of mass along the lab's x, and power. Locals: theta, then the piece's shape.
+
+    `kind` is `arc` or `side`. Differentiating takes most of the time in which a program is built, so it is done once.
+    """
+    piece = kind(body.n_joint)
     theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("Z", 3)
     now = instant(body, friction, piece.angles, piece.direction, z, delta)
     cx, cy = body.centre_velocity(now.posture, now.velocity)

@@ -53,8 +53,7 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
         stated = Problem(
             "class", guess, equal_links(links), friction, row.gait_class, delta, RESTARTS[-1] * delta, intervals=row.intervals
         )
-        if compiler() is not None:
-            compile_problem(stated)
+        compiled(links, friction, type(row.gait_class), stated)
         if known is None:
             solution = maximise_efficiency(stated, watch)
         else:
@@ -72,6 +71,16 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
             gap = next(check.value for check in c.checks if check.name == "replay gap")
             result |= {"replay gap": gap, "intervals": int(solution.mesh.n)}
     return result | {"cpu seconds": time.process_time() - begin}
+
+
+_compiled: set[tuple[int, Friction, type]] = set()
+
+
+def compiled(links: int, friction: Friction, kind: type, stated: Problem) -> None:
+    """Puts the machine code of a kind of classes into its folder, if it can be made."""
+    if (links, friction, kind) not in _compiled and compiler() is not None:
+        compile_problem(stated)
+        _compiled.add((links, friction, kind))
 
 
 def keep(links: int, friction: str, row: str, seed: str, result: dict) -> None:
