@@ -111,7 +111,7 @@ def unit_norm(n_joint: int) -> LocalFunction:
 
 
 def excess_turn(n_joint: int, curvature: float) -> LocalFunction:
-    """How far unit tangents at both ends of an arc are apart, squared, beyond what the curvature allows.
+    """How far unit tangents at both ends of an arc are apart beyond what the curvature allows, as an angle.
 
     Locals: both tangents and the mean shape speed; given: the part of a period h that the arc takes. Half a turn an arc is the
     most that unit tangents can express.
@@ -119,7 +119,7 @@ def excess_turn(n_joint: int, curvature: float) -> LocalFunction:
     t0, t1 = ca.SX.sym("t0", n_joint), ca.SX.sym("t1", n_joint)
     speed, h = ca.SX.sym("speed"), ca.SX.sym("h")
     half = ca.fmin(np.pi * curvature * speed * h, 1.4)
-    out = 0.25 * ca.sumsqr(t1 - t0) - ca.sin(half) ** 2
+    out = 0.25 * ca.sumsqr(t1 - t0) / ca.sin(half) - ca.sin(half)
     return local_function("turn", ca.vertcat(t0, t1, speed), h, ca.SX.sym("delta"), out)
 
 
