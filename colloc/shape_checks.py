@@ -46,7 +46,9 @@ def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[Shape
         checks.append(_minimum_check(f"{name} (left)", angles, first - np.pi, second - np.pi))
         checks.append(_minimum_check(f"{name} (right)", angles, -first - np.pi, -second - np.pi))
     for i, j in far:
-        checks.append(_minimum_check(f"links {i + 1} and {j + 1}", angles, *intrusions(body, angles, i, j), CLEARANCE_SMOOTHING))
+        checks.append(
+            _minimum_check(f"links {i + 1} and {j + 1}", angles, *intrusions(body, angles, i, j), CLEARANCE_SMOOTHING)
+        )
     return checks
 
 

@@ -19,7 +19,7 @@ SIZE = 0.7
 """Length [rad] of polygons made of infinitesimal gaits."""
 FEWER = "fewer links"
 """The start from the best gait of the same class with one link less."""
-_STARTS = 4
+_STARTS = 6
 CACHE = Path("results/small_gaits_chains.json")
 _PHASES = np.linspace(0.0, 1.0, 1001)
 
@@ -66,16 +66,19 @@ def chain_rows(links: int) -> dict[str, Row]:
     """The rows of four and more links."""
     result: dict[str, Row] = {}
     starts = [f"start {k}" for k in range(_STARTS)]
+    few = starts[:2]
     harmonics = (1, 2, 3, 4, 6) if links == 4 else (1, 2, 3, 4)
     for before, n in zip((0, *harmonics), harmonics, strict=False):
-        seeds = [FEWER, *(starts if n < 3 else starts[:2])] + ([f"harmonics {before}"] if before else [])
+        seeds = [FEWER, *(starts if n < 4 else few)] + ([f"harmonics {before}"] if before else [])
         result[f"harmonics {n}"] = Row(Harmonic(n, "bilateral"), 24 + 6 * n, [*seeds, *(["curvature 8"] if n > 1 else [])])
     for before, k in zip((0, 1, 2, 4), (1, 2, 4, 8), strict=True):
         seeds = [f"curvature {before}"] if before else []
         near = f"harmonics {1 if k == 1 else 2 if k == 2 else 4}"
         result[f"curvature {k}"] = Row(FreePath(k, "bilateral"), 50 if k < 4 else 60, [*seeds, near, FEWER])
     for m in range(3, 7):
-        result |= polygon_rows(m, 10 * m, [FEWER], ["best small gait"], ["curvature 8", FEWER], ["fold", FEWER])
+        own = [f"corners {m}"] if m % 2 else [f"corners {m} corner", f"corners {m} side"]
+        first, more = [FEWER, *starts[2:]], ["curvature 8", FEWER, *few]
+        result |= polygon_rows(m, 10 * m, first, ["best small gait"], more, ["fold", *own])
     return result
 
 
