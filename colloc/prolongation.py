@@ -22,7 +22,7 @@ from colloc.gait_fields import AnyClass, AnyGait
 from colloc.level_run import Report
 from colloc.optimise import maximise_efficiency
 from colloc.path_gait import Corners
-from colloc.path_samples import path_length
+from colloc.path_samples import fourier_through, path_length
 from colloc.problem import Problem
 from colloc.sampling import largest_factor
 from colloc.solution import SOLVED, Solution
@@ -66,6 +66,18 @@ def over_links(gait: AnyGait, body: Chain, other: Chain, joint_limit: float = fl
     return Corners(vertices[:, :-1] if gait.symmetry == "none" else vertices, gait.symmetry)
 
 
+def laid_into(gait_class: AnyClass, gait: AnyGait, body: Chain, joint_limit: float = float(np.pi)) -> AnyGait:
+    """The gait that starts a search in a class: its Fourier series for harmonics, shrunk until admissible; else itself.
+
+    A truncated series overshoots, and a path that touches its limits is no longer admissible then.
+    """
+    if not isinstance(gait_class, Harmonic) or isinstance(gait, Fourier):
+        return gait
+    near = fourier_through(gait, gait_class)
+    factor = min(1.0, largest_factor(body, joint_limit, near.angles(np.linspace(0.0, 1.0, 1001))))
+    return Fourier(factor * near.mean, factor * near.cos, factor * near.sin)
+
+
 def prolonged(
     problem: Problem, gait: AnyGait, gait_class: AnyClass, restart: float = RESTARTS[0], **changes: object
 ) -> Problem:
@@ -75,7 +87,8 @@ def prolonged(
     changed too (``intervals=...``).
     """
     delta = delta_in(gait_class, gait, delta_at_unit_speed(problem))
-    stated = {"guess": gait, "gait": gait_class, "delta": delta, "delta_start": restart * delta}
+    guess = laid_into(gait_class, gait, problem.body, problem.joint_limit)
+    stated = {"guess": guess, "gait": gait_class, "delta": delta, "delta_start": restart * delta}
     return problem.with_(**(stated | changes))
 
 

@@ -83,9 +83,9 @@ def table(links: int, friction: str, known: dict) -> list[str]:
             lines.append(f"| {class_words(row)} | none certified | | | | | | {tally} | |")
             continue
         seed = next(name for name, a in attempts.items() if a is found)
-        mark = "*" if smaller_delta(row, found) else ""
+        efficiency = f"{found['efficiency']:.4f}{'*' if smaller_delta(row, found) else ''}"
         lines.append(
-            f"| {class_words(row)} | {found['efficiency']:.4f}{mark} | {found['at zero delta']:.4f} | {found['distance']:.4f} | "
+            f"| {class_words(row)} | {efficiency} | {found['at zero delta']:.4f} | {found['distance']:.4f} | "
             f"{found['work']:.4f} | {found['length']:.2f} | {abs(found['replay gap']):.0e} | {tally} | {seed} |"
         )
     return [*lines, ""]
@@ -131,10 +131,10 @@ def head(links: int) -> list[str]:
         f"# Efficiency against class of gaits, {HEADS.get(links, links)} equal links",
         "",
         f"{command} Joint limit pi; path",
-        "length at least 0.628 rad; sides of polygons at least 0.02 rad; delta = 1e-4 at unit shape speed, 1e-5 in rows with an",
-        "asterisk, where delta changes the efficiency by more than 1 %. Every efficiency is that of an independent replay whose",
-        "certificate holds (replay gap at most 1e-4); the class is explained in docs/gait_classes.md. Local optima of few starts:",
-        "a class may hold better ones.",
+        "length at least 0.628 rad; sides of polygons at least 0.02 rad; delta = 1e-4 at unit shape speed, 1e-5 in rows with",
+        "an asterisk, where delta changes the efficiency by more than 1 %. Every efficiency is that of an independent replay",
+        "whose certificate holds (replay gap at most 1e-4); the class is explained in docs/gait_classes.md. Local optima of",
+        "few starts: a class may hold better ones.",
     ]
     if links > 3:
         lines.append('"Fewer links": the best gait of the class with one link less, laid into the longer chain.')

@@ -23,7 +23,7 @@ from colloc.gait_fields import AnyGait, fields, gait_from
 from colloc.machine_code import compiler
 from colloc.optimise import maximise_efficiency
 from colloc.path_samples import path_length
-from colloc.prolongation import RESTARTS, delta_in, maximise_from, over_links
+from colloc.prolongation import RESTARTS, delta_in, laid_into, maximise_from, over_links
 from colloc.replaced_file import replaced_file
 from scripts.class_report import DELTA, best, load, store, write
 from scripts.class_rows import FEWER, Row, equal_links, named_gait, rows
@@ -51,9 +51,9 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
     result: dict = {"status": "too long", "message": ""}
     try:
         delta = delta_in(row.gait_class, guess, DELTA)
-        stated = Problem(
-            "class", guess, equal_links(links), friction, row.gait_class, delta, RESTARTS[-1] * delta, intervals=row.intervals
-        )
+        body = equal_links(links)
+        start = laid_into(row.gait_class, guess, body)
+        stated = Problem("class", start, body, friction, row.gait_class, delta, RESTARTS[-1] * delta, intervals=row.intervals)
         compiled(links, friction, type(row.gait_class), stated)
         if known is None:
             solution = maximise_efficiency(stated, watch)

@@ -7,6 +7,7 @@ import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Harmonic, Polygon, Problem, ellipse, prolongation
 from colloc.contact import crossing_depth
+from colloc.errors import ProblemError
 from colloc.optimise import maximise_efficiency
 from colloc.path_start import nearest_parameters, transcribed
 from colloc.prolongation import maximise_from, over_links, prolonged
@@ -68,6 +69,17 @@ def test_a_large_gait_is_admissible_in_any_chain(lengths):
     assert np.abs(angles).max() <= np.pi
     assert crossing_depth(Chain(lengths), angles).max() == 0
     np.testing.assert_allclose(angles, -angles[::-1, ::-1], atol=1e-12)
+
+
+def test_a_truncated_path_that_overshoots_its_limits_starts_a_search_all_the_same():
+    square = Corners(np.array([[3.1, 3.1, -3.1, -3.1], [-0.6, 0.6, 0.6, -0.6]]))
+    problem = Problem("square", square, gait=Polygon(4), intervals=16)
+    stated = prolonged(problem, square, Harmonic(3))
+    angles = stated.guess.angles(PHASES)
+    assert 3.0 < np.abs(angles).max() <= np.pi
+    assert crossing_depth(THREE, angles).max() == 0
+    with pytest.raises(ProblemError, match="beyond the limit"):
+        problem.with_(gait=Harmonic(3))
 
 
 @pytest.mark.parametrize(
