@@ -69,8 +69,10 @@ def chain_rows(links: int) -> dict[str, Row]:
     few = starts[:2]
     harmonics = (1, 2, 3, 4, 6) if links == 4 else (1, 2, 3, 4)
     for before, n in zip((0, *harmonics), harmonics, strict=False):
-        seeds = [FEWER, *(starts if n < 4 else few)] + ([f"harmonics {before}"] if before else [])
-        result[f"harmonics {n}"] = Row(Harmonic(n, "bilateral"), 24 + 6 * n, [*seeds, *(["curvature 8"] if n > 1 else [])])
+        seeds = [FEWER, *(starts if n < 4 else few)]
+        if before:
+            seeds += [f"harmonics {before}", "curvature 8", "corners 6 corner"]
+        result[f"harmonics {n}"] = Row(Harmonic(n, "bilateral"), 24 + 6 * n, seeds)
     for before, k in zip((0, 1, 2, 4), (1, 2, 4, 8), strict=True):
         seeds = [f"curvature {before}"] if before else []
         near = f"harmonics {1 if k == 1 else 2 if k == 2 else 4}"

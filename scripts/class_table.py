@@ -25,6 +25,7 @@ from colloc.optimise import maximise_efficiency
 from colloc.path_samples import path_length
 from colloc.prolongation import RESTARTS, delta_in, laid_into, maximise_from, over_links
 from colloc.replaced_file import replaced_file
+from colloc.solution import Solution
 from scripts.class_report import DELTA, best, load, store, write
 from scripts.class_rows import FEWER, Row, equal_links, named_gait, rows
 
@@ -40,7 +41,8 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
     """One search, as plain numbers: status, and what the certificate says of the gait found.
 
     `known` is the efficiency of the guess if that is an optimum of a class with as many links. Where delta is found to matter
-    too much, as it does to polygons that are as small as they may be, the search goes on at `SMALLER` times that.
+    too much, as it does to gaits that are as small as they may be, the search goes on at the delta that belongs to the
+    length of the path found, then at `SMALLER` times that.
     """
     begin = time.process_time()
 
@@ -59,9 +61,10 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
             solution = maximise_efficiency(stated, watch)
         else:
             solution = maximise_from(stated, guess, row.gait_class, known, watch)
-        if solution.certificate is not None and any(c.name.startswith("delta") for c in solution.certificate.failures):
-            less = stated.with_(guess=solution.gait, delta=SMALLER * delta, delta_start=delta)
-            solution = maximise_efficiency(less, watch)
+        for unit in (DELTA, SMALLER * DELTA):
+            less, at = delta_in(row.gait_class, solution.gait, unit), solution.problem.delta
+            if less < 0.5 * at and delta_matters(solution):
+                solution = maximise_efficiency(stated.with_(guess=solution.gait, delta=less, delta_start=at), watch)
     except TooLong:
         pass
     except CollocError as error:
@@ -75,6 +78,11 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
             gap = next(check.value for check in c.checks if check.name == "replay gap")
             result |= {"replay gap": gap, "intervals": int(solution.mesh.n), "length": path_length(solution.gait)}
     return result | {"cpu seconds": time.process_time() - begin}
+
+
+def delta_matters(solution: Solution) -> bool:
+    """Whether the certificate says that delta changes the efficiency by too much."""
+    return solution.certificate is not None and any(c.name.startswith("delta") for c in solution.certificate.failures)
 
 
 _compiled: set[tuple[int, Friction, type]] = set()
