@@ -158,16 +158,16 @@ class Solver(Generic[AnyProgram]):
         """
         result = self._solve_within(x, delta, multipliers, radius, iterations)
         own = self.transcription.layout.parameters[:, 0]
-        here = radius
+        here, widest = radius, _WIDEST
         for count in range(_REGIONS):
             if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * here:
                 return result
             x = result.x
             if count >= _ALIKE:
-                here = max(radius, min(2 * here, _WIDEST))
+                here = max(radius, min(2 * here, widest))
             result = self._solve_within(x, delta, None, here, iterations).accumulated(result)
             if not result.optimal and here > radius:
-                here = radius
+                here = widest = radius  # kinks are too many further out
                 result = self._solve_within(x, delta, None, here, iterations).accumulated(result)
         return replace(result, complementarity=np.inf, status="still moving")
 

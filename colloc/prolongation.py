@@ -31,6 +31,8 @@ RESTARTS = (10.0, 100.0)
 """A search from an optimum of another class begins at so many times the final delta; the second if the first one lost it."""
 _KEPT = 1e-4
 """Relative loss of efficiency by which an optimum counts as lost."""
+_ENOUGH = 1.001
+_PHASES = np.linspace(0.0, 1.0, 1001)
 _CORNERS = 200
 """Vertices by which a path of arcs is laid into a chain of other links."""
 
@@ -55,7 +57,7 @@ def over_links(gait: AnyGait, body: Chain, other: Chain, joint_limit: float = fl
     overlap = np.minimum(others[1:, None], ends[1:]) - np.maximum(others[:-1, None], ends[:-1])
     means = np.maximum(overlap, 0.0) / other.length_column()
     matrix = np.diff(means @ np.tril(np.ones((body.n_link, body.n_joint)), -1), axis=0)
-    angles = matrix @ gait.angles(np.linspace(0.0, 1.0, 1001))
+    angles = matrix @ gait.angles(_PHASES)
     matrix = matrix * min(1.0, largest_factor(other, joint_limit, angles))
     if isinstance(gait, Fourier):
         return Fourier(matrix @ gait.mean, matrix @ gait.cos, matrix @ gait.sin)
@@ -66,15 +68,24 @@ def over_links(gait: AnyGait, body: Chain, other: Chain, joint_limit: float = fl
     return Corners(vertices[:, :-1] if gait.symmetry == "none" else vertices, gait.symmetry)
 
 
-def laid_into(gait_class: AnyClass, gait: AnyGait, body: Chain, joint_limit: float = float(np.pi)) -> AnyGait:
-    """The gait that starts a search in a class: its Fourier series for harmonics, shrunk until admissible; else itself.
+def laid_into(
+    gait_class: AnyClass, gait: AnyGait, body: Chain, joint_limit: float = float(np.pi), smallest_shape_speed: float = 0.1
+) -> AnyGait:
+    """The gait that starts a search in a class: its Fourier series for harmonics, else itself, made admissible.
 
-    A truncated series overshoots, and a path that touches its limits is no longer admissible then.
+    A truncated series overshoots, and a path that touches its limits is no longer admissible then: all angles shrink. It cuts
+    corners, and a path as short as it may be becomes too short: it grows about its mean.
     """
-    if not isinstance(gait_class, Harmonic) or isinstance(gait, Fourier):
-        return gait
-    near = fourier_through(gait, gait_class)
-    factor = min(1.0, largest_factor(body, joint_limit, near.angles(np.linspace(0.0, 1.0, 1001))))
+    near = fourier_through(gait, gait_class) if isinstance(gait_class, Harmonic) else gait
+    growth = _ENOUGH * 2 * np.pi * smallest_shape_speed / path_length(near)
+    if growth > 1 and isinstance(near, Fourier):
+        near = Fourier(near.mean, growth * near.cos, growth * near.sin)
+    elif growth > 1 and isinstance(near, Corners):
+        mean = near.angles(_PHASES[:-1]).mean(axis=1, keepdims=True)
+        near = Corners(mean + growth * (near.corners - mean), near.symmetry)
+    if near is gait or not isinstance(near, Fourier):
+        return near
+    factor = min(1.0, largest_factor(body, joint_limit, near.angles(_PHASES)))
     return Fourier(factor * near.mean, factor * near.cos, factor * near.sin)
 
 
@@ -87,7 +98,7 @@ def prolonged(
     changed too (``intervals=...``).
     """
     delta = delta_in(gait_class, gait, delta_at_unit_speed(problem))
-    guess = laid_into(gait_class, gait, problem.body, problem.joint_limit)
+    guess = laid_into(gait_class, gait, problem.body, problem.joint_limit, problem.smallest_shape_speed)
     stated = {"guess": guess, "gait": gait_class, "delta": delta, "delta_start": restart * delta}
     return problem.with_(**(stated | changes))
 

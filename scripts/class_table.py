@@ -77,7 +77,7 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
             result |= {"at zero delta": c.efficiency_at_zero_delta, "delta": solution.problem.delta}
             gap = next(check.value for check in c.checks if check.name == "replay gap")
             result |= {"replay gap": gap, "intervals": int(solution.mesh.n), "length": path_length(solution.gait)}
-    return result | {"cpu seconds": time.process_time() - begin}
+    return result | {"cpu seconds": time.process_time() - begin, "seed": known}
 
 
 def delta_matters(solution: Solution) -> bool:
@@ -107,14 +107,23 @@ def keep(links: int, friction: str, row: str, seed: str, result: dict) -> None:
 def attempts_left(
     listed: dict[str, Row], links: int, friction: str, only: str
 ) -> Iterator[tuple[str, str, AnyGait, float | None]]:
-    """Rows and starts not tried yet whose start is known by now (rows that come later may make more of them known)."""
+    """Rows and starts not tried yet whose start is known by now (rows that come later may make more of them known).
+
+    Starts from other rows are tried again when these have improved.
+    """
     for row, (_, _, seeds) in listed.items():
         for seed in seeds if only in row else []:
-            if seed in load(links).get(friction, {}).get(row, {}):
+            tried = load(links).get(friction, {}).get(row, {}).get(seed)
+            if tried is not None and seed not in listed:
                 continue
             found = guess(listed, links, friction, row, seed)
-            if found is not None:
+            if found is not None and (tried is None or better(found[1], tried.get("seed", np.inf))):
                 yield row, seed, *found
+
+
+def better(efficiency: float | None, known: float | None) -> bool:
+    """Whether the optimum that is a start has improved since it was last tried."""
+    return efficiency is not None and known is not None and efficiency > known * (1 + 1e-4)
 
 
 def guess(listed: dict[str, Row], links: int, friction: str, row: str, seed: str) -> tuple[AnyGait, float | None] | None:

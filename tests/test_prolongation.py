@@ -9,8 +9,9 @@ from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Harmonic, Polygon
 from colloc.contact import crossing_depth
 from colloc.errors import ProblemError
 from colloc.optimise import maximise_efficiency
+from colloc.path_samples import path_length
 from colloc.path_start import nearest_parameters, transcribed
-from colloc.prolongation import maximise_from, over_links, prolonged
+from colloc.prolongation import laid_into, maximise_from, over_links, prolonged
 from colloc.symmetry import SYMMETRIES
 
 THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
@@ -80,6 +81,18 @@ def test_a_truncated_path_that_overshoots_its_limits_starts_a_search_all_the_sam
     assert crossing_depth(THREE, angles).max() == 0
     with pytest.raises(ProblemError, match="beyond the limit"):
         problem.with_(gait=Harmonic(3))
+
+
+@pytest.mark.parametrize("symmetry", ["none", "bilateral"])
+@pytest.mark.parametrize("gait_class", [Harmonic, Polygon])
+def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class):
+    corners = {"none": [[0.4, 0.5, 0.6], [0.2, 0.1, 0.3]], "bilateral": [[0.4, 0.5, 0.45], [-0.4, -0.42, -0.45]]}
+    small = Corners(np.array(corners[symmetry]), symmetry)
+    laid = laid_into(gait_class(3, symmetry), small, THREE)
+    assert path_length(laid) == pytest.approx(0.2 * np.pi, rel=2e-3)
+    np.testing.assert_allclose(laid.angles(PHASES[:-1]).mean(axis=1), small.angles(PHASES[:-1]).mean(axis=1), atol=1e-3)
+    if symmetry == "bilateral":
+        np.testing.assert_allclose(laid.angles(PHASES), -laid.angles(-PHASES)[::-1], atol=1e-9)
 
 
 @pytest.mark.parametrize(
