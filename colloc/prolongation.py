@@ -31,7 +31,8 @@ RESTARTS = (10.0, 100.0)
 """A search from an optimum of another class begins at so many times the final delta; the second if the first one lost it."""
 _KEPT = 1e-4
 """Relative loss of efficiency by which an optimum counts as lost."""
-_ENOUGH = 1.001
+_SHORT = 1.002
+"""An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
 _PHASES = np.linspace(0.0, 1.0, 1001)
 _CORNERS = 200
 """Vertices by which a path of arcs is laid into a chain of other links."""
@@ -77,10 +78,10 @@ def laid_into(
     corners, and a path as short as it may be becomes too short: it grows about its mean.
     """
     near = fourier_through(gait, gait_class) if isinstance(gait_class, Harmonic) else gait
-    growth = _ENOUGH * 2 * np.pi * smallest_shape_speed / path_length(near)
-    if growth > 1 and isinstance(near, Fourier):
+    growth = 2 * np.pi * smallest_shape_speed / path_length(near)
+    if growth > _SHORT and isinstance(near, Fourier):
         near = Fourier(near.mean, growth * near.cos, growth * near.sin)
-    elif growth > 1 and isinstance(near, Corners):
+    elif growth > _SHORT and isinstance(near, Corners):
         mean = near.angles(_PHASES[:-1]).mean(axis=1, keepdims=True)
         near = Corners(mean + growth * (near.corners - mean), near.symmetry)
     if near is gait or not isinstance(near, Fourier):

@@ -25,6 +25,8 @@ KEPT = {
     "gallery": "python -m scripts.gallery",
     "mesh_tolerance.md": "python -m benchmarks --only mesh_tolerance",
     "gait_classes.md": "python -m scripts.class_table",
+    "gait_classes_4.md": "python -m scripts.class_table --links 4",
+    "gait_classes_5.md": "python -m scripts.class_table --links 5",
     "gait_classes.png": "python -m scripts.class_table",
     "gait_classes.pdf": "python -m scripts.class_table",
     "chains.md": "python -m benchmarks.chains --starts 4",
