@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Harmonic, Polygon, Problem, ellipse, prolongation
+from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse, prolongation
 from colloc.contact import crossing_depth
 from colloc.errors import ProblemError
 from colloc.optimise import maximise_efficiency
@@ -13,6 +13,7 @@ from colloc.path_samples import path_length
 from colloc.path_start import nearest_parameters, transcribed
 from colloc.prolongation import laid_into, maximise_from, over_links, prolonged
 from colloc.symmetry import SYMMETRIES
+from scripts.class_rows import FEWER, equal_links, named_gait, rows
 
 THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
 PHASES = np.linspace(0.0, 1.0, 101)
@@ -146,3 +147,17 @@ def test_where_a_near_start_fails_one_from_afar_is_tried():
     solution = maximise_from(problem, hexagon, Polygon(8, "bilateral"), 0.40154, intervals=80)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4015
+
+
+@pytest.mark.parametrize("links", [3, 4, 5])
+def test_every_richer_class_of_the_tables_starts_from_a_poorer_one(links):
+    listed = rows(links, False)
+    named = {"large loop", "middle loop", "small triangle", "best small gait", "fold", FEWER, *(f"start {k}" for k in range(6))}
+    for name, row in listed.items():
+        kind, number, *rest = name.split()
+        assert set(row.seeds) <= named | set(listed), name
+        assert len(set(row.seeds)) == len(row.seeds)
+        poorer = [other for other in listed if other.split()[0] == kind and int(other.split()[1]) < int(number)]
+        if poorer and not (kind == "corners" and rest == ["side"]):
+            assert set(row.seeds) & set(poorer), name
+        Problem("p", named_gait("start 0", links, Friction(), row.gait_class), equal_links(links), intervals=row.intervals)
