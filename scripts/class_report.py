@@ -1,7 +1,7 @@
 """The table and figure of `scripts.class_table`, from the attempts kept so far: python -m scripts.class_report [--links 3]
 
 Reads results/class_table.json; writes results/curated/gait_classes.md and gait_classes.png and .pdf beside it. For four
-links: class_table_4.json and gait_classes_4.md, without a figure; so for more.
+links: class_table_4.json, gait_classes_4.md and a figure of bodies; so for more.
 """
 
 from __future__ import annotations
@@ -14,15 +14,19 @@ import numpy as np
 
 from colloc import Chain, Friction
 from colloc.bound import QUICK, known_bound
-from colloc.figures_classes import GaitPanel, save_gait_panels
+from colloc.figures_classes import GaitPanel, save_body_strips, save_gait_panels
 from colloc.gait_fields import gait_from
 from colloc.infinitesimal import small_gait
 from scripts.bound_table import BUDGET
-from scripts.class_rows import known_small_gait
+from scripts.class_rows import equal_links, known_small_gait
 
 CURATED = Path("results/curated")
 DELTA = 1e-4
 """At unit shape speed, for every class."""
+SHOWN_CHAINS = (
+    *("harmonics 1", "harmonics 2", "harmonics 4", "curvature 1", "curvature 8", "corners 4 side", "corners 6 corner"),
+    "corners 6 free",
+)
 SHOWN = ("harmonics 1", "harmonics 2", "harmonics 4", "curvature 2", "curvature 8", "corners 3", "corners 4 free")
 
 
@@ -148,22 +152,23 @@ def write(links: int, known: dict) -> None:
         lines += table(links, friction, known[friction])
     CURATED.mkdir(parents=True, exist_ok=True)
     (CURATED / f"gait_classes{suffix(links)}.md").write_text("\n".join(lines), encoding="utf-8")
-    if links == 3:
-        draw(known)
+    draw(links, known)
 
 
-def draw(known: dict) -> None:
-    """The figure: paths and bodies of some rows."""
+def draw(links: int, known: dict) -> None:
+    """The figure: paths and bodies of some rows, or bodies alone where paths lie in no plane."""
     panels = []
-    for row in SHOWN:
+    for row in SHOWN if links == 3 else SHOWN_CHAINS:
         found = best(known.get("1,1,1", {}).get(row, {}))
         if found is not None:
             title = (
                 f"{class_words(row).replace(', bilateral', '')}\nd/W = {found['efficiency']:.4f}, d = {found['distance']:.3f}"
             )
-            panels.append(GaitPanel(title, gait_from(found["gait"])))
-    if panels:
+            panels.append(GaitPanel(title if links == 3 else title.replace("\n", ": "), gait_from(found["gait"])))
+    if panels and links == 3:
         save_gait_panels(panels, CURATED / "gait_classes.png")
+    elif panels:
+        save_body_strips(panels, equal_links(links), CURATED / f"gait_classes{suffix(links)}.png")
 
 
 def main() -> None:

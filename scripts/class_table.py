@@ -3,7 +3,7 @@
 Solves one class after another, each from a few starts: optima of neighbouring classes and of fewer links (prolongation),
 random gaits, hand-made ones, and the best infinitesimal gaits; `scripts.class_rows` lists them. Resumable: attempts are kept
 in results/class_table.json (class_table_4.json for four links) and not repeated. Writes results/curated/gait_classes.md
-(gait_classes_4.md) and, for three links, the figure beside it (--table only writes them, like python -m scripts.class_report).
+(gait_classes_4.md) and the figure beside it (--table only writes them, like python -m scripts.class_report).
 """
 
 from __future__ import annotations
