@@ -38,8 +38,8 @@ def _draw_bodies(axes: Any, body: Chain, gait: Gait, apart: float = 0.8) -> None
     x, y = body.joints(gait.angles(t))
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     for k, colour in enumerate(matplotlib.colormaps["viridis"](t)):
-        axes.plot(x[:, k] + apart * k, y[:, k], color=colour, lw=1.6, solid_capstyle="round")
-        axes.plot(x[-1:, k] + apart * k, y[-1:, k], "o", color=colour, ms=2.5)
+        axes.plot(x[:, k] + apart * k, y[:, k], color=colour, lw=1.6, solid_capstyle="round", clip_on=False)
+        axes.plot(x[-1:, k] + apart * k, y[-1:, k], "o", color=colour, ms=2.5, clip_on=False)
     axes.set_aspect("equal")
     axes.set_axis_off()
 
