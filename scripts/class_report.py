@@ -119,8 +119,8 @@ def chain_bound_line(links: int, friction: Friction) -> str:
     words = [f"{g.efficiency:.4f} at ({', '.join(f'{a:g}' for a in shape)})" for g, shape in reached.values()]
     return (
         f"Upper bound on every gait: {1 / friction.smallest:.4g} = 1/min(mu); the program of a smaller one does not finish for "
-        f"more than three links (docs/bound.md). Infinitesimal gaits, those from which searches start, reach {words[0]} and, "
-        f"near a fold, {words[1]}."
+        "more than three links (docs/bound.md). Infinitesimal gaits on a coarse grid of shapes, from which searches start, "
+        f"reach {words[0]} and, near a fold, {words[1]}."
     )
 
 
