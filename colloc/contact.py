@@ -24,7 +24,7 @@ Pairs = tuple[tuple[int, int], ...]
 SMOOTHING = 1e-3
 """Width [rad] of the smoothed minimum; it errs to the safe side, by at most half of this."""
 CLEARANCE_SMOOTHING = 2e-4
-"""Width [body lengths] of smoothed absolute values and maxima; they err to the safe side, by at most 1.5 times this."""
+"""Width [body lengths] of smoothed absolute values and minima; they err to the safe side, by at most twice this."""
 
 
 def _subtended(angle: Array, link: float, middle: float) -> Array:
@@ -47,20 +47,20 @@ def crossing_sums(body: Chain, angles: Array) -> list[tuple[Array, Array]]:
     return sums
 
 
-def smooth_minimum(first: Array, second: Array) -> Array:
-    """The smaller of two values, or up to half of `SMOOTHING` more where they are equal."""
+def smooth_minimum(first: Array, second: Array, width: float = SMOOTHING) -> Array:
+    """The smaller of two values, or up to half of `width` more where they are equal."""
     gap = first - second
-    spread = namespace(gap).sqrt(gap * gap + SMOOTHING * SMOOTHING) - SMOOTHING
+    spread = namespace(gap).sqrt(gap * gap + width * width) - width
     return 0.5 * (first + second) - 0.5 * spread
 
 
-def share_of_first(first: Array, second: Array) -> Array:
+def share_of_first(first: Array, second: Array, width: float = SMOOTHING) -> Array:
     """Derivative of `smooth_minimum` in its first argument; that in the second makes up 1."""
     gap = first - second
-    return 0.5 - 0.5 * gap / namespace(gap).sqrt(gap * gap + SMOOTHING * SMOOTHING)
+    return 0.5 - 0.5 * gap / namespace(gap).sqrt(gap * gap + width * width)
 
 
-def tangent_of_minimum(first: Array, second: Array, share: Array) -> Array:
+def tangent_of_minimum(first: Array, second: Array, share: Array, width: float = SMOOTHING) -> Array:
     """The tangent plane of `smooth_minimum` that has the slope `share` in the first argument; never below the minimum.
 
     Where a path rounds the corner at which both sums are pi, the smaller sum has a peak with a kink, and the instant of the
@@ -69,7 +69,7 @@ def tangent_of_minimum(first: Array, second: Array, share: Array) -> Array:
     """
     share_of_second = 1.0 - share
     bulge = 0.5 - namespace(share).sqrt(share * share_of_second)
-    return share * first + share_of_second * second + SMOOTHING * bulge
+    return share * first + share_of_second * second + width * bulge
 
 
 def crossing_bounds(body: Chain, angles: Array) -> Array | None:
@@ -90,18 +90,22 @@ def far_pairs(body: Chain) -> list[tuple[int, int]]:
     return [(i, j) for i in range(body.n_link) for j in range(i + 3, body.n_link)]
 
 
+def intrusions(body: Chain, angles: Array, first: int, second: int) -> tuple[Array, Array]:
+    """Two smooth functions that are both > 0 where links `first` < `second` cross [body lengths]; ``(1, n_time)`` each.
+
+    With m and d the mean and half the difference of the distances of one link's ends from the other's line, that link
+    lies on one side iff ``|d| - |m| <= 0``; this for one link, and for the other.
+    """
+    return -_side(body, angles, first, second), -_side(body, angles, second, first)
+
+
 def clearance(body: Chain, angles: Array, first: int, second: int) -> Array:
     """A smooth function that is >= 0 only where links `first` < `second` do not cross [body lengths], ``(1, n_time)``.
 
-    With m and d the mean and half the difference of the distances of one link's ends from the other's line, that link
-    lies on one side iff ``|m| - |d| >= 0``. Two segments cross iff neither lies on one side of the other: the larger of
-    the two values is the clearance. Smoothing also closes the gap through which parallel links would slip through each
-    other at one instant, when both ends pass at once.
+    Two segments cross iff neither lies on one side of the other: the smaller of the two `intrusions` decides. Smoothing also
+    closes the gap through which parallel links would slip through each other at one instant, when both ends pass at once.
     """
-    xp = namespace(angles)
-    one = _side(body, angles, first, second)
-    other = _side(body, angles, second, first)
-    return 0.5 * (one + other) + 0.5 * _smooth_abs(xp, one - other)
+    return -smooth_minimum(*intrusions(body, angles, first, second), CLEARANCE_SMOOTHING)
 
 
 def _smooth_abs(xp, value: Array) -> Array:

@@ -15,7 +15,7 @@ from colloc.path_samples import Gait
 
 
 class GaitPanel(NamedTuple):
-    """A gait of two joints and what to write above it."""
+    """A gait and what to write above it."""
 
     title: str
     gait: Gait
@@ -33,13 +33,13 @@ def _draw_path(axes: Any, gait: Gait, limits: tuple[np.ndarray, float]) -> None:
     axes.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] - half, centre[1] + half), aspect="equal")
 
 
-def _draw_bodies(axes: Any, body: Chain, gait: Gait) -> None:
+def _draw_bodies(axes: Any, body: Chain, gait: Gait, apart: float = 0.8) -> None:
     t = np.arange(_SNAPSHOTS) / _SNAPSHOTS
     x, y = body.joints(gait.angles(t))
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     for k, colour in enumerate(matplotlib.colormaps["viridis"](t)):
-        axes.plot(x[:, k] + 0.8 * k, y[:, k], color=colour, lw=1.6, solid_capstyle="round")
-        axes.plot(x[-1:, k] + 0.8 * k, y[-1:, k], "o", color=colour, ms=2.5)
+        axes.plot(x[:, k] + apart * k, y[:, k], color=colour, lw=1.6, solid_capstyle="round", clip_on=False)
+        axes.plot(x[-1:, k] + apart * k, y[-1:, k], "o", color=colour, ms=2.5, clip_on=False)
     axes.set_aspect("equal")
     axes.set_axis_off()
 
@@ -75,6 +75,24 @@ def gait_panels(panels: list[GaitPanel], body: Chain | None = None) -> Figure:
                     spine.set_color(RED)
             _draw_bodies(figure.add_subplot(grid[2 * row + 1, column]), body, panel.gait)
     return figure
+
+
+def body_strips(panels: list[GaitPanel], body: Chain) -> Figure:
+    """A figure of bodies of any number of links along their gaits, equal steps in phase, two gaits a row."""
+    columns = min(2, len(panels))
+    rows = -(-len(panels) // columns)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(5.2 * columns, 1.15 * rows), layout="constrained")
+        for k, panel in enumerate(panels):
+            axes = figure.add_subplot(rows, columns, k + 1)
+            _draw_bodies(axes, body, panel.gait, 1.1)
+            axes.set_title(panel.title, fontsize=8)
+    return figure
+
+
+def save_body_strips(panels: list[GaitPanel], body: Chain, path: Path) -> None:
+    """Save `body_strips` as PNG and PDF."""
+    save_figure(body_strips(panels, body), path)
 
 
 def save_gait_panels(panels: list[GaitPanel], path: Path) -> None:

@@ -37,7 +37,7 @@ Gaits of more parameters need more."""
 _RETRIES = 2
 """A gait of many parameters that has not converged on a refined mesh after a few dozen iterations follows a kink in tiny
 steps. Hundreds more rarely help; going on from its last gait, projected back onto the balance, within half the trust region,
-does."""
+does. So it does for paths right after pairs of links were found to cross, where the start is far from the optimum."""
 _EXCHANGES = 4
 _ADMISSIBLE = 1e-8
 OTHER_MESH = 1.15
@@ -138,6 +138,7 @@ class Run:
         iterations = NEXT_ITERATIONS if self.track and not self.patient else None
         result = self.solver.solve(x, delta, multipliers, radius, iterations)
         stuck = self.rich and bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta == delta
+        stuck = stuck or (start is not None and self.problem.has_path)
         for _ in range(_RETRIES if stuck else 0):
             if result.optimal or not np.isfinite(result.x).all():
                 break

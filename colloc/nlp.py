@@ -101,7 +101,10 @@ class NlpResult:
 
 OPTIMAL_TOLERANCE = 1e-6
 AnyProgram = TypeVar("AnyProgram", bound=Program)
-_REGIONS = 20
+_REGIONS, _ALIKE, _WIDEST = 20, 3, 1.0
+"""Trust regions that may follow each other, and how many of them have the first one's radius. A gait that still moves then is
+not near its optimum at all (paths of three joints, whose basins end between deltas, go 2 rad and more), so regions double,
+up to the widest [rad]."""
 _INSIDE = 0.999
 """A point nearer to the edge of its trust region than this is on it: the barrier keeps off an active bound by its tolerance
 over the multiplier, which is small where efficiency is flat."""
@@ -155,11 +158,17 @@ class Solver(Generic[AnyProgram]):
         """
         result = self._solve_within(x, delta, multipliers, radius, iterations)
         own = self.transcription.layout.parameters[:, 0]
-        for _ in range(_REGIONS):
-            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * radius:
+        here, widest = radius, _WIDEST
+        for count in range(_REGIONS):
+            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * here:
                 return result
             x = result.x
-            result = self._solve_within(x, delta, None, radius, iterations).accumulated(result)
+            if count >= _ALIKE:
+                here = max(radius, min(2 * here, widest))
+            result = self._solve_within(x, delta, None, here, iterations).accumulated(result)
+            if not result.optimal and here > radius:
+                here = widest = radius  # kinks are too many further out
+                result = self._solve_within(x, delta, None, here, iterations).accumulated(result)
         return replace(result, complementarity=np.inf, status="still moving")
 
     def _solve_within(

@@ -7,6 +7,8 @@ body, from the NumPy solver, with derivatives by the implicit function theorem (
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -64,8 +66,13 @@ def side(n_joint: int) -> Piece:
     return Piece(ca.vertcat(a, b), ca.vertcat(sigma, gain), a + sigma * step, step / length, gain * length)
 
 
-def path_point(body: Chain, friction: Friction, piece: Piece) -> LocalFunction:
-    """Rotation rate, velocity of the centre of mass along the lab's x, and power. Locals: theta, then the piece's shape."""
+@lru_cache(maxsize=32)
+def path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+    """Rotation rate, velocity of the centre of mass along the lab's x, and power. Locals: theta, then the piece's shape.
+
+    `kind` is `arc` or `side`. Differentiating takes most of the time in which a program is built, so it is done once.
+    """
+    piece = kind(body.n_joint)
     theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("Z", 3)
     now = instant(body, friction, piece.angles, piece.direction, z, delta)
     cx, cy = body.centre_velocity(now.posture, now.velocity)
@@ -104,7 +111,7 @@ def unit_norm(n_joint: int) -> LocalFunction:
 
 
 def excess_turn(n_joint: int, curvature: float) -> LocalFunction:
-    """How far unit tangents at both ends of an arc are apart, squared, beyond what the curvature allows.
+    """How far unit tangents at both ends of an arc are apart beyond what the curvature allows, as an angle.
 
     Locals: both tangents and the mean shape speed; given: the part of a period h that the arc takes. Half a turn an arc is the
     most that unit tangents can express.
@@ -112,7 +119,7 @@ def excess_turn(n_joint: int, curvature: float) -> LocalFunction:
     t0, t1 = ca.SX.sym("t0", n_joint), ca.SX.sym("t1", n_joint)
     speed, h = ca.SX.sym("speed"), ca.SX.sym("h")
     half = ca.fmin(np.pi * curvature * speed * h, 1.4)
-    out = 0.25 * ca.sumsqr(t1 - t0) - ca.sin(half) ** 2
+    out = 0.25 * ca.sumsqr(t1 - t0) / ca.sin(half) - ca.sin(half)
     return local_function("turn", ca.vertcat(t0, t1, speed), h, ca.SX.sym("delta"), out)
 
 

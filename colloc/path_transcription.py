@@ -24,7 +24,7 @@ from colloc.mesh import Mesh
 from colloc.path_class import FreePath
 from colloc.path_gait import ArcPath, Corners
 from colloc.path_geometry import PathGeometry, arc_geometry, side_geometry
-from colloc.path_kernels import ADVANCE, OMEGA, POWER, path_point, squared_distance
+from colloc.path_kernels import ADVANCE, OMEGA, POWER, arc, path_point, side, squared_distance
 from colloc.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.problem import Problem
 from colloc.shape_checks import ShapeCheck
@@ -144,7 +144,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     near, mesh = path_through(problem, gait, edges)
     layout = problem_layout(problem, mesh)
     geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near, far)
-    point = path_point(problem.body, problem.friction, geometry.piece)
+    point = path_point(problem.body, problem.friction, arc if isinstance(problem.gait, FreePath) else side)
     interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
     tau = np.tile(mesh.scheme.c, mesh.n)
     # a point that two intervals share would have two tangents at a corner: points of each interval are its own

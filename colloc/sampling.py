@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from colloc.body import Chain
 from colloc.contact import crossing_depth
 from colloc.errors import ProblemError
 from colloc.gait import Fourier, Harmonic
@@ -40,16 +41,20 @@ def is_admissible(problem: Problem, gait: Fourier) -> bool:
 
 def largest_amplitude(problem: Problem, gait: Fourier) -> float:
     """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for the straight body."""
-    angles = gait.angles(np.arange(_PHASES) / _PHASES)
+    return largest_factor(problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES))
+
+
+def largest_factor(body: Chain, joint_limit: float, angles: np.ndarray) -> float:
+    """The largest factor by which shapes ``(n_joint, n)`` can be multiplied and stay admissible; inf for straight ones."""
     peak = np.abs(angles).max()
     if peak == 0:
         return np.inf
-    low, high = 0.0, problem.joint_limit / peak
-    if not crossing_depth(problem.body, high * angles).any():
+    low, high = 0.0, joint_limit / peak
+    if not crossing_depth(body, high * angles).any():
         return high * _SAFE
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        crossing = bool(crossing_depth(problem.body, middle * angles).any())
+        crossing = bool(crossing_depth(body, middle * angles).any())
         low, high = (low, middle) if crossing else (middle, high)
     return low * _SAFE
 

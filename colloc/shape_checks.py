@@ -9,7 +9,15 @@ import casadi as ca
 import numpy as np
 
 from colloc.body import Chain
-from colloc.contact import clearance, crossing_sums, share_of_first, smooth_minimum, tangent_of_minimum
+from colloc.contact import (
+    CLEARANCE_SMOOTHING,
+    SMOOTHING,
+    crossing_sums,
+    intrusions,
+    share_of_first,
+    smooth_minimum,
+    tangent_of_minimum,
+)
 
 
 class ShapeCheck(NamedTuple):
@@ -37,7 +45,10 @@ def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[Shape
         name = f"links {i + 1} and {i + 3}"
         checks.append(_minimum_check(f"{name} (left)", angles, first - np.pi, second - np.pi))
         checks.append(_minimum_check(f"{name} (right)", angles, -first - np.pi, -second - np.pi))
-    checks += [_smooth_check(f"links {i + 1} and {j + 1}", angles, -clearance(body, angles, i, j)) for i, j in far]
+    for i, j in far:
+        checks.append(
+            _minimum_check(f"links {i + 1} and {j + 1}", angles, *intrusions(body, angles, i, j), CLEARANCE_SMOOTHING)
+        )
     return checks
 
 
@@ -47,12 +58,12 @@ def _smooth_check(name: str, angles: ca.SX, value: ca.SX) -> ShapeCheck:
     return ShapeCheck(name, ca.Function("check", [angles], [value]), none, ca.Function("cut", [angles, share], [value]))
 
 
-def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX) -> ShapeCheck:
-    value, share = smooth_minimum(first, second), ca.SX.sym("share")
-    cut = ca.if_else(share < 0, value, tangent_of_minimum(first, second, ca.fmax(share, 0)))
+def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX, width: float = SMOOTHING) -> ShapeCheck:
+    value, share = smooth_minimum(first, second, width), ca.SX.sym("share")
+    cut = ca.if_else(share < 0, value, tangent_of_minimum(first, second, ca.fmax(share, 0), width))
     return ShapeCheck(
         name,
         ca.Function("check", [angles], [value]),
-        ca.Function("share", [angles], [share_of_first(first, second)]),
+        ca.Function("share", [angles], [share_of_first(first, second, width)]),
         ca.Function("cut", [angles, share], [cut]),
     )

@@ -1,8 +1,9 @@
-"""Efficiency against class of gaits: python -m scripts.class_table [--friction 1,1,1] [--only WORD] [--seconds 60]
+"""Efficiency against class of gaits: python -m scripts.class_table [--links 3] [--friction 1,1,1] [--only WORD] [--seconds 60]
 
-Solves one class after another, each from a few starts: optima of neighbouring classes (prolongation), hand-made ones, and
-the best infinitesimal gaits. Resumable: attempts are kept in results/class_table.json and not repeated. Writes
-results/curated/gait_classes.md and the figure beside it (--table only writes them, like python -m scripts.class_report).
+Solves one class after another, each from a few starts: optima of neighbouring classes and of fewer links (prolongation),
+random gaits, hand-made ones, and the best infinitesimal gaits; `scripts.class_rows` lists them. Resumable: attempts are kept
+in results/class_table.json (class_table_4.json for four links) and not repeated. Writes results/curated/gait_classes.md
+(gait_classes_4.md) and the figure beside it (--table only writes them, like python -m scripts.class_report).
 """
 
 from __future__ import annotations
@@ -10,79 +11,40 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from colloc import Chain, Corners, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc import Friction, Problem
+from colloc.compiled_problem import compile_problem
 from colloc.errors import CollocError
-from colloc.gait_fields import fields, gait_from
-from colloc.infinitesimal import small_gait
+from colloc.gait_fields import AnyGait, fields, gait_from
+from colloc.machine_code import compiler
 from colloc.optimise import maximise_efficiency
 from colloc.path_samples import path_length
-from colloc.prolongation import delta_in
+from colloc.prolongation import RESTARTS, delta_in, laid_into, maximise_from, over_links
 from colloc.replaced_file import replaced_file
-from colloc.sampling import LATIN_HYPERCUBE, start_gait
-from scripts.class_report import STORE, best, load, write
+from colloc.solution import Solution
+from scripts.class_report import DELTA, best, load, store, write
+from scripts.class_rows import FEWER, Row, equal_links, named_gait, rows
 
-DELTA = 1e-4
-"""At unit shape speed, for every class."""
+SMALLER = 0.1
+"""Factor in delta where it changes the efficiency by more than a certificate allows."""
 
 
 class TooLong(Exception):
     """An attempt that took longer than it may."""
 
 
-def rows(short: bool) -> dict[str, tuple[object, int, list[str]]]:
-    """Classes by name: the class, mesh intervals, and where their searches start (names of rows, or of gaits)."""
-    result: dict[str, tuple[object, int, list[str]]] = {}
-    curvatures = (2, 8) if short else (1, 2, 4, 8, 16, 32)
-    for before, k in zip((0, *curvatures), curvatures, strict=False):
-        seeds = [f"curvature {before}"] if before else ["large loop"]
-        seeds += ["small triangle"] if k >= 8 else ["middle loop"]
-        result[f"curvature {k}"] = (FreePath(k, "bilateral"), 60 if k < 16 else 80, list(dict.fromkeys(seeds)))
-    harmonics = (1, 2, 4) if short else range(1, 9)
-    for n in harmonics:
-        seeds = [f"harmonics {m}" for m in harmonics if m < n][-1:]
-        seeds.append("large loop" if n == 1 else "curvature 8")
-        seeds += [f"start {k}" for k in range(4)] if n == 2 and not short else []
-        result[f"harmonics {n}"] = (Harmonic(n, "bilateral"), 30 + 6 * n, seeds)
-    corners = (3, 4) if short else range(3, 9)
-    for m in corners:
-        nearest = f"curvature {curvatures[-1]}"
-        for axis in ("corner",) if m % 2 else ("corner", "side"):
-            before = [f"corners {m - 1}{'' if (m - 1) % 2 else ' ' + axis}"] if m > 3 else ["small triangle"]
-            name = f"corners {m}{'' if m % 2 else ' ' + axis}"
-            result[name] = (Polygon(m, "bilateral", axis), 10 * m, [*before, nearest])
-        before = [f"corners {m - 1} free"] if m > 3 else ["best small gait"]
-        result[f"corners {m} free"] = (Polygon(m, "none"), 10 * m, [*before, "fold"])
-    return result
+def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: float | None, seconds: float) -> dict:
+    """One search, as plain numbers: status, and what the certificate says of the gait found.
 
-
-def named_gait(name: str, friction: Friction) -> object:
-    """A start by name."""
-    if name == "large loop":
-        return ellipse(0, 2.8, 1.3)
-    if name == "middle loop":
-        return ellipse(0, 1.8, 1.2)
-    if name == "small triangle":
-        return Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
-    if name.startswith("start"):
-        seeded = Problem("seeded", ellipse(0, 1, 1), gait=Harmonic(2, "bilateral"))
-        return start_gait(seeded, LATIN_HYPERCUBE, 0, int(name.split()[1]))
-    body, length = Chain(), 0.7
-    if name == "fold":
-        shape = np.array([3.0, -0.03])
-    else:
-        grid = [np.array([a, b]) for a in np.linspace(0.4, 2.8, 4) for b in np.linspace(-2.8, 2.8, 5)]
-        shape = max(grid, key=lambda s: small_gait(body, friction, s, directions=36, headings=4).efficiency)
-    return Corners(small_gait(body, friction, shape).path(shape, length))
-
-
-def attempt(gait_class: object, guess: object, friction: Friction, intervals: int, seconds: float) -> dict:
-    """One search, as plain numbers: status, and what the certificate says of the gait found."""
+    `known` is the efficiency of the guess if that is an optimum of a class with as many links. Where delta is found to matter
+    too much, as it does to gaits that are as small as they may be, the search goes on at the delta that belongs to the
+    length of the path found, then at `SMALLER` times that.
+    """
     begin = time.process_time()
-    delta = delta_in(gait_class, guess, DELTA)
 
     def watch(level: object) -> None:
         if time.process_time() - begin > seconds:
@@ -90,10 +52,19 @@ def attempt(gait_class: object, guess: object, friction: Friction, intervals: in
 
     result: dict = {"status": "too long", "message": ""}
     try:
-        stated = Problem(
-            "class", guess, friction=friction, gait=gait_class, delta=delta, delta_start=100 * delta, intervals=intervals
-        )
-        solution = maximise_efficiency(stated, watch)
+        delta = delta_in(row.gait_class, guess, DELTA)
+        body = equal_links(links)
+        start = laid_into(row.gait_class, guess, body)
+        stated = Problem("class", start, body, friction, row.gait_class, delta, RESTARTS[-1] * delta, intervals=row.intervals)
+        compiled(links, friction, type(row.gait_class), stated)
+        if known is None:
+            solution = maximise_efficiency(stated, watch)
+        else:
+            solution = maximise_from(stated, guess, row.gait_class, known, watch)
+        for unit in (DELTA, SMALLER * DELTA):
+            less, at = delta_in(row.gait_class, solution.gait, unit), solution.problem.delta
+            if less < 0.5 * at and delta_matters(solution):
+                solution = maximise_efficiency(stated.with_(guess=solution.gait, delta=less, delta_start=at), watch)
     except TooLong:
         pass
     except CollocError as error:
@@ -103,49 +74,94 @@ def attempt(gait_class: object, guess: object, friction: Friction, intervals: in
         if solution.certificate is not None:
             c = solution.certificate
             result |= {"efficiency": c.efficiency, "error": c.efficiency_error, "distance": c.distance, "work": c.work}
-            result |= {"at zero delta": c.efficiency_at_zero_delta, "delta": delta, "length": path_length(solution.gait)}
+            result |= {"at zero delta": c.efficiency_at_zero_delta, "delta": solution.problem.delta}
             gap = next(check.value for check in c.checks if check.name == "replay gap")
-            result |= {"replay gap": gap, "intervals": int(solution.mesh.n)}
-    return result | {"cpu seconds": time.process_time() - begin}
+            result |= {"replay gap": gap, "intervals": int(solution.mesh.n), "length": path_length(solution.gait)}
+    return result | {"cpu seconds": time.process_time() - begin, "seed": known}
 
 
-def keep(friction: str, row: str, seed: str, result: dict) -> dict:
+def delta_matters(solution: Solution) -> bool:
+    """Whether the certificate says that delta changes the efficiency by too much."""
+    return solution.certificate is not None and any(c.name.startswith("delta") for c in solution.certificate.failures)
+
+
+_compiled: set[tuple[int, Friction, type]] = set()
+
+
+def compiled(links: int, friction: Friction, kind: type, stated: Problem) -> None:
+    """Puts the machine code of a kind of classes into its folder, if it can be made."""
+    if (links, friction, kind) not in _compiled and compiler() is not None:
+        compile_problem(stated)
+        _compiled.add((links, friction, kind))
+
+
+def keep(links: int, friction: str, row: str, seed: str, result: dict) -> None:
     """Adds an attempt to the store; what other runs have added meanwhile stays."""
-    known = load()
+    known = load(links)
     known.setdefault(friction, {}).setdefault(row, {})[seed] = result
-    STORE.parent.mkdir(exist_ok=True)
-    with replaced_file(STORE) as temporary:
+    store(links).parent.mkdir(exist_ok=True)
+    with replaced_file(store(links)) as temporary:
         Path(temporary).write_text(json.dumps(known))
-    return known
+
+
+def attempts_left(
+    listed: dict[str, Row], links: int, friction: str, only: str
+) -> Iterator[tuple[str, str, AnyGait, float | None]]:
+    """Rows and starts not tried yet whose start is known by now (rows that come later may make more of them known).
+
+    Starts from other rows are tried again when these have improved.
+    """
+    for row, (_, _, seeds) in listed.items():
+        for seed in seeds if only in row else []:
+            tried = load(links).get(friction, {}).get(row, {}).get(seed)
+            if tried is not None and seed not in listed:
+                continue
+            found = guess(listed, links, friction, row, seed)
+            if found is not None and (tried is None or better(found[1], tried.get("seed", np.inf))):
+                yield row, seed, *found
+
+
+def better(efficiency: float | None, known: float | None) -> bool:
+    """Whether the optimum that is a start has improved since it was last tried."""
+    return efficiency is not None and known is not None and efficiency > known * (1 + 1e-4)
+
+
+def guess(listed: dict[str, Row], links: int, friction: str, row: str, seed: str) -> tuple[AnyGait, float | None] | None:
+    """A start and, if it is an optimum of a class with as many links, its efficiency; None as long as it is not known."""
+    law = Friction(*(float(mu) for mu in friction.split(",")))
+    if seed == FEWER:
+        fewer = best(load(links - 1).get(friction, {}).get(row, {}))
+        chains = equal_links(links - 1), equal_links(links)
+        return None if fewer is None else (over_links(gait_from(fewer["gait"]), *chains), None)
+    if seed not in listed:
+        return named_gait(seed, links, law, listed[row].gait_class), None
+    found = best(load(links).get(friction, {}).get(seed, {}))
+    return None if found is None else (gait_from(found["gait"]), found["efficiency"])
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--links", type=int, default=3, help="equal links, 3 or more (default: 3)")
     parser.add_argument("--friction", default="1,1,1", help="mu_t,mu_f,mu_b")
     parser.add_argument("--only", default="", help="rows whose name contains this")
-    parser.add_argument("--short", action="store_true", help="fewer classes")
+    parser.add_argument("--short", action="store_true", help="fewer classes (of three links)")
     parser.add_argument("--seconds", type=float, default=60, help="processor time an attempt may take")
     parser.add_argument("--table", action="store_true", help="write the table and figure from what there is")
     options = parser.parse_args()
-    if not options.table:
-        friction = Friction(*(float(mu) for mu in options.friction.split(",")))
-        for row, (gait_class, intervals, seeds) in rows(options.short).items():
-            for seed in seeds if options.only in row else []:
-                known = load().get(options.friction, {})
-                if seed in known.get(row, {}):
-                    continue
-                found = best(known[seed]) if seed in known else None
-                if seed in rows(options.short) and found is None:
-                    continue
-                guess = gait_from(found["gait"]) if found else named_gait(seed, friction)
-                result = attempt(gait_class, guess, friction, intervals, options.seconds)
-                keep(options.friction, row, seed, result)
-                print(
-                    f"{options.friction} {row:<18s} from {seed:<18s} {result['status']:<18s} "
-                    f"{result.get('efficiency', np.nan):.6f} {result['cpu seconds']:6.1f} s {result['message'][:90]}",
-                    flush=True,
-                )
-    write(load())
+    if options.links < 3:
+        parser.error("--links must be at least 3.")
+    links, friction = options.links, Friction(*(float(mu) for mu in options.friction.split(",")))
+    listed = {} if options.table else rows(links, options.short)
+    while left := next(attempts_left(listed, links, options.friction, options.only), None):
+        row, seed, start, known = left
+        result = attempt(listed[row], links, friction, start, known, options.seconds)
+        keep(links, options.friction, row, seed, result)
+        print(
+            f"{options.friction} {row:<18s} from {seed:<18s} {result['status']:<18s} "
+            f"{result.get('efficiency', np.nan):.6f} {result['cpu seconds']:6.1f} s {result['message'][:90]}",
+            flush=True,
+        )
+    write(links, load(links))
 
 
 if __name__ == "__main__":

@@ -92,6 +92,22 @@ def test_all_formulations_find_the_same_optimum_with_the_same_multipliers():
     np.testing.assert_allclose(results["condensed"].lam_g, one.lam_g, atol=1e-5)
 
 
+def test_trust_regions_widen_when_the_optimum_is_far_and_it_is_the_one_found_in_one_step():
+    stated = problem("bilateral", Friction(), guess=ellipse(0.0, 1.6, 1.0))
+    transcription = transcribe(stated)
+    solver, own = Solver(transcription), transcription.layout.parameters[:, 0]
+    x = feasible_point(transcription, stated.gait.parameters(stated.guess), stated.delta)
+    free = solver.solve(x, stated.delta)
+    small = solver.solve(x, stated.delta, radius=0.02)
+    assert free.optimal
+    assert small.optimal, "20 regions of one radius would end 0.4 rad away"
+    moved = np.abs(small.x[own] - x[own]).max()
+    assert moved > 1.0
+    # contact is constrained at instants that are worst where each solve, or region, begins
+    np.testing.assert_allclose(small.x[own], free.x[own], atol=0.03)
+    assert small.objective == pytest.approx(free.objective, rel=0.01)
+
+
 def test_a_gait_that_moves_linearly_in_delta_is_predicted_exactly():
     track, at = Track(), lambda d, shift=0.0: np.array([1.0 + 2 * d, -3 * d]) + shift
     assert not track

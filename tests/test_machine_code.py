@@ -7,11 +7,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ellipse
-from colloc.compiled_problem import compile_problem
+from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc.compiled_problem import DIFFERENTIATED_ONCE, compile_problem
 from colloc.errors import ProblemError, StoreError
 from colloc.kernels import balance_steps, point_function
 from colloc.machine_code import FOLDER, code_folder, compiler, compiling, machine_code
+from colloc.path_kernels import arc, path_point
 
 needs_compiler = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
 THIRD = Chain((1 / 3,) * 3)
@@ -20,10 +21,10 @@ THIRD = Chain((1 / 3,) * 3)
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER, str(tmp_path / "code"))
-    for function in (point_function, balance_steps):
+    for function in DIFFERENTIATED_ONCE:
         function.cache_clear()
     yield tmp_path / "code"
-    for function in (point_function, balance_steps):
+    for function in DIFFERENTIATED_ONCE:
         function.cache_clear()
 
 
@@ -75,6 +76,21 @@ def test_nothing_is_compiled_unasked_and_what_was_compiled_is_found_again(folder
     assert is_compiled(machine_code([long_function()])[0])
     assert not is_compiled(machine_code([long_function(scale=1.1)])[0])
     assert len(list(folder.iterdir())) == 1
+
+
+@needs_compiler
+def test_free_paths_share_their_code_and_so_do_polygons(folder):
+    """Neither bounds on curvature, meshes, numbers of corners, symmetries nor guesses are part of the code."""
+    path = Problem("p", ellipse(0, 1.5, 1.0), gait=FreePath(2.0, "bilateral"), intervals=8)
+    compile_problem(path)
+    compile_problem(path.with_(gait=Polygon(3, "bilateral")))
+    kept = set(folder.iterdir())
+    compile_problem(path.with_(gait=FreePath(8.0, "none"), guess=ellipse(0.2, 1.8, 1.2), intervals=11))
+    compile_problem(path.with_(gait=Polygon(5, "none"), intervals=20))
+    assert set(folder.iterdir()) == kept
+    point = path_point(path.body, path.friction, arc)
+    assert is_compiled(point.hessian)
+    assert path_point(path.body, path.friction, arc) is point
 
 
 @needs_compiler

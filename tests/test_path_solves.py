@@ -130,9 +130,9 @@ def test_a_free_path_far_beyond_the_paper(solved):
 
 @pytest.mark.slow
 def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
-    """The far pair binds at the first level; refined to 1e-4, the solve wanders (README, limits), so the mesh is given.
+    """The far pair binds at the first level; refined to 1e-4, the solve wanders (docs/gait_classes.md), so the mesh is given.
 
-    Hundreds of iterations depend on the last digits: 40 intervals converged until peaks of contact were placed exactly.
+    Of 15 such solves, from three ellipses on five meshes, 14 converge.
     """
     guess = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
     problem = Problem(

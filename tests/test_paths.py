@@ -5,6 +5,7 @@ import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.arcs import advance, direction
+from colloc.contact import crossing_depth, passing_depth
 from colloc.errors import NotConvergedError, ProblemError
 from colloc.gait import shifted
 from colloc.path_replay import replay
@@ -251,3 +252,21 @@ def test_the_certificate_sees_a_path_that_does_not_join(symmetry):
         # arcs are drawn from their starts: the last shape is drawn by nobody, so its arc is bent instead
         tangents = path.tangents + (1e-5 if place == -1 else 0.0) * (np.arange(path.edges.size) == path.edges.size - 1)
         assert _largest_jump(ArcPath(path.edges, shapes, tangents, path.length, symmetry)) > 1e-7
+
+
+def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():
+    """All joints are open by e but two neighbours, which are folded: W = e/5, d = W (1 - e^2/24). No gait exceeds 1."""
+    links = 5
+    body, sign = Chain((1 / links,) * links), np.array([[(-1.0) ** (j + 1)] for j in range(links - 1)])
+    closed = [(), *((j, j + 1) for j in range(links - 2))]
+    open_by = np.array([[0.0 if j in pair else 1.0 for pair in closed] for j in range(links - 1)])
+    for e in (0.2, 0.1):
+        gait = Corners(sign * (np.pi - e * open_by))
+        fine = replay(body, Friction(), lambda t, g=gait: (g.angles(t), g.rates(t)), 1e-7 * gait.length, instants=800,
+                      tolerance=1e-4, breaks=gait.phases[1:-1])  # fmt: skip
+        assert fine.rotation == pytest.approx(0, abs=1e-12)
+        assert fine.work == pytest.approx(e / links, rel=1e-8)
+        assert 1 - fine.efficiency == pytest.approx(e**2 / 24, rel=0.02)
+        angles = gait.angles(np.linspace(0, 1, 4001))
+        assert crossing_depth(body, angles).max() < 1e-12
+        assert passing_depth(body, angles) < 1e-12
