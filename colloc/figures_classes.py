@@ -33,10 +33,15 @@ def _draw_path(axes: Any, gait: Gait, limits: tuple[np.ndarray, float]) -> None:
     axes.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] - half, centre[1] + half), aspect="equal")
 
 
-def _draw_bodies(axes: Any, body: Chain, gait: Gait, apart: float = 0.8) -> None:
+def _draw_bodies(axes: Any, body: Chain, gait: Gait, apart: float | None = 0.8) -> None:
+    """Bodies side by side, `apart` body lengths, by default as far as they are wide; then a bar of 0.1 body lengths too."""
     t = np.arange(_SNAPSHOTS) / _SNAPSHOTS
     x, y = body.joints(gait.angles(t))
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    if apart is None:
+        apart = 1.3 * float(np.ptp(x, axis=0).max())
+        low = y.min() - 0.12 * apart
+        axes.plot(x.min() + np.array([0.0, 0.1]), [low, low], color="black", lw=1.0, clip_on=False)
     for k, colour in enumerate(matplotlib.colormaps["viridis"](t)):
         axes.plot(x[:, k] + apart * k, y[:, k], color=colour, lw=1.6, solid_capstyle="round", clip_on=False)
         axes.plot(x[-1:, k] + apart * k, y[-1:, k], "o", color=colour, ms=2.5, clip_on=False)
@@ -78,14 +83,17 @@ def gait_panels(panels: list[GaitPanel], body: Chain | None = None) -> Figure:
 
 
 def body_strips(panels: list[GaitPanel], body: Chain) -> Figure:
-    """A figure of bodies of any number of links along their gaits, equal steps in phase, two gaits a row."""
+    """A figure of bodies of any number of links along their gaits, equal steps in phase, two gaits a row.
+
+    Every gait has its own scale, which a bar of 0.1 body lengths shows.
+    """
     columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5.2 * columns, 1.15 * rows), layout="constrained")
         for k, panel in enumerate(panels):
             axes = figure.add_subplot(rows, columns, k + 1)
-            _draw_bodies(axes, body, panel.gait, 1.1)
+            _draw_bodies(axes, body, panel.gait, None)
             axes.set_title(panel.title, fontsize=8)
     return figure
 

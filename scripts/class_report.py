@@ -138,7 +138,7 @@ def head(links: int) -> list[str]:
         "length at least 0.628 rad; sides of polygons at least 0.02 rad; delta = 1e-4 at unit shape speed, 1e-5 in rows with",
         "an asterisk, where delta changes the efficiency by more than 1 %. Every efficiency is that of an independent replay",
         "whose certificate holds (replay gap at most 1e-4); the class is explained in docs/gait_classes.md. Local optima of",
-        "few starts: a class may hold better ones.",
+        "few starts: a class may hold better ones. Starts that failed under earlier code and were repeated count once.",
     ]
     if links > 3:
         lines.append('"Fewer links": the best gait of the class with one link less, laid into the longer chain.')
