@@ -1,8 +1,8 @@
 """CasADi functions as machine code: their generated C, compiled once by the system's compiler and kept in a folder.
 
 CasADi interprets its expressions; compiled, a Hessian of some ten thousand operations runs about ten times faster, with the
-same operations in the same order, so the same results to the last bit. Compiling takes seconds, so it is never done
-unasked: functions whose code is in the folder are loaded, all others are interpreted, except within `compiling`.
+same operations in the same order, so the same results to the last bit. Compiling takes seconds, so callers ask
+for it where it pays: functions whose code is in the folder are loaded, all others are interpreted, except within `compiling`.
 """
 
 from __future__ import annotations
