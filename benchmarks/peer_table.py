@@ -1,15 +1,17 @@
-"""General tools and a derivative-free search on the same problem: python -m benchmarks --only peer_table
+"""General tools and optimisers of SciPy on the same problem: python -m benchmarks --only peer_table
 
 The problem: isotropic three-link body, one bilateral harmonic, delta from 0.1 to 1e-4, 24 intervals of three Radau points on
-half a period, IPOPT with MUMPS and a tolerance of 1e-9, the same random starts, the same feasible motion to start from.
+half a period, the same random starts. Every tool has the best options that were found for it. Those that solve the full
+program (rockit, YAPSS) use IPOPT with MUMPS and a tolerance of 1e-9, and start every level from a motion that colloc's NumPy
+solver of the balance makes feasible; SLSQP works on colloc's reduced functions; Nelder-Mead solves balances by `solve_balance`
+at the last delta only.
+
 Every tool is a script under benchmarks/peers, written after that tool's own examples; the other tools run in an environment
-of their own (benchmarks/peers/requirements.txt), and their runs are read from files:
+of their own (benchmarks/peers/requirements.txt). All take turns, start by start:
 
-    peers-venv/bin/python -m benchmarks.peers.rockit_three_link --starts 20 --tuned > results/peers/rockit-tuned.jsonl
-    peers-venv/bin/python -m benchmarks.peers.yapss_three_link --starts 20 --tuned > results/peers/yapss-tuned.jsonl
+    python -m benchmarks.peers.interleave --peers peers-venv/bin/python
 
-and the same without --tuned into rockit.jsonl and yapss.jsonl. What is not in results/peers is taken from
-results/curated/benchmarks/peers; colloc and Nelder-Mead are run if there is neither. A start succeeds if the replay of its
+What that has not written to results/peers is taken from results/curated/benchmarks/peers. A start succeeds if the replay of its
 gait reaches one of the two certified optima to 1e-3. Joint limits that hold at nodes only, as general tools impose them, are
 exceeded between nodes by some 3e-4 rad at the best optimum; up to 2e-3 rad is forgiven here, not by colloc's certificate.
 """
@@ -17,9 +19,8 @@ exceeded between nodes by some 3e-4 rad at the best optimum; up to 2e-3 rad is f
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,21 +30,44 @@ from colloc.ellipses import admissible
 
 OPTIMA = (0.260030, 0.207596)
 """Certified by problems/three_link.py and problems/three_link_offset.py."""
-_COLLOC = "benchmarks.peers.colloc_three_link"
+
+
+class Tool(NamedTuple):
+    """The file of a tool's runs, and the module and options that make them."""
+
+    file: str
+    command: list[str]
+
+
+_COLLOC, _SLSQP = "benchmarks.peers.colloc_three_link", "benchmarks.peers.slsqp_three_link"
+_ROCKIT, _YAPSS = "benchmarks.peers.rockit_three_link", "benchmarks.peers.yapss_three_link"
+CERTIFIED = "colloc, defaults"
 OWN = {
-    "colloc, defaults": ("colloc-refined.jsonl", [_COLLOC, "--refined"]),
-    "colloc, defaults, compiled": ("colloc-refined-compiled.jsonl", [_COLLOC, "--refined", "--compiled"]),
-    "colloc, same mesh": ("colloc.jsonl", [_COLLOC]),
-    "colloc, same mesh, compiled": ("colloc-compiled.jsonl", [_COLLOC, "--compiled"]),
-    "Nelder-Mead": ("nelder-mead.jsonl", ["benchmarks.peers.nelder_mead"]),
+    CERTIFIED: Tool("colloc-refined.jsonl", [_COLLOC, "--refined"]),
+    "colloc, defaults, compiled": Tool("colloc-refined-compiled.jsonl", [_COLLOC, "--refined", "--compiled"]),
+    "colloc, same mesh": Tool("colloc.jsonl", [_COLLOC]),
+    "colloc, same mesh, compiled": Tool("colloc-compiled.jsonl", [_COLLOC, "--compiled"]),
+    "SLSQP on colloc's reduced functions": Tool("slsqp.jsonl", [_SLSQP]),
+    "SLSQP on colloc's reduced functions, compiled": Tool("slsqp-compiled.jsonl", [_SLSQP, "--compiled"]),
+    "Nelder-Mead on solve_balance": Tool("nelder-mead.jsonl", ["benchmarks.peers.nelder_mead"]),
 }
+"""Run by this environment."""
 OTHERS = {
-    "rockit, default IPOPT": "rockit.jsonl",
-    "rockit, tuned IPOPT": "rockit-tuned.jsonl",
-    "YAPSS, default IPOPT": "yapss.jsonl",
-    "YAPSS, tuned IPOPT": "yapss-tuned.jsonl",
+    "rockit, default IPOPT": Tool("rockit.jsonl", [_ROCKIT]),
+    "rockit, tuned IPOPT": Tool("rockit-tuned.jsonl", [_ROCKIT, "--tuned"]),
+    "YAPSS, default IPOPT": Tool("yapss.jsonl", [_YAPSS]),
+    "YAPSS, tuned IPOPT": Tool("yapss-tuned.jsonl", [_YAPSS, "--tuned"]),
 }
-_PLACES = (Path("results/peers"), Path("results/curated/benchmarks/peers"))
+RECORDED_ONCE = ("rockit, default IPOPT", "YAPSS, default IPOPT")
+"""Not run by `benchmarks.peers.interleave` unless asked for: most starts fail, each after its time limit."""
+_WORDS = (
+    "Processor seconds, transcription and compiling included (first start). The ratio is to the certified solve, "
+    f'"{CERTIFIED}"; the rows of that name alone have refinement and a certificate. All rows with a ratio were run in turns, '
+    "start by start (A B C A B C ...), one thread each, on a machine that others used: ratios count, seconds do not. SLSQP and "
+    "Nelder-Mead use colloc's functions."
+)
+FOLDER = Path("results/peers")
+_PLACES = (FOLDER, Path("results/curated/benchmarks/peers"))
 
 
 def recorded(name: str) -> list[dict]:
@@ -64,39 +88,33 @@ def judged(run: dict) -> tuple[bool, float, float]:
     return abs(short) < 1e-3, run["efficiency"] / replayed - 1, short
 
 
-def row(name: str, runs: list[dict]) -> list[object]:
-    """A line of the table."""
+def row(name: str, runs: list[dict], unit: float) -> list[object]:
+    """A line of the table; `unit`: processor seconds an optimum that count as 1."""
     verdicts = [judged(run) for run in runs]
     good = [k for k, verdict in enumerate(verdicts) if verdict[0]]
     cpu = np.array([run["cpu"] for run in runs])
     best = sum(abs(runs[k]["efficiency"] / OPTIMA[0] - 1) < 5e-3 for k in good)
     cells: list[object] = [name, len(runs), f"{len(good)} ({best} the best)", float(np.median(cpu))]
     if not good:
-        return [*cells, "-", "-", "-"]
+        return [*cells, "-", "-", "-", "-"]
     claim, short = (float(np.median([abs(verdicts[k][i]) for k in good])) for i in (1, 2))
-    return [*cells, float(cpu.sum() / len(good)), claim, short]
+    seconds = seconds_an_optimum(runs)
+    return [*cells, seconds, f"{seconds / unit:.2f}" if name not in RECORDED_ONCE else "(other day)", claim, short]
+
+
+def seconds_an_optimum(runs: list[dict]) -> float:
+    """Processor seconds of all starts over the optima found."""
+    return sum(run["cpu"] for run in runs) / sum(judged(run)[0] for run in runs)
 
 
 def report(quick: bool, folder: Path) -> str:
-    """The table, and how many times faster the best of ours is than the best of the others."""
-    rows = []
-    for name, (file, command) in OWN.items():
-        if not recorded(file):
-            starts = 2 if quick else 3 if name == "Nelder-Mead" else 20
-            run = [sys.executable, "-m", *command, "--starts", str(starts)]
-            output = subprocess.run(run, capture_output=True, text=True, check=True).stdout
-            _PLACES[0].mkdir(parents=True, exist_ok=True)
-            (_PLACES[0] / file).write_text(output, encoding="utf-8")
-        rows.append(row(name, recorded(file)))
-    rows += [row(name, runs) for name, file in OTHERS.items() if (runs := recorded(file))]
-    header = ["tool", "starts", "optima found", "median s a start", "s an optimum", "claim against replay", "short of optimum"]
+    """The table; ratios are those of processor seconds an optimum to colloc's certified solve."""
+    runs = {name: recorded(tool.file) for name, tool in {**OWN, **OTHERS}.items()}
+    unit = seconds_an_optimum(runs[CERTIFIED])
+    rows = [row(name, found, unit) for name, found in runs.items() if found]
+    header = ["tool", "starts", "optima found", "median s a start", "s an optimum", "ratio"]
+    header += ["claim against replay", "short of optimum"]
     text = markdown_table(header, rows)
-    missing = [name for name, file in OTHERS.items() if not recorded(file)]
-    if missing:
+    if missing := [name for name, found in runs.items() if not found]:
         text += f"\n\nNot recorded: {', '.join(missing)}."
-    measured = [r[4] for r in rows if not str(r[0]).startswith("colloc") and isinstance(r[4], float)]
-    ours = [(r[0], r[4]) for r in rows if str(r[0]).startswith("colloc") and isinstance(r[4], float)]
-    if measured and ours:
-        ratios = ", ".join(f"{min(measured) / seconds:.1f} times as much as {name}" for name, seconds in ours)
-        text += f"\n\nProcessor seconds an optimum: the best of the others takes {ratios}. Compiling is included (first start)."
-    return text
+    return f"{text}\n\n{_WORDS}"

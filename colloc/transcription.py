@@ -1,11 +1,13 @@
 """Direct collocation of a problem: decision variables, constraints and objective on a mesh.
 
-Decision variables: gait parameters p; at every point joint angles, joint rates, tail velocity z and the lifted link
-forces; the tail's orientation theta at every site; distance x and work W at every edge. Rates, velocities and delta are
-per radian of phase, so that all variables are O(1).
+Decision variables: gait parameters p; at every point joint angles, joint rates and tail velocity z; the tail's orientation
+theta at every site; distance x and work W at every edge. Rates, velocities and delta are per radian of phase, so that all
+variables are O(1).
 
-The balance itself is a step function of the tail velocity as delta goes to 0. Lifted forces cure that: each force is
-tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0; the balance is linear in the forces.
+The balance itself is a step function of the tail velocity as delta goes to 0. Its place is taken by z - Z(angles, rates) = 0,
+with Z the velocity that balances the body. So it is under the formulations "map" and "condensed" (the default, which then
+eliminates all variables but p and the first theta: `colloc.condensed`). Under "lifted" the links' forces are variables at every
+point too: each is tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0, and the balance is linear.
 x is the displacement of the centre of mass along a fixed direction. The first orientation is free, so maximising x
 turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable.
 """

@@ -5,8 +5,8 @@ sum w_i omega_i = 0 (so does the rotation). Dry friction is homogeneous of degre
 first order of its size: d/W = sum w_i e.v_i / sum w_i P_i, a linear program (`colloc.infinitesimal`, docs/bound.md section 4).
 
 `PROBLEM` starts collocation from the best of them: the triangle about (c, -c), whose efficiency tends to 2/5 as it shrinks,
-here of finite size and with three harmonics (0.349 at delta = 1e-3; 0.383 at 1e-4, which takes minutes, as the loop shrinks
-with delta). `python -m scripts.infinitesimal_map` draws the map.
+here of finite size and with three harmonics (0.348 at delta = 1e-3; smaller delta lets the loop shrink further, and takes
+longer). `python -m scripts.infinitesimal_map` draws the map.
 """
 
 import numpy as np

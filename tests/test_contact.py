@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.body import Chain
-from colloc.contact import SMOOTHING, crossing_bounds, crossing_depth, share_of_first, smooth_minimum, tangent_of_minimum
+from colloc.contact import SMOOTHING, crossing_bounds, crossing_depth, gap, share_of_first, smooth_minimum, tangent_of_minimum
 from colloc.gait import Fourier
 from colloc.layout import problem_mesh
 from colloc.problem import Problem
@@ -47,6 +47,32 @@ def test_longer_chains_see_every_pair():
     square = np.array([[np.pi / 2 + 0.2], [np.pi / 2 + 0.2], [np.pi / 2 + 0.2]])
     assert crossing_depth(body, square)[0] > 0
     assert crossing_depth(body, square * 0.7)[0] == 0
+
+
+def test_the_gap_between_links_is_that_of_their_points():
+    body = Chain((0.2, 0.35, 0.15, 0.3))
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(-np.pi, np.pi, (3, 200))
+    part = np.linspace(0.0, 1.0, 201)
+    ends = np.stack(body.joints(angles))
+    points = [ends[:, k, :, None] * (1 - part) + ends[:, k + 1, :, None] * part for k in range(4)]
+    tips = {(i, j): 200 if j > i else 0 for i in range(4) for j in range(4)}  # of link j, the end away from link i
+
+    def distance(i, j):
+        other = points[j] if abs(i - j) > 1 else points[j][:, :, [tips[i, j]]]
+        return np.hypot(*(points[i][:, :, :, None] - other[:, :, None, :])).min(axis=(1, 2))
+
+    naive = np.min([distance(i, j) for i in range(4) for j in range(4) if i != j], axis=0)
+    assert np.abs(naive - gap(body, angles)).max() < 0.35 / 200
+    crossing = crossing_depth(body, angles) > 0
+    assert crossing.any()
+    assert np.all(gap(body, angles)[crossing] == 0)
+
+
+def test_folded_neighbours_and_a_zigzag_have_the_gap_of_their_ends():
+    fold = np.array([[2.0, 2.9, np.pi]])
+    np.testing.assert_allclose(gap(Chain((0.5, 0.5)), fold), 0.5 * np.sin(np.pi - fold[0]), atol=1e-15)
+    np.testing.assert_allclose(gap(Chain(), np.concatenate([fold, -fold])), np.sin(np.pi - fold[0]) / 3, atol=1e-15)
 
 
 def test_two_links_cannot_cross():

@@ -6,15 +6,13 @@ defaults, and a start counts only with a certificate. With --compiled the deriva
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import tempfile
 
 import numpy as np
 
+from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import INTERVALS
-from benchmarks.peers.starts import starts
 from colloc import Harmonic, Problem, ellipse, maximise_efficiency
 from colloc.compiled_problem import compile_problem
 from colloc.continuation import continue_delta
@@ -22,36 +20,27 @@ from colloc.machine_code import FOLDER, OFF
 from colloc.solution import SOLVED
 
 
-def solve(start: np.ndarray, refined: bool) -> dict:
+def solve(refined: bool, start: np.ndarray) -> dict:
     """The gait and efficiency from one start, or what went wrong."""
     same_work: dict = {} if refined else {"scheme": "radau-3", "mesh_tolerance": 0}
     problem = Problem("peer", ellipse(*start), gait=Harmonic(1, "bilateral"), intervals=INTERVALS, **same_work)
     solution = maximise_efficiency(problem) if refined else continue_delta(problem)
     good = solution.status == SOLVED if refined else solution.levels[-1].optimal and solution.levels[-1].delta <= 1e-4
     if not good:
-        return {"failed_at": solution.levels[-1].delta, "message": solution.message[:80]}
+        return failed(solution.levels[-1].delta, solution.message)
     gait = solution.gait
-    return {"efficiency": solution.efficiency, "gait": [gait.mean[0], gait.cos[0, 0], gait.sin[0, 0]]}
+    return found(solution.efficiency, [gait.mean[0], gait.cos[0, 0], gait.sin[0, 0]])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description="The three-link problem in colloc; see the top of this file.")
-    parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument("--refined", action="store_true")
-    parser.add_argument("--compiled", action="store_true")
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as code:
-        os.environ[FOLDER] = code if options.compiled else OFF
-        begin = sum(os.times()[:4])  # the compiler's time too
-        if options.compiled:
-            compile_problem(Problem("peer", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral")))
-        for start in starts(options.starts):
-            result = solve(start, options.refined)
-            now = sum(os.times()[:4])
-            result |= {"cpu": now - begin, "start": start.tolist(), "with_build": True}
-            begin = now
-            print(json.dumps(result), flush=True)
+def build(refined: bool, compiled: bool) -> bool:
+    """Compiles the derivatives if it is to; what `solve` is told."""
+    if compiled:
+        compile_problem(Problem("peer", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral")))
+    return refined
 
 
 if __name__ == "__main__":
-    main()
+    chosen = arguments(__doc__, refined="everything at its defaults, certified", compiled="compile the derivatives first")
+    with tempfile.TemporaryDirectory() as code:
+        os.environ[FOLDER] = code if chosen.compiled else OFF
+        run(chosen, lambda: build(chosen.refined, chosen.compiled), solve)

@@ -1,24 +1,21 @@
-"""What a newcomer would try: Nelder-Mead over (A0, A1, B1) on the paper's fixed point: python -m benchmarks.peers.nelder_mead
+"""What a newcomer would try: Nelder-Mead over (A0, A1, B1): python -m benchmarks.peers.nelder_mead --starts 20
 
-Every evaluation solves the balance at 400 instants of the period by the fixed point (batched, which a first version would not
-be) at delta = 1e-4, and sums distance and work. Gaits that cross themselves or exceed pi are worth nothing.
+Every evaluation solves the balance at 400 instants of the period at delta = 1e-4 (`solve_balance`, in one batch) and sums
+distance and work. Gaits that cross themselves or exceed pi are worth nothing.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
-
 import numpy as np
 from scipy.optimize import minimize
 
-from benchmarks.peers.starts import starts
+from benchmarks.peers.runs import arguments, found, run
 from colloc import Chain, Friction, ellipse, solve_balance
 from colloc.balance import instant, total_power
 from colloc.ellipses import admissible
 
 INSTANTS = 400
+SETTINGS = {"xatol": 1e-3, "fatol": 1e-7, "maxfev": 1000}
 
 
 def minus_efficiency(parameters: np.ndarray) -> float:
@@ -28,7 +25,7 @@ def minus_efficiency(parameters: np.ndarray) -> float:
         return 0.0
     gait, t = ellipse(*parameters), np.arange(INSTANTS) / INSTANTS
     angles, rates = gait.angles(t), gait.rates(t)
-    z = solve_balance(body, friction, angles, rates, 1e-4, tolerance=1e-8, method="fixed_point").z
+    z = solve_balance(body, friction, angles, rates, 1e-4, tolerance=1e-8).z
     now = instant(body, friction, angles, rates, z, 1e-4)
     cx, cy = (c[0] for c in body.centre_velocity(now.posture, now.velocity))
     theta = np.concatenate([[0.0], np.cumsum(0.5 * (z[2, 1:] + z[2, :-1]))]) / INSTANTS
@@ -37,17 +34,11 @@ def minus_efficiency(parameters: np.ndarray) -> float:
     return -float(d / total_power(now.velocity, now.force).mean())
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Nelder-Mead over ellipses; see the top of this file.")
-    parser.add_argument("--starts", type=int, default=20)
-    for start in starts(parser.parse_args().starts):
-        begin = time.process_time()
-        settings = {"xatol": 1e-4, "fatol": 1e-9, "maxfev": 1000}
-        found = minimize(minus_efficiency, start, method="Nelder-Mead", options=settings)
-        result = {"efficiency": -found.fun, "gait": found.x.tolist(), "evaluations": found.nfev}
-        result |= {"cpu": time.process_time() - begin, "start": start.tolist(), "with_build": True}
-        print(json.dumps(result), flush=True)
+def solve(_: None, start: np.ndarray) -> dict:
+    """Where the simplex ends."""
+    ended = minimize(minus_efficiency, start, method="Nelder-Mead", options=SETTINGS)
+    return found(-ended.fun, ended.x) | {"evaluations": ended.nfev}
 
 
 if __name__ == "__main__":
-    main()
+    run(arguments(__doc__), lambda: None, solve)

@@ -1,25 +1,37 @@
-"""The three-link problem in rockit, after its examples dae.py (algebraic states) and repeated_solve.py (parameters).
+"""The three-link problem in rockit, after its examples dae.py (algebraic states) and repeated solves.
 
 Run in the peers' environment: python -m benchmarks.peers.rockit_three_link --starts 20 [--tuned]
+
+The program is written and its derivatives are made once; every level is a call of one function from a packed guess (`gist`)
+to a packed solution. `set_initial` would evaluate the guess expression by expression, twenty times as long as IPOPT's work.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from rockit import DirectCollocation, Ocp
 
 from benchmarks.peers.physics import DELTAS, balance_and_rates, gait
+from benchmarks.peers.runs import arguments, failed, found, run, words_of
 from benchmarks.peers.settings import DEFAULT, DEGREE, INTERVALS, TUNED
-from benchmarks.peers.starts import feasible_motion, starts
+from benchmarks.peers.starts import feasible_motion
 
 
-def build(tuned: bool) -> tuple:
-    """The problem, its symbols, and the time to write it down (transcription happens at the first solve)."""
+@dataclass
+class Program:
+    """The solver, phases of nodes and roots, and how a motion is packed."""
+
+    solve: ca.Function
+    phases: np.ndarray
+    unpack: ca.Function
+    pack: np.ndarray
+
+
+def build(tuned: bool) -> Program:
+    """The problem, transcribed."""
     ocp = Ocp(T=np.pi)
     theta, x, W = ocp.state(), ocp.state(), ocp.state()
     z = ocp.algebraic(3)
@@ -36,48 +48,41 @@ def build(tuned: bool) -> tuple:
     ocp.subject_to(-np.pi <= (q1 <= np.pi))
     ocp.subject_to(-np.pi <= (q2 <= np.pi))
     ocp.add_objective(-ocp.at_tf(x) / ocp.at_tf(W))
-    ocp.solver("ipopt", {"print_time": False, "ipopt": {**DEFAULT, **(TUNED if tuned else {})}})
+    ipopt = {**DEFAULT, **(TUNED if tuned else {})}
+    ocp.solver("ipopt", {"print_time": False, "expand": True, "error_on_fail": True, "ipopt": ipopt})
     ocp.method(DirectCollocation(N=INTERVALS, M=1, degree=DEGREE, scheme="radau"))
-    return ocp, (theta, x, W), z, parameters, delta
+    ocp.set_value(delta, DELTAS[0])
+    states = ca.vertcat(theta, x, W)
+    at_nodes = ocp.sample(states, grid="control")[1]
+    at_roots = [ocp.sample(part, grid="integrator_roots")[1] for part in (states, z)]
+    solve = ocp.to_function("solve", [ocp.gist], [ocp.gist])
+    samples = [at_nodes, *at_roots, ocp.value(parameters), ocp.value(delta)]
+    unpack = ca.Function("unpack", [ocp.gist], samples)
+    every = ca.vertcat(*[ca.vec(part) for part in samples])
+    pack = np.linalg.pinv(np.array(ca.evalf(ca.jacobian(every, ocp.gist))))
+    step = np.pi / INTERVALS
+    roots = (np.arange(INTERVALS)[:, None] + np.array(ca.collocation_points(DEGREE, "radau"))).ravel() * step
+    return Program(solve, np.concatenate([np.arange(INTERVALS + 1) * step, roots]), unpack, pack)
 
 
-def solve(built: tuple, start: np.ndarray) -> dict:
+def solve(program: Program, start: np.ndarray) -> dict:
     """Continuation in delta from one start; the gait and efficiency of the last level, or where it failed."""
-    ocp, states, z, parameters, delta = built
     own = start
     for level in DELTAS:
-        phases = np.linspace(0, np.pi, 8 * INTERVALS + 1)
-        motion, velocity = feasible_motion(own, level / (2 * np.pi), phases)
-        # as functions of time: arrays of states fail inside rockit 0.6.7 (its line 273 names an undefined `kron`)
-        for state, values in zip(states, motion, strict=True):
-            ocp.set_initial(state, ca.interpolant("state", "linear", [phases], values)(ocp.t))
-        ocp.set_initial(z, ca.interpolant("z", "linear", [phases], velocity.ravel(order="F"))(ocp.t))
-        ocp.set_initial(parameters, own)
-        ocp.set_value(delta, level / (2 * np.pi))
+        delta = level / (2 * np.pi)
+        states, velocity = feasible_motion(own, delta, program.phases)
+        first = INTERVALS + 1
+        motion = [states[:, :first], states[:, first:], velocity[:, first:], own, delta]
+        guess = program.pack @ np.concatenate([np.ravel(part, order="F") for part in motion])
         try:
-            solution = ocp.solve()
-        except RuntimeError:
-            return {"failed_at": level, "message": ocp.non_converged_solution.stats["return_status"]}
-        own = np.array(solution.value(parameters)).ravel()
-        x, W = (solution.sample(s, grid="control")[1][-1] for s in states[1:])
-    return {"efficiency": float(x / W), "gait": own.tolist()}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="The three-link problem in rockit; see the top of this file.")
-    parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument("--tuned", action="store_true", help="the IPOPT options that colloc's lifted formulation uses")
-    options = parser.parse_args()
-    begin = time.process_time()
-    built = build(options.tuned)
-    first = True
-    for start in starts(options.starts):
-        result = solve(built, start)
-        now = time.process_time()
-        result |= {"cpu": now - begin, "start": start.tolist(), "with_build": first}
-        first, begin = False, now
-        print(json.dumps(result), flush=True)
+            solution = program.solve(guess)
+        except RuntimeError as error:
+            return failed(level, words_of(error))
+        states, _, _, own, _ = (np.array(part) for part in program.unpack(solution))
+        own = own.ravel()
+    return found(states[1, -1] / states[2, -1], own)
 
 
 if __name__ == "__main__":
-    main()
+    chosen = arguments(__doc__, tuned="options under which it converges from every start")
+    run(chosen, lambda: build(chosen.tuned), solve)

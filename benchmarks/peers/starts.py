@@ -24,7 +24,7 @@ def feasible_motion(parameters: np.ndarray, delta: float, phases: np.ndarray) ->
     """States (theta, distance, work) and tail velocities, each ``(3, n)``, of a gait at phases 0..pi; all per radian."""
     body, friction = Chain(), Friction()
     gait = ellipse(*parameters)
-    fine = np.linspace(0, np.pi, 2001)
+    fine = np.linspace(0, np.pi, 401)
     angles, rates = gait.angles(fine / (2 * np.pi)), gait.rates(fine / (2 * np.pi)) / (2 * np.pi)
     z = solve_balance(body, friction, angles, rates, delta).require().z
     now = instant(body, friction, angles, rates, z, delta)

@@ -5,9 +5,6 @@ Run in the peers' environment: python -m benchmarks.peers.yapss_three_link --sta
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
 import warnings
 
 import numpy as np
@@ -15,8 +12,9 @@ import yapss
 import yapss.math
 
 from benchmarks.peers.physics import DELTAS, balance_and_rates, gait
+from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import DEFAULT, DEGREE, INTERVALS, TUNED
-from benchmarks.peers.starts import feasible_motion, starts
+from benchmarks.peers.starts import feasible_motion
 
 
 def build(delta: float, own: np.ndarray, tuned: bool) -> yapss.Problem:
@@ -54,29 +52,18 @@ def build(delta: float, own: np.ndarray, tuned: bool) -> yapss.Problem:
     return ocp
 
 
-def solve(start: np.ndarray, tuned: bool) -> dict:
+def solve(tuned: bool, start: np.ndarray) -> dict:
     """Continuation in delta from one start; the gait and efficiency of the last level, or where it failed."""
     own = start
     for level in DELTAS:
         solution = build(level / (2 * np.pi), own, tuned).solve()
         if solution.nlp_info.ipopt_status != 0:
-            return {"failed_at": level, "message": solution.nlp_info.ipopt_status_message[:80]}
+            return failed(level, solution.nlp_info.ipopt_status_message)
         own = np.array(solution.parameter)
-    return {"efficiency": -float(solution.objective), "gait": own.tolist()}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="The three-link problem in YAPSS; see the top of this file.")
-    parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument("--tuned", action="store_true", help="the IPOPT options that colloc's lifted formulation uses")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
-    for start in starts(options.starts):
-        begin = time.process_time()
-        result = solve(start, options.tuned)
-        result |= {"cpu": time.process_time() - begin, "start": start.tolist(), "with_build": True}
-        print(json.dumps(result), flush=True)
+    return found(-solution.objective, own)
 
 
 if __name__ == "__main__":
-    main()
+    warnings.simplefilter("ignore")
+    chosen = arguments(__doc__, tuned="options under which it converges from most starts")
+    run(chosen, lambda: chosen.tuned, solve)  # a problem is written anew at every level: delta is a number in it
