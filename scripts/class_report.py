@@ -19,6 +19,7 @@ from colloc.gait_fields import gait_from
 from colloc.infinitesimal import small_gait
 from scripts.bound_table import BUDGET
 from scripts.class_rows import equal_links, known_small_gait
+from scripts.link_gaps import LYING, gaps
 
 CURATED = Path("results/curated")
 DELTA = 1e-4
@@ -77,20 +78,22 @@ def table(links: int, friction: str, known: dict) -> list[str]:
         "",
     ]
     lines += [
-        "| class | efficiency | delta -> 0 | d | W | path length | replay gap | starts (certified) | best from |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| class | efficiency | delta -> 0 | d | W | path length | gap | lying | replay gap | starts (certified) | best from |",
+        "|" + "---|" * 11,
     ]
     for row in sorted(known, key=order):
         attempts, found = known[row], best(known[row])
         tally = f"{len(attempts)} ({sum(a['status'] == 'solved' for a in attempts.values())})"
         if found is None:
-            lines.append(f"| {class_words(row)} | none certified | | | | | | {tally} | |")
+            lines.append(f"| {class_words(row)} | none certified | | | | | | | | {tally} | |")
             continue
         seed = next(name for name, a in attempts.items() if a is found)
+        least, lying = gaps(equal_links(links), gait_from(found["gait"]))
         efficiency = f"{found['efficiency']:.4f}{'*' if smaller_delta(row, found) else ''}"
         lines.append(
             f"| {class_words(row)} | {efficiency} | {found['at zero delta']:.4f} | {found['distance']:.4f} | "
-            f"{found['work']:.4f} | {found['length']:.2f} | {abs(found['replay gap']):.0e} | {tally} | {seed} |"
+            f"{found['work']:.4f} | {found['length']:.2f} | "
+            f"{least:.3f} | {lying:.0%} | {abs(found['replay gap']):.0e} | {tally} | {seed} |"
         )
     return [*lines, ""]
 
@@ -139,6 +142,9 @@ def head(links: int) -> list[str]:
         "an asterisk, where delta changes the efficiency by more than 1 %. Every efficiency is that of an independent replay",
         "whose certificate holds (replay gap at most 1e-4); the class is explained in docs/gait_classes.md. Local optima of",
         "few starts: a class may hold better ones. Starts that failed under earlier code and were repeated count once.",
+        "Links have no thickness. *Gap*: the smallest distance, over the whole gait, between links that are not neighbours,",
+        "and from the free end of a link to its neighbour [body lengths]; *lying*: the share of the path on which it is",
+        f"below {LYING:g}, so that links lie on each other. The best gaits whose links keep 0.05 apart: without_contact.md.",
     ]
     if links > 3:
         lines.append('"Fewer links": the best gait of the class with one link less, laid into the longer chain.')
@@ -161,10 +167,13 @@ def draw(links: int, known: dict) -> None:
     for row in SHOWN if links == 3 else SHOWN_CHAINS:
         found = best(known.get("1,1,1", {}).get(row, {}))
         if found is not None:
+            gait = gait_from(found["gait"])
+            _, lying = gaps(equal_links(links), gait)
             title = (
                 f"{class_words(row).replace(', bilateral', '')}\nd/W = {found['efficiency']:.4f}, d = {found['distance']:.3f}"
             )
-            panels.append(GaitPanel(title if links == 3 else title.replace("\n", ": "), gait_from(found["gait"])))
+            title += f", lying {lying:.0%}" if lying > 0 else ""
+            panels.append(GaitPanel(title if links == 3 else title.replace("\n", ": "), gait))
     if panels and links == 3:
         save_gait_panels(panels, CURATED / "gait_classes.png")
     elif panels:

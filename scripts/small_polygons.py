@@ -17,6 +17,7 @@ from colloc.infinitesimal import small_gait
 from colloc.optimise import maximise_efficiency
 from colloc.path_samples import path_length
 from colloc.solution import SOLVED
+from scripts.link_gaps import LYING, gaps
 
 SPEEDS = (0.1, 0.04, 0.02)
 DELTA_PER_SPEED = 1e-3
@@ -34,7 +35,8 @@ def row(symmetry: str, speed: float) -> list[str]:
     solution = maximise_efficiency(stated.with_(delta=delta, delta_start=100 * delta))
     certificate = solution.certificate
     if solution.status != SOLVED or certificate is None:
-        return [symmetry, f"{2 * np.pi * speed:.3f}", f"{delta:.0e}", solution.status, "", "", "", ""]
+        return [symmetry, f"{2 * np.pi * speed:.3f}", f"{delta:.0e}", solution.status, *6 * [""]]
+    least, lying = gaps(Chain(), solution.gait)
     gap = next(check.value for check in certificate.checks if check.name == "replay gap")
     return [
         symmetry,
@@ -45,6 +47,7 @@ def row(symmetry: str, speed: float) -> list[str]:
         f"{certificate.distance:.5f}",
         f"{certificate.work:.5f}",
         f"{gap:.0e}",
+        *(f"{least:.3f}", f"{lying:.0%}"),
     ]
 
 
@@ -56,12 +59,15 @@ def main() -> None:
         f"{small_gait(Chain(), Friction(), np.array(shape)).efficiency:.4f} ({symmetry}, at ({shape[0]:.3g}, {shape[1]:.3g}))"
         for symmetry, shape in LIMITS.items()
     )
-    heads = ["symmetry", "length at least", "delta", "length", "d/W", "d", "W", "replay gap"]
+    heads = ["symmetry", "length at least", "delta", "length", "d/W", "d", "W", "replay gap", "gap", "lying"]
     lines = [
         "# Small triangles, three equal links, isotropic friction",
         "",
         "Written by `python -m scripts.small_polygons`. Triangles in shape space, sides of at least 0.02 rad, each certified",
         f"by independent replay; delta at unit shape speed. Infinitesimal gaits reach {limits}.",
+        "Links have no thickness: *gap* is the smallest distance between links that are not neighbours, and from the free end",
+        f"of a link to its neighbour [body lengths], *lying* the share of the path on which it is below {LYING:g}, so that",
+        "links lie on each other: at the fold most or all of the time. without_contact.md has the best gaits that keep apart.",
         "",
         "| " + " | ".join(heads) + " |",
         "|" + "---|" * len(heads),

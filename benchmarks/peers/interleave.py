@@ -18,9 +18,9 @@ from benchmarks.peer_table import FOLDER, OTHERS, OWN, RECORDED_ONCE, Tool
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
-def started(tool: Tool, python: str, starts: int) -> subprocess.Popen[str]:
+def started(tool: Tool, python: str, starts: int, first: int) -> subprocess.Popen[str]:
     """A tool's process, which waits for a line before every start."""
-    command = [python, "-m", *tool.command, "--starts", str(starts), "--paced"]
+    command = [python, "-m", *tool.command, "--starts", str(starts), "--first", str(first), "--paced"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     return subprocess.Popen(command, text=True, env=os.environ | _ONE_THREAD, **pipes)  # type: ignore[call-overload]
 
@@ -41,16 +41,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--peers", default=sys.executable, help="Python of the environment with rockit and YAPSS")
     parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="go on after so many starts of an earlier run")
     parser.add_argument("--only", nargs="*", metavar="NAME", help=f"of {', '.join((*OWN, *OTHERS))}")
     options = parser.parse_args()
     tools = {**OWN, **OTHERS}
     names = options.only or [name for name in tools if name not in RECORDED_ONCE]
     FOLDER.mkdir(parents=True, exist_ok=True)
-    running = {name: started(tools[name], sys.executable if name in OWN else options.peers, options.starts) for name in names}
+    running = {
+        name: started(tools[name], sys.executable if name in OWN else options.peers, options.starts, options.first)
+        for name in names
+    }
     files = {name: FOLDER / tools[name].file for name in names}
-    for path in files.values():
-        path.write_text("")
-    for k in range(options.starts):
+    for path in files.values():  # what an earlier run has beyond the first starts is made again
+        kept = path.read_text(encoding="utf-8").splitlines(keepends=True)[: options.first] if options.first else []
+        path.write_text("".join(kept), encoding="utf-8")
+    for k in range(options.first, options.starts):
         for name, process in running.items():
             line = turn(process)
             with Path(files[name]).open("a", encoding="utf-8") as file:

@@ -15,9 +15,10 @@ from benchmarks.peers.starts import starts
 
 
 def arguments(page: str, **flags: str) -> argparse.Namespace:
-    """The options of a tool's script: --starts, --paced, and its own switches with their help."""
+    """The options of a tool's script: --starts, --first, --paced, and its own switches with their help."""
     parser = argparse.ArgumentParser(description=page, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="starts to leave out, of an earlier run that was cut short")
     parser.add_argument("--paced", action="store_true", help="wait for a line on standard input before every start")
     for name, words in flags.items():
         parser.add_argument(f"--{name}", action="store_true", help=words)
@@ -25,9 +26,10 @@ def arguments(page: str, **flags: str) -> argparse.Namespace:
 
 
 def run(options: argparse.Namespace, build: Callable[[], Any], solve: Callable[[Any, np.ndarray], dict]) -> None:
-    """Prints what `solve` makes of every start; the first one pays for `build`, and for the processes it starts."""
-    program, begin = None, _processor_seconds()
-    for start in starts(options.starts):
+    """Prints what `solve` makes of every start; the first one of all pays for `build`, and for the processes it starts."""
+    program = build() if options.first else None
+    begin = _processor_seconds()
+    for start in starts(options.starts)[options.first :]:
         if options.paced:
             sys.stdin.readline()
         program = build() if program is None else program
