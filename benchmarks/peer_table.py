@@ -88,33 +88,41 @@ def judged(run: dict) -> tuple[bool, float, float]:
     return abs(short) < 1e-3, run["efficiency"] / replayed - 1, short
 
 
-def row(name: str, runs: list[dict], unit: float) -> list[object]:
+class Tally(NamedTuple):
+    """The runs of a tool with their verdicts (`judged`)."""
+
+    runs: list[dict]
+    verdicts: list[tuple[bool, float, float]]
+
+    @property
+    def seconds_an_optimum(self) -> float:
+        """Processor seconds of all starts over the optima found; infinite if there are none."""
+        found = sum(good for good, _, _ in self.verdicts)
+        return sum(run["cpu"] for run in self.runs) / found if found else np.inf
+
+
+def row(name: str, tally: Tally, unit: float) -> list[object]:
     """A line of the table; `unit`: processor seconds an optimum that count as 1."""
-    verdicts = [judged(run) for run in runs]
-    good = [k for k, verdict in enumerate(verdicts) if verdict[0]]
-    cpu = np.array([run["cpu"] for run in runs])
-    best = sum(abs(runs[k]["efficiency"] / OPTIMA[0] - 1) < 5e-3 for k in good)
-    cells: list[object] = [name, len(runs), f"{len(good)} ({best} the best)", float(np.median(cpu))]
+    good = [k for k, verdict in enumerate(tally.verdicts) if verdict[0]]
+    best = sum(abs(tally.runs[k]["efficiency"] / OPTIMA[0] - 1) < 5e-3 for k in good)
+    median = float(np.median([run["cpu"] for run in tally.runs]))
+    cells: list[object] = [name, len(tally.runs), f"{len(good)} ({best} the best)", median]
     if not good:
         return [*cells, "-", "-", "-", "-"]
-    claim, short = (float(np.median([abs(verdicts[k][i]) for k in good])) for i in (1, 2))
-    seconds = seconds_an_optimum(runs)
+    claim, short = (float(np.median([abs(tally.verdicts[k][i]) for k in good])) for i in (1, 2))
+    seconds = tally.seconds_an_optimum
     return [*cells, seconds, f"{seconds / unit:.2f}" if name not in RECORDED_ONCE else "(other day)", claim, short]
-
-
-def seconds_an_optimum(runs: list[dict]) -> float:
-    """Processor seconds of all starts over the optima found."""
-    return sum(run["cpu"] for run in runs) / sum(judged(run)[0] for run in runs)
 
 
 def report(quick: bool, folder: Path) -> str:
     """The table; ratios are those of processor seconds an optimum to colloc's certified solve."""
     runs = {name: recorded(tool.file) for name, tool in {**OWN, **OTHERS}.items()}
-    unit = seconds_an_optimum(runs[CERTIFIED])
-    rows = [row(name, found, unit) for name, found in runs.items() if found]
+    tallies = {name: Tally(found, [judged(run) for run in found]) for name, found in runs.items() if found}
+    unit = tallies[CERTIFIED].seconds_an_optimum
+    rows = [row(name, tally, unit) for name, tally in tallies.items()]
     header = ["tool", "starts", "optima found", "median s a start", "s an optimum", "ratio"]
     header += ["claim against replay", "short of optimum"]
     text = markdown_table(header, rows)
-    if missing := [name for name, found in runs.items() if not found]:
+    if missing := [name for name in runs if name not in tallies]:
         text += f"\n\nNot recorded: {', '.join(missing)}."
     return f"{text}\n\n{_WORDS}"
