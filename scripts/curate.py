@@ -33,7 +33,7 @@ KEPT = {
     "gait_classes_4.pdf": "python -m scripts.class_table --links 4",
     "gait_classes.png": "python -m scripts.class_table",
     "gait_classes.pdf": "python -m scripts.class_table",
-    "chains.md": "python -m benchmarks.chains --starts 4",
+    "chains.md": "python -m benchmarks.chains --output results/curated",
     "error_control.md": "python -m benchmarks.error_control",
     "work_precision.png": "python -m benchmarks.work_precision",
     "work_precision_path.md": "python -m benchmarks.work_precision --path",
@@ -48,6 +48,7 @@ KEPT = {
     "sweep_scaling.md": "python -m benchmarks.sweep_scaling --cells 24 --tasks 500 --dask",
     "bound_table.md": "python -m scripts.bound_table",
     "cycles.md": "python -m scripts.search_cycles --cases 32,1 24,2 24,4 24,7",
+    "without_contact.md": "python -m scripts.without_contact",
     "small_polygons.md": "python -m scripts.small_polygons",
     "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
 }

@@ -9,6 +9,7 @@ from benchmarks.link_integrals import worst_errors
 from benchmarks.peer_table import OPTIMA, judged
 from benchmarks.peers import physics
 from benchmarks.peers.nelder_mead import minus_efficiency
+from benchmarks.peers.slsqp_three_link import Reduced, solve
 from benchmarks.peers.starts import feasible_motion, starts
 from benchmarks.scaling import problem_of
 from benchmarks.smooth_panels import MOTION, loads
@@ -84,6 +85,13 @@ def test_a_run_is_judged_by_the_replay_of_its_gait():
 def test_nelder_mead_is_given_the_efficiency():
     assert -minus_efficiency(np.array([0.0, 2.859, 1.302])) == pytest.approx(OPTIMA[0], rel=3e-3)
     assert minus_efficiency(np.array([0.0, 4.0, 1.0])) == 0.0
+
+
+def test_slsqp_on_the_reduced_functions_finds_an_optimum():
+    found, claim, short = judged(solve(Reduced(), starts(1)[0]))
+    assert found
+    assert abs(claim) < 1e-4
+    assert abs(short) < 1e-4
 
 
 def test_closed_forms_are_as_good_as_the_table_says_and_few_points_as_bad():
