@@ -23,7 +23,7 @@ KEPT = {
     "report.png": "python -m scripts.report_screenshot",
     "gallery.json": "python -m scripts.gallery",
     "gallery": "python -m scripts.gallery",
-    "mesh_tolerance.md": "python -m benchmarks --only mesh_tolerance",
+    "mesh_tolerance.md": "python -m benchmarks.work_precision",
     "gait_classes.md": "python -m scripts.class_table",
     "gait_classes_4.md": "python -m scripts.class_table --links 4",
     "gait_classes_5.md": "python -m scripts.class_table --links 5",
