@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from colloc import Chain
-from colloc.contact import gap
-from colloc.gait_fields import AnyGait
+from colloc.gaits.gait_fields import AnyGait
+from colloc.mechanics.contact import gap
 
 LYING = 0.01
 """Body lengths: links with a smaller gap count as lying on each other."""

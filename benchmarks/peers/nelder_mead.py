@@ -11,8 +11,8 @@ from scipy.optimize import minimize
 
 from benchmarks.peers.runs import arguments, found, run
 from colloc import Chain, Friction, ellipse, solve_balance
-from colloc.balance import instant, total_power
-from colloc.ellipses import admissible
+from colloc.mechanics.balance import instant, total_power
+from scripts.models.ellipses import admissible
 
 INSTANTS = 400
 SETTINGS = {"xatol": 1e-3, "fatol": 1e-7, "maxfev": 1000}

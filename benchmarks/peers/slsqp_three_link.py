@@ -1,6 +1,6 @@
 """SciPy's SLSQP on the reduced functions: python -m benchmarks.peers.slsqp_three_link --starts 20 [--compiled]
 
-The balance, the orientation, distance and work are eliminated by `colloc.condensed`, which gives minus the efficiency and its
+The balance, the orientation, distance and work are eliminated by `collocation.reduced_space`, which gives minus the efficiency and its
 exact gradient as functions of (A0, A1, B1) and the first orientation; the optimiser is SciPy's. Mesh, scheme and levels of
 delta are those of the other tools; joint limits hold at the mesh's points, where they are linear. With --compiled the
 derivatives are compiled first; the first start pays.
@@ -18,11 +18,11 @@ from benchmarks.peers.physics import DELTAS
 from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import INTERVALS
 from colloc import Harmonic, Problem, ellipse
-from colloc.compiled_problem import compile_problem
-from colloc.condensed import Condensed
-from colloc.layout import RADIANS
-from colloc.machine_code import FOLDER, OFF
-from colloc.transcription import transcribe
+from colloc.collocation.layout import RADIANS
+from colloc.collocation.reduced_space import Condensed
+from colloc.collocation.transcription import transcribe
+from colloc.numerics.machine_code import FOLDER, OFF
+from colloc.search.compiled_problem import compile_problem
 
 TOLERANCE = 1e-9
 STATED = Problem(
