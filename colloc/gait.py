@@ -57,6 +57,11 @@ class Fourier:
         return 1.0
 
     @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: radians of phase per period."""
+        return 2 * np.pi
+
+    @property
     def n_harmonic(self) -> int:
         return self.cos.shape[1]
 

@@ -12,8 +12,8 @@ from operator import attrgetter
 
 import numpy as np
 
-from colloc.continuation import continue_delta
 from colloc.errors import ProblemError
+from colloc.optimise import optimum
 from colloc.problem import Problem
 from colloc.solution import Solution
 
@@ -95,7 +95,7 @@ def continue_parameter(
             # close to an optimum there is no need to begin at strong regularisation again
             near = 10 * here.delta if name == "delta" else 3 * here.delta
             here = here.with_(guess=guess.gait, delta_start=min(here.delta_start, near))
-        step = Step(value, continue_delta(here))
+        step = Step(value, optimum(here))
         steps.append(step)
         if on_step is not None:
             on_step(step)

@@ -20,8 +20,8 @@ from colloc.path_samples import fourier_through, symmetric_samples
 from colloc.schemes import scheme
 
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
-CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
-FORMULATIONS = (CONDENSED, MAP, LIFTED)
+FULL, IMPLICIT = "full", "implicit velocity"
+FORMULATIONS = (FULL, IMPLICIT)
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
@@ -77,8 +77,9 @@ class Problem:
         Mesh intervals on the part of the period that is solved.
     scheme : str
         Collocation scheme, see `colloc.schemes.scheme`.
-    formulation : {"condensed", "map", "lifted"}
-        How the balance becomes constraints, see `colloc.kernels`; "condensed" eliminates them, see `colloc.condensed`.
+    formulation : {"full", "implicit velocity"}
+        The nonlinear program whose solution is the answer, see `colloc.kernels`: with tail velocities and link forces as
+        variables and the balance as constraints, or with the velocities tied to those of the balance solver.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """
@@ -94,7 +95,7 @@ class Problem:
     smallest_shape_speed: float = 0.1
     intervals: int = 30
     scheme: str = "gauss-3"
-    formulation: str = CONDENSED
+    formulation: str = FULL
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
@@ -147,8 +148,6 @@ class Problem:
             per_interval = collocation.s - collocation.left
             fewest, what = max(2, -(-4 * self.gait.harmonics // per_interval)), f"{self.gait.harmonics} harmonics"
         else:
-            if self.formulation == LIFTED:
-                raise ProblemError(f"the class {kind} has no formulation {LIFTED!r}: its balance is always eliminated.")
             if collocation.left:
                 raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
             fewest, what = (2 * self.gait.pieces, "the sides") if isinstance(self.gait, Polygon) else (4, "a path")

@@ -16,11 +16,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from colloc.body import Chain
-from colloc.continuation import continue_delta
 from colloc.gait import Fourier, Harmonic
 from colloc.gait_fields import AnyClass, AnyGait
-from colloc.level_run import Report
-from colloc.optimise import maximise_efficiency
+from colloc.optimise import Report, maximise_efficiency, optimum
 from colloc.path_gait import Corners
 from colloc.path_samples import fourier_through, path_length
 from colloc.problem import Problem
@@ -131,7 +129,7 @@ def maximise_from(
     **changes
         As for `prolonged`.
     """
-    solve = maximise_efficiency if certified else continue_delta
+    solve = maximise_efficiency if certified else optimum
 
     def value(solution: Solution) -> float:
         return efficiency_of(solution) if found(solution, certified) else -np.inf
@@ -180,7 +178,7 @@ def continue_classes(
     list of Solution
         In the order they were solved, failed ones too; a class that fails passes on what it was given.
     """
-    solve = maximise_efficiency if certified else continue_delta
+    solve = maximise_efficiency if certified else optimum
     solutions: list[Solution] = []
     gait: AnyGait = problem.guess
     known: float | None = None

@@ -25,12 +25,19 @@ class ShapeCheck(NamedTuple):
 
     value: of the angles. share: of the angles, the weight of the first of two sums of which the function is the minimum,
     or -1. cut: of the angles and a share, the tangent plane of that weight, or the function itself where it is negative.
+    slope: its derivative with respect to the angles.
     """
 
     name: str
     value: ca.Function
     share: ca.Function
     cut: ca.Function
+    slope: ca.Function
+
+    @property
+    def on_joint(self) -> bool:
+        """Whether it is a joint angle itself, bounded from below too."""
+        return self.name.startswith("joint")
 
 
 def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[ShapeCheck]:
@@ -55,7 +62,12 @@ def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[Shape
 def _smooth_check(name: str, angles: ca.SX, value: ca.SX) -> ShapeCheck:
     share = ca.SX.sym("share")
     none = ca.Function("share", [angles], [ca.SX(-1)])
-    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, ca.Function("cut", [angles, share], [value]))
+    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, *_cut(angles, share, value))
+
+
+def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:
+    slope = ca.densify(ca.gradient(cut, angles))
+    return ca.Function("cut", [angles, share], [cut]), ca.Function("slope", [angles, share], [slope])
 
 
 def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX, width: float = SMOOTHING) -> ShapeCheck:
@@ -65,5 +77,5 @@ def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX, width:
         name,
         ca.Function("check", [angles], [value]),
         ca.Function("share", [angles], [share_of_first(first, second, width)]),
-        ca.Function("cut", [angles, share], [cut]),
+        *_cut(angles, share, cut),
     )

@@ -12,12 +12,13 @@ import numpy as np
 from colloc.balance import Instant, instant, total_power
 from colloc.fixed_point import solve_balance
 from colloc.gait_fields import AnyGait
-from colloc.layout import RADIANS, Layout, problem_layout
+from colloc.layout import Layout, problem_layout
 from colloc.mesh import Mesh
 from colloc.problem import Problem
 from colloc.schemes import scheme
 from colloc.solution_card import solution_card
 
+REDUCED = "reduced"
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
 
 
@@ -47,6 +48,9 @@ class Level:
     seconds, evaluation_seconds : float
     scheme : str
         Collocation scheme, which refinement may have raised in order; "" for the problem's.
+    program : str
+        What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
+        formulation.
     """
 
     delta: float
@@ -66,6 +70,12 @@ class Level:
     seconds: float
     evaluation_seconds: float
     scheme: str = ""
+    program: str = REDUCED
+
+    @property
+    def full(self) -> bool:
+        """Whether IPOPT solved the problem's own formulation, and no reduced one was searched."""
+        return self.program != REDUCED
 
 
 @dataclass(frozen=True)
@@ -230,7 +240,8 @@ class Solution:
         """Angles, rates and tail velocities per period at the collocation points."""
         x, layout, problem = self.last.x, self.layout, self.problem
         if layout.z.size:
-            return x[layout.angles], RADIANS * x[layout.rates], RADIANS * x[layout.z]
+            unit = self.gait.speed_unit
+            return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
         gait, times = self.gait, self.mesh.times
         angles, rates = gait.angles(times), gait.rates(times)
         return angles, rates, solve_balance(problem.body, problem.friction, angles, rates, self.delta_per_period).z

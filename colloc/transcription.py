@@ -34,7 +34,7 @@ from colloc.gait import Fourier
 from colloc.kernels import N_RATE, gait_check, mean_square, minus_efficiency, point_function
 from colloc.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.mesh import Mesh
-from colloc.problem import LIFTED, Problem
+from colloc.problem import FULL, Problem
 from colloc.shape_checks import ShapeCheck, shape_checks
 from colloc.velocity_callback import VelocityMap
 from colloc.worst_instants import check_values, held_shares, worst_instants
@@ -75,7 +75,7 @@ class Transcription:
 
     @property
     def lifted(self) -> bool:
-        return self.problem.formulation == LIFTED
+        return self.layout.forces.size > 0
 
     @property
     def speed_unit(self) -> float:
@@ -191,7 +191,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
                     gather,
                     stacked(groups, name, function.n_out * gather.shape[1]),
                     parameters,
-                    velocity_map if name == "point" and problem.formulation != LIFTED else None,
+                    velocity_map if name == "point" and problem.formulation != FULL else None,
                 )
                 for name, (function, gather, parameters) in blocks.items()
             ),
@@ -210,21 +210,26 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
     # a function bounded by L has Fourier coefficients of at most 4 L / pi
     lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * problem.joint_limit / np.pi
-    if problem.formulation == LIFTED:
-        friction, length = problem.friction, problem.body.length_column()
-        tangential = max(friction.mu_f, friction.mu_b) * length
-        limit = np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+    if layout.forces.size:
+        limit = largest_forces(problem)
         lower[layout.forces], upper[layout.forces] = -limit, limit
     for state in (layout.distance, layout.work):
         lower[state[0, 0]] = upper[state[0, 0]] = 0.0
     return lower, upper
 
 
+def largest_forces(problem: Problem) -> np.ndarray:
+    """Largest tangential and normal forces and couples of friction on the links, ``(3 n_link, 1)``."""
+    friction, length = problem.friction, problem.body.length_column()
+    tangential = max(friction.mu_f, friction.mu_b) * length
+    return np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+
+
 def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
     """The equations of every point: lifted force laws, then the balance (or the velocity map in its place)."""
     n_law = n_out - N_RATE - 3
     groups = [output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
-    if problem.formulation == LIFTED:
+    if problem.formulation == FULL:
         groups.insert(0, output_group("force law", range(n_law), n_out, n_point, n))
     return groups
 

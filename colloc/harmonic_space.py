@@ -1,0 +1,107 @@
+"""Harmonic gaits as a search sees them: shapes on a mesh and rows that keep them admissible, in terms of their parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.contact import Pairs
+from colloc.gait import Fourier
+from colloc.gait_fields import AnyGait
+from colloc.layout import problem_mesh
+from colloc.mesh import Mesh
+from colloc.path_samples import fourier_through
+from colloc.problem import Problem
+from colloc.shape_checks import shape_checks
+from colloc.worst_instants import check_values, held_shares, worst_instants
+
+
+class HarmonicSpace:
+    """Members of a class of harmonics by their parameters v, in which angles and rates are linear.
+
+    Rows: every shape check at its worst instant in every mesh cell, then the mean square shape speed.
+
+    Parameters
+    ----------
+    problem : Problem
+    edges : (n_interval + 1,), optional
+        Of the mesh; uniform by default.
+    scheme : str, optional
+        By default the problem's.
+    far : pairs of links more than two apart that are kept from crossing.
+    """
+
+    def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
+        self.problem, self.far = problem, far
+        self.mesh = problem_mesh(problem.with_(scheme=scheme or problem.scheme), edges)
+        self.checks = shape_checks(problem.body, far)
+        gait, n_joint, limit = problem.gait, problem.body.n_joint, problem.joint_limit
+        angles, rates = gait.angle_matrix(self.mesh.times, n_joint), gait.rate_matrix(self.mesh.times, n_joint)
+        self._matrix = np.concatenate([angles, rates], axis=1)
+        self.n = self._matrix.shape[2]
+        self._pace = np.ones(self.mesh.n_point)
+        self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
+        # a function bounded by L has Fourier coefficients of at most 4 L / pi
+        self.upper = np.full(self.n, 4 * limit / np.pi)
+        self.lower = -self.upper
+        bounds = [(-limit, limit) if check.on_joint else (-np.inf, 0.0) for check in self.checks]
+        low, high = np.repeat(bounds, self.mesh.n, axis=0).T
+        self.row_lower = np.append(low, problem.smallest_shape_speed**2)
+        self.row_upper = np.append(high, np.inf)
+        names, ends = [*(check.name for check in self.checks), "shape speed"], self.mesh.n * np.arange(len(self.checks) + 1)
+        self.groups = {name: slice(a, b) for name, a, b in zip(names, ends, [*ends[1:], ends[-1] + 1], strict=True)}
+        self.own = np.arange(self.n)
+
+    def member(self, v: np.ndarray) -> Fourier:
+        """The gait of parameters v."""
+        return self.problem.gait.fourier(v, self.problem.body.n_joint)
+
+    def parameters(self, gait: AnyGait) -> np.ndarray:
+        """Parameters ``(n,)`` of the member nearest to a gait."""
+        return self.problem.gait.parameters(fourier_through(gait, self.problem.gait))
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        """The parameters as the full program has them."""
+        return v
+
+    def phase_mesh(self, gait: Fourier) -> Mesh:
+        """The mesh in phases of a member: it is the same for all."""
+        return self.mesh
+
+    def remeshed(self, gait: Fourier, edges: np.ndarray, scheme: str) -> HarmonicSpace:
+        """The class on another mesh."""
+        return HarmonicSpace(self.problem, edges, scheme, self.far)
+
+    def with_far(self, far: Pairs) -> HarmonicSpace:
+        """The class with other pairs of links kept apart."""
+        return HarmonicSpace(self.problem, self.mesh.edges, self.mesh.scheme.name, far)
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
+        y = (self._matrix @ v).T
+        return (*np.split(y, 2), self._pace)
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        """See `colloc.reduced_space.Shapes`."""
+        return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
+
+    def move_checks(self, v: np.ndarray) -> float:
+        """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+        gait, n_joint = self.member(v), self.problem.body.n_joint
+        times = worst_instants(gait, self.mesh, self.checks)
+        placed = zip(self.checks, times, strict=True)
+        self._placed = [(c, held_shares(c, gait, t), self.problem.gait.angle_matrix(t, n_joint)) for c, t in placed]
+        values = np.concatenate([check_values(c, gait, t) for c, t in zip(self.checks, times, strict=True)])
+        return float(max((values - self.row_upper[:-1]).max(), (self.row_lower[:-1] - values).max()))
+
+    def rows(self, v: np.ndarray) -> np.ndarray:
+        """Values of the rows."""
+        values = [check.cut((matrix @ v).T, shares[None]).full().ravel() for check, shares, matrix in self._placed]
+        return np.append(np.concatenate(values), v @ self._square @ v)
+
+    def row_slopes(self, v: np.ndarray) -> np.ndarray:
+        """Derivatives of the rows, ``(n_row, n)``."""
+        slopes = [
+            np.einsum("jt,tjp->tp", check.slope((matrix @ v).T, shares[None]).full(), matrix)
+            for check, shares, matrix in self._placed
+        ]
+        return np.vstack([*slopes, 2 * self._square @ v])

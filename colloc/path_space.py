@@ -1,0 +1,180 @@
+"""Paths as a search sees them: arcs or straight pieces on a mesh, and rows that keep them in their class, by few parameters.
+
+A free path is its mean shape speed, the tangents where arcs meet, and the shape at its start: all other shapes follow, arc by
+arc. Tangents of more than two joints are divided by their length, so that they may be any vectors, and the last one is that
+of the first where the path closes smoothly. A polygon is its vertices.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from colloc.blocks import oracles
+from colloc.contact import Pairs
+from colloc.gait_fields import AnyGait
+from colloc.layout import problem_layout
+from colloc.mesh import Mesh
+from colloc.path_class import FreePath
+from colloc.path_gait import ArcPath, Corners
+from colloc.path_kernels import chord
+from colloc.path_start import nearest_parameters
+from colloc.path_transcription import transcribe_fit
+from colloc.problem import Problem
+from colloc.nlp import as_sparse
+from colloc.symmetry import BILATERAL, NONE
+
+_FOLLOWS = ("path", "unit tangent", "smooth closure")
+"""Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
+
+
+class PathSpace:
+    """Members of a class of paths near one of them; attributes as `colloc.reduced_program.SearchSpace`.
+
+    Parameters
+    ----------
+    problem : Problem
+    near : AnyGait
+        Fixes winding, start phase, and which interval lies on which side.
+    edges : (n_interval + 1,), optional
+        Of the mesh, in phases of `near`.
+    scheme : str, optional
+    far : pairs of links
+    """
+
+    def __init__(
+        self, problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+    ) -> None:
+        self.problem, self.near, self.far = problem, near, far
+        stated = problem.with_(scheme=scheme or problem.scheme)
+        self._fit = fit = transcribe_fit(stated, near, edges, far)
+        self.mesh, self._geometry = fit.mesh, fit.geometry
+        self.layout = problem_layout(problem, self.mesh)
+        self._oracles = oracles(fit.assembly)
+        free = fit.lower < fit.upper
+        self._fixed = np.where(free, 0.0, fit.lower)
+        gait, n_joint = problem.gait, problem.body.n_joint
+        self._arcs = isinstance(gait, FreePath)
+        self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
+        self.own = np.arange(fit.lower.size)
+        if self._arcs:
+            speed, tangents, shapes = gait.split(self.own, n_joint)
+            self._speed, self._tangents, self._shapes = speed[0, 0], tangents, shapes
+            last = tangents[:, : -1 if self._closed else None]
+            self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
+            self.own = self.own[free[self.own]]
+            self._chord = chord(self._geometry.piece)
+        self.n = self.own.size
+        self.lower, self.upper = fit.lower[self.own], fit.upper[self.own]
+        dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
+        kept = {name: np.arange(rows.start, rows.stop) for name, rows in fit.groups.items() if name not in dropped}
+        self._kept, ends = np.concatenate(list(kept.values())), np.cumsum([0, *(rows.size for rows in kept.values())])
+        self.groups = {name: slice(int(a), int(b)) for name, a, b in zip(kept, ends, ends[1:], strict=False)}
+        self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
+        self._place()
+
+    def _place(self) -> None:
+        """Where the collocation points lie, as functions of the parameters."""
+        mesh, piece = self.mesh, self._geometry.piece
+        out = ca.vertcat(piece.angles, piece.direction, piece.speed)
+        arguments = [piece.shape, piece.given]
+        slope = ca.densify(ca.vec(ca.jacobian(out, piece.shape)))
+        self._value, self._slope = ca.Function("place", arguments, [out]), ca.Function("slope", arguments, [slope])
+        self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
+        self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        """The parameters of `colloc.path_class`: shapes where arcs meet follow from the start."""
+        p = self._fixed.copy()
+        p[self.own] = v
+        if self._arcs:
+            tangents = p[self._tangents]
+            if tangents.shape[0] > 1:
+                if self._closed:
+                    tangents[:, -1] = tangents[:, 0] * (1 if self.problem.gait.symmetry == NONE else -1)
+                p[self._tangents] = tangents / np.linalg.norm(tangents, axis=0)
+            step = self._chord.value(p[self._geometry.shape], self.mesh.h[None], 0.0).full()
+            start = p[self._shapes[:, :1]]
+            p[self._shapes] = np.concatenate([start, start + np.cumsum(step, axis=1)], axis=1)
+        return p
+
+    def _frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Full parameters ``(m,)`` and their derivatives ``(m, n)``."""
+        p, frame = self.full_parameters(v), np.zeros((self._fixed.size, self.n))
+        frame[self.own, np.arange(self.n)] = 1.0
+        if not self._arcs:
+            return p, frame
+        if self._tangents.shape[0] > 1:
+            raw = self._fixed.copy()
+            raw[self.own] = v
+            for edge, rows in enumerate(self._tangents.T):
+                sign, source = 1.0, rows
+                if self._closed and edge == self._tangents.shape[1] - 1:
+                    sign, source = 1.0 if self.problem.gait.symmetry == NONE else -1.0, self._tangents[:, 0]
+                size = np.linalg.norm(raw[source])
+                unit = raw[source] / size
+                own = np.zeros((rows.size, self.n))
+                own[:, np.searchsorted(self.own, source)] = (np.eye(rows.size) - np.outer(unit, unit)) * sign / size
+                frame[rows] = own
+        local = self._geometry.shape
+        f = self._chord
+        nonzeros = f.jacobian(p[local], self.mesh.h[None], 0.0).full()
+        n_joint, n = self._shapes.shape[0], self.mesh.n
+        jacobian = np.zeros((n, n_joint, f.n_local))
+        jacobian[:, f.jac_row, f.jac_col] = nonzeros.T
+        # a chord does not depend on where the arc starts, so the frame of the shapes is not needed for it
+        step = np.einsum("kjs,ksn->kjn", jacobian, frame[local.T])
+        frame[self._shapes[:, 1:].T] = frame[self._shapes[:, 0]] + np.cumsum(step, axis=0)
+        return p, frame
+
+    def member(self, v: np.ndarray) -> ArcPath | Corners:
+        """The gait of parameters v."""
+        return self._fit.member(self.full_parameters(v))
+
+    def parameters(self, gait: AnyGait) -> np.ndarray:
+        """Parameters ``(n,)`` of the member nearest to a gait."""
+        return nearest_parameters(self._fit, gait)[self.own]
+
+    def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
+        """The mesh in phases of a member."""
+        return self._fit.phase_mesh(gait)
+
+    def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
+        """The class near a member on another mesh."""
+        return PathSpace(self.problem, gait, edges, scheme, self.far)
+
+    def with_far(self, far: Pairs) -> PathSpace:
+        """The class with other pairs of links kept apart."""
+        return PathSpace(self.problem, self.near, self.mesh.edges, self.mesh.scheme.name, far)
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
+        out = self._value(self.full_parameters(v)[self._gather], self._given).full()
+        return (*np.split(out[:-1], 2), out[-1])
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        """See `colloc.reduced_space.Shapes`."""
+        p, frame = self._frame(v)
+        n_out, n_shape = on_shape.shape[2] + 1, self._gather.shape[0]
+        slope = self._slope(p[self._gather], self._given).full().T.reshape(-1, n_shape, n_out)
+        on_local = np.einsum("kto,tso->kst", np.concatenate([on_shape, on_pace[:, :, None]], axis=2), slope)
+        on_full = np.zeros((on_local.shape[0], p.size))
+        np.add.at(on_full, (slice(None), self._gather), on_local)
+        return on_full @ frame
+
+    def move_checks(self, v: np.ndarray) -> float:
+        """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+        p = self.full_parameters(v)
+        self._moved = self._oracles.parameter_vector(1.0, self._fit.block_parameters(p))
+        return self._fit.check_excess(p)
+
+    def rows(self, v: np.ndarray) -> np.ndarray:
+        """Values of the rows."""
+        g = self._oracles.options["jac_g"](self.full_parameters(v), self._moved)[0]
+        return np.array(g).ravel()[self._kept]
+
+    def row_slopes(self, v: np.ndarray) -> np.ndarray:
+        """Derivatives of the rows, ``(n_row, n)``."""
+        p, frame = self._frame(v)
+        jacobian = self._oracles.options["jac_g"](p, self._moved)[1]
+        return np.asarray(as_sparse(jacobian)[self._kept] @ frame)

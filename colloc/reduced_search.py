@@ -1,0 +1,157 @@
+"""The search for an optimum in the reduced space: delta falls, checks move, the mesh is refined, by quasi-Newton SQP.
+
+At every delta the gait is optimised within a box round the last one, with the shape checks at their worst instants; they are
+moved, and the gait optimised again, until it rests. At the final delta a mesh is planned for the gait (`colloc.refinement`)
+and the gait optimised on that, until it needs no other.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.far_contact import crossing_pairs, last_free
+from colloc.gait_fields import AnyGait
+from colloc.problem import Problem
+from colloc.reduced_program import ReducedProgram, SearchSpace
+from colloc.refinement import AIM, planned_mesh
+from colloc.search_space import space_near
+from colloc.sqp import Stationarity, minimised, stationarity
+
+FACTOR = 0.2
+FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
+"""Boxes round the last gait [rad], at the first level, later ones, and on a refined mesh: far enough for an optimum to move,
+not so far that a step ends in another world. A gait that ends on the edge of its box goes on from there."""
+ROUGH, FINE = 1e-8, 1e-14
+"""Accuracy of -d/W at which SQP stops, on the way and at the final delta."""
+STATIONARY = 1e-6
+_ROUNDS, _AT_REST = 12, 1e-8
+_ADMISSIBLE = 1e-8
+_MESHES, _SAME_AIM = 8, 2
+"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
+half, then a quarter of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A gait that SQP came to rest at.
+
+    Attributes
+    ----------
+    space : SearchSpace
+        Its class on a mesh, with the checks placed.
+    v : (n,)
+    delta : float
+    objective : float
+        -d/W.
+    conditions : Stationarity
+        Of the reduced program.
+    iterations, evaluations : int
+    seconds : float
+    """
+
+    space: SearchSpace
+    v: np.ndarray
+    delta: float
+    objective: float
+    conditions: Stationarity
+    iterations: int
+    evaluations: int
+    seconds: float
+
+    @classmethod
+    def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
+        """A gait as it is, to go on from."""
+        space.move_checks(v)
+        program = ReducedProgram(space, delta)
+        return cls(space, v, delta, program.objective(v), stationarity(program, v), 0, 0, 0.0)
+
+    @property
+    def optimal(self) -> bool:
+        """First-order conditions hold to 1e-6 in the reduced space."""
+        c = self.conditions
+        return max(c.kkt_error, c.violation, c.complementarity) < STATIONARY
+
+    @property
+    def gait(self) -> AnyGait:
+        return self.space.member(self.v)
+
+
+Report = Callable[[Found], None]
+
+
+def settled(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float) -> Found:
+    """Optimise from v at one delta on one mesh until checks, box and gait rest."""
+    begin, program = time.perf_counter(), ReducedProgram(space, delta)
+    iterations = evaluations = 0
+    space.move_checks(v)
+    for _ in range(_ROUNDS):
+        before = v
+        result = minimised(program, v, radius, accuracy)
+        v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
+        admissible = space.move_checks(v) <= _ADMISSIBLE
+        conditions = stationarity(program, v)
+        stationary = accuracy > FINE or conditions.kkt_error < STATIONARY
+        if admissible and not result.on_edge and (stationary or np.abs(v - before).max() < _AT_REST):
+            break
+    return Found(space, v, delta, result.objective, conditions, iterations, evaluations, time.perf_counter() - begin)
+
+
+def settled_apart(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float) -> Found:
+    """The same, keeping pairs of links more than two apart from crossing as they turn out to cross."""
+    found = settled(space, v, delta, radius, accuracy)
+    while new := tuple(p for p in crossing_pairs(found.space, found.v) if p not in found.space.far):
+        begin = last_free(found.space, v, found.v)
+        space = found.space.with_far(found.space.far + new)
+        found = settled(space, begin, delta, radius, accuracy)
+    return found
+
+
+def deltas(problem: Problem, first: float) -> list[float]:
+    """Levels from a first delta down to the problem's."""
+    levels = [first]
+    while levels[-1] > problem.delta:
+        below = FACTOR * levels[-1]
+        levels.append(below if below > 1.2 * problem.delta else problem.delta)
+    return levels
+
+
+def descended(found: Found, problem: Problem, report: Report) -> Found:
+    """From a gait at some delta down to the problem's, on the same mesh."""
+    for delta in deltas(problem, found.delta)[1:]:
+        accuracy = FINE if delta <= problem.delta else ROUGH
+        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, accuracy)
+        report(found)
+    return found
+
+
+def refined(found: Found, report: Report) -> tuple[Found, str]:
+    """The gait on planned meshes until it needs no other, and what is missing if that does not happen."""
+    problem, kept = found.space.problem, np.empty(0)
+    if problem.mesh_tolerance == 0:
+        return found, ""
+    for count in range(_MESHES):
+        aim = AIM * 0.5 ** max(0, count - _SAME_AIM)
+        delta = found.delta * found.gait.delta_unit
+        plan = planned_mesh(
+            problem, found.space.phase_mesh(found.gait), found.gait, delta, problem.mesh_tolerance, kept=kept, aim=aim
+        )
+        if plan is None:
+            return found, ""
+        kept = np.concatenate([kept, plan.kept])
+        space = found.space.remeshed(found.gait, plan.edges, plan.scheme)
+        found = settled_apart(space, space.parameters(found.gait), found.delta, REMESH_RADIUS, FINE)
+        report(found)
+    return found, f"refinement ended after {_MESHES} meshes, at an estimated efficiency error of {plan.estimate:.1e}."
+
+
+def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:
+    """An optimum of a problem from a start, on a mesh that meets its tolerance; the second is what is missing, or ""."""
+    space, v = space_near(problem, start)
+    accuracy = FINE if problem.delta_start <= problem.delta else ROUGH
+    found = settled_apart(space, v, problem.delta_start, FIRST_RADIUS, accuracy)
+    report(found)
+    return refined(descended(found, problem, report), report)
