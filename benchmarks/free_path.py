@@ -7,10 +7,11 @@ on 60 intervals without refinement (design target: 0.5 s and 5 s). Certificates 
 import argparse
 import time
 
+from colloc.search.continuation import continue_delta
+
 from colloc import FreePath, Problem, ellipse
-from colloc.continuation import continue_delta
-from colloc.nlp import Solver
-from colloc.path_start import transcribed
+from colloc.search.nlp import Solver
+from colloc.search.path_start import transcribed
 
 
 def main() -> None:

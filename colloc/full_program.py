@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.diagnosis import explanation
-from colloc.layout import problem_layout
-from colloc.nlp import NlpResult, Solver
-from colloc.path_start import transcribed
-from colloc.program import GaitProgram
+from colloc.collocation.layout import problem_layout
+from colloc.collocation.program import GaitProgram
+from colloc.collocation.warm_start import balanced_variables, feasible_point
 from colloc.reduced_search import Found
-from colloc.solution import REDUCED, Level
-from colloc.warm_start import balanced_variables, feasible_point
+from colloc.results.solution import REDUCED, Level
+from colloc.search.diagnosis import explanation
+from colloc.search.nlp import NlpResult, Solver
+from colloc.search.path_start import transcribed
 
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
 RADIUS = 0.01

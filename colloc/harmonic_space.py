@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.contact import Pairs
-from colloc.gait import Fourier
-from colloc.gait_fields import AnyGait
-from colloc.layout import problem_mesh
-from colloc.mesh import Mesh
-from colloc.path_samples import fourier_through
-from colloc.problem import Problem
-from colloc.shape_checks import shape_checks
-from colloc.worst_instants import check_values, held_shares, worst_instants
+from colloc.collocation.layout import problem_mesh
+from colloc.collocation.shape_checks import shape_checks
+from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.path_samples import fourier_through
+from colloc.gaits.problem import Problem
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.mesh import Mesh
 
 
 class HarmonicSpace:

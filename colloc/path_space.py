@@ -10,19 +10,19 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from colloc.blocks import oracles
-from colloc.contact import Pairs
-from colloc.gait_fields import AnyGait
-from colloc.layout import problem_layout
-from colloc.mesh import Mesh
-from colloc.path_class import FreePath
-from colloc.path_gait import ArcPath, Corners
-from colloc.path_kernels import chord
-from colloc.path_start import nearest_parameters
-from colloc.path_transcription import transcribe_fit
-from colloc.problem import Problem
-from colloc.nlp import as_sparse
-from colloc.symmetry import BILATERAL, NONE
+from colloc.collocation.layout import problem_layout
+from colloc.collocation.path_equations import chord
+from colloc.collocation.path_transcription import transcribe_fit
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.path_classes import FreePath
+from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import BILATERAL, NONE
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.blocks import oracles
+from colloc.numerics.mesh import Mesh
+from colloc.search.nlp import as_sparse
+from colloc.search.path_start import nearest_parameters
 
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
 """Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
@@ -84,7 +84,7 @@ class PathSpace:
         self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        """The parameters of `colloc.path_class`: shapes where arcs meet follow from the start."""
+        """The parameters of `colloc.gaits.path_classes`: shapes where arcs meet follow from the start."""
         p = self._fixed.copy()
         p[self.own] = v
         if self._arcs:

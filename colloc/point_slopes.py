@@ -12,10 +12,10 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from colloc.balance import instant, net_force, total_power
-from colloc.body import Chain
-from colloc.friction import Friction
-from colloc.machine_code import machine_code
+from colloc.mechanics.balance import instant, net_force, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.numerics.machine_code import machine_code
 
 OMEGA, ADVANCE, ACROSS, POWER = range(2, 6)
 """Rows of `point_slopes` beside the tail's velocity: rotation rate, velocity of the centre of mass in the body frame, power."""
@@ -39,7 +39,9 @@ def _expressions(body: Chain, friction: Friction) -> tuple[ca.Function, ca.Funct
     return found[0], found[1]
 
 
-def point_rates(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
+def point_rates(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
+) -> np.ndarray:
     """Rows ``(6, n_time)``: tail velocity, velocity of the centre of mass in the body frame, power.
 
     Parameters
@@ -53,7 +55,9 @@ def point_rates(body: Chain, friction: Friction, angles: np.ndarray, rates: np.n
     return _expressions(body, friction)[0](angles, rates, z, np.full((1, z.shape[1]), delta)).full()
 
 
-def point_slopes(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
+def point_slopes(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
+) -> np.ndarray:
     """Total derivatives ``(n_time, 6, 2 n_joint)`` of `point_rates` with respect to angles, then rates."""
     flat = _expressions(body, friction)[1](angles, rates, z, np.full((1, z.shape[1]), delta)).full()
     return flat.T.reshape(z.shape[1], -1, N_ROW).transpose(0, 2, 1)

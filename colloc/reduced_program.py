@@ -6,12 +6,12 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.contact import Pairs
-from colloc.gait_fields import AnyGait
-from colloc.mesh import Mesh
-from colloc.problem import Problem
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import NONE
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.mesh import Mesh
 from colloc.reduced_space import ReducedSpace, Shapes
-from colloc.symmetry import NONE
 
 
 class SearchSpace(Shapes, Protocol):
@@ -36,7 +36,7 @@ class SearchSpace(Shapes, Protocol):
         """Parameters of the member nearest to a gait."""
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        """The parameters as the full program has them (see `colloc.layout`)."""
+        """The parameters as the full program has them (see `colloc.collocation.layout`)."""
 
     def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member."""

@@ -1,7 +1,7 @@
 """The search for an optimum in the reduced space: delta falls, checks move, the mesh is refined, by quasi-Newton SQP.
 
 At every delta the gait is optimised within a box round the last one, with the shape checks at their worst instants; they are
-moved, and the gait optimised again, until it rests. At the final delta a mesh is planned for the gait (`colloc.refinement`)
+moved, and the gait optimised again, until it rests. At the final delta a mesh is planned for the gait (`verification.refinement`)
 and the gait optimised on that, until it needs no other.
 """
 
@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.far_contact import crossing_pairs, last_free
-from colloc.gait_fields import AnyGait
-from colloc.problem import Problem
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
 from colloc.reduced_program import ReducedProgram, SearchSpace
-from colloc.refinement import AIM, planned_mesh
+from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.search_space import space_near
 from colloc.sqp import Stationarity, minimised, stationarity
+from colloc.verification.refinement import AIM, planned_mesh
 
 FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3

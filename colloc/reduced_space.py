@@ -17,12 +17,12 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.body import Chain
-from colloc.friction import Friction
-from colloc.mesh import Mesh
-from colloc.newton_balance import balanced_near
+from colloc.collocation.newton_balance import balanced_near
+from colloc.gaits.symmetry import ANTIPODAL
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.numerics.mesh import Mesh
 from colloc.point_slopes import ACROSS, ADVANCE, OMEGA, POWER, point_rates, point_slopes
-from colloc.symmetry import ANTIPODAL
 
 _TOLERANCE = 1e-12
 

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from scipy.optimize import minimize, nnls
 
-from colloc.interruption import interruptible
+from colloc.system.interruption import interruptible
 
 _NOWHERE = 1e3
 """Objective where the balance cannot be solved: a line search steps back from it."""

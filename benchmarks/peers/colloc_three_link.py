@@ -12,14 +12,14 @@ import os
 import tempfile
 
 import numpy as np
+from colloc.search.continuation import continue_delta
 
 from benchmarks.peers.settings import INTERVALS
 from benchmarks.peers.starts import starts
 from colloc import Harmonic, Problem, ellipse, maximise_efficiency
-from colloc.compiled_problem import compile_problem
-from colloc.continuation import continue_delta
-from colloc.machine_code import FOLDER, OFF
-from colloc.solution import SOLVED
+from colloc.numerics.machine_code import FOLDER, OFF
+from colloc.results.solution import SOLVED
+from colloc.search.compiled_problem import compile_problem
 
 
 def solve(start: np.ndarray, refined: bool) -> dict:

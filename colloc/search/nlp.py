@@ -1,0 +1,268 @@
+"""The one place that names IPOPT: solves a transcription's nonlinear program and measures what comes back."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from colloc.collocation.program import Program
+from colloc.numerics.blocks import Oracles, oracles
+from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.system.interruption import interruptible
+
+IPOPT_OPTIONS: dict[str, object] = {
+    "print_level": 0,
+    "sb": "yes",
+    "linear_solver": "mumps",
+    "tol": 1e-9,
+    "constr_viol_tol": 1e-9,
+    "acceptable_iter": 0,
+    "mu_strategy": "monotone",
+    "mu_init": 1e-4,
+    "bound_push": 1e-5,
+    "bound_frac": 1e-5,
+    "warm_start_init_point": "yes",
+    "warm_start_bound_push": 1e-5,
+    "warm_start_bound_frac": 1e-5,
+    "warm_start_slack_bound_push": 1e-5,
+    "warm_start_slack_bound_frac": 1e-5,
+    "warm_start_mult_bound_push": 1e-5,
+    "max_iter": 60,
+}
+LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
+"""With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along
+negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
+needs no such leash and is slowed by it."""
+
+
+@dataclass(frozen=True, eq=False)
+class NlpResult:
+    """A point IPOPT returned, with its multipliers and what we measured there ourselves.
+
+    Attributes
+    ----------
+    x, lam_x : (n,)
+    lam_g : (m,)
+    objective : float
+    kkt_error : float
+        Largest component of the Lagrangian's gradient, unscaled.
+    violation : float
+        Largest violation of a constraint or bound.
+    complementarity : float
+        Largest product of a multiplier with its distance to the bound.
+    status : str
+        IPOPT's own word; not a verdict.
+    iterations : int
+    seconds : float
+    evaluation_seconds : float
+        The part spent evaluating functions and derivatives.
+    excess : (m,)
+        How far each constraint is violated.
+    """
+
+    x: np.ndarray
+    lam_x: np.ndarray
+    lam_g: np.ndarray
+    objective: float
+    kkt_error: float
+    violation: float
+    complementarity: float
+    status: str
+    iterations: int
+    seconds: float
+    evaluation_seconds: float
+    excess: np.ndarray
+
+    def accumulated(self, earlier: NlpResult) -> NlpResult:
+        """This result with the effort of an earlier solve of the same level added."""
+        return replace(
+            self,
+            iterations=self.iterations + earlier.iterations,
+            seconds=self.seconds + earlier.seconds,
+            evaluation_seconds=self.evaluation_seconds + earlier.evaluation_seconds,
+        )
+
+    @property
+    def optimal(self) -> bool:
+        """First-order conditions hold to 1e-6, by our own measure."""
+        return max(self.kkt_error, self.violation, self.complementarity) < OPTIMAL_TOLERANCE
+
+
+OPTIMAL_TOLERANCE = 1e-6
+AnyProgram = TypeVar("AnyProgram", bound=Program)
+_REGIONS, _ALIKE, _WIDEST = 20, 3, 1.0
+"""Trust regions that may follow each other, and how many of them have the first one's radius. A gait that still moves then is
+not near its optimum at all (paths of three joints, whose basins end between deltas, go 2 rad and more), so regions double,
+up to the widest [rad]."""
+_INSIDE = 0.999
+"""A point nearer to the edge of its trust region than this is on it: the barrier keeps off an active bound by its tolerance
+over the multiplier, which is small where efficiency is flat."""
+
+
+class Solver(Generic[AnyProgram]):
+    """A transcription bound to IPOPT; built once, solved for many deltas and starts."""
+
+    def __init__(self, transcription: AnyProgram, options: dict[str, object] | None = None) -> None:
+        self.transcription = transcription
+        self.oracles: Oracles = oracles(transcription.assembly)
+        own = LIFTED_OPTIONS if transcription.lifted else {}
+        chosen = {**IPOPT_OPTIONS, **own, **(options or {})}
+        settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
+        settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
+        settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
+        self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, {**settings, **self.oracles.options})
+
+    def solve(
+        self,
+        x: np.ndarray,
+        delta: float,
+        multipliers: tuple[np.ndarray, np.ndarray] | None = None,
+        radius: float = np.inf,
+    ) -> NlpResult:
+        """Maximise efficiency from x.
+
+        Parameters
+        ----------
+        x : (n,)
+        delta : float
+            Regularisation speed, per period.
+        multipliers : (lam_x, lam_g), optional
+            By default those of the equations that come closest to stationarity at x.
+        radius : float
+            Trust region: how far each gait parameter may move [rad]. A result on its edge is solved again from there.
+        """
+        result = self.solve_within(x, delta, multipliers, radius)
+        own = self.transcription.layout.parameters[:, 0]
+        here, widest = radius, _WIDEST
+        for count in range(_REGIONS):
+            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * here:
+                return result
+            x = result.x
+            if count >= _ALIKE:
+                here = max(radius, min(2 * here, widest))
+            result = self.solve_within(x, delta, None, here).accumulated(result)
+            if not result.optimal and here > radius:
+                here = widest = radius  # kinks are too many further out
+                result = self.solve_within(x, delta, None, here).accumulated(result)
+        return replace(result, complementarity=np.inf, status="still moving")
+
+    def solve_within(
+        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None, radius: float
+    ) -> NlpResult:
+        """The same within one trust region, on whose edge the result may lie."""
+        t = self.transcription
+        own = t.layout.parameters[:, 0]
+        parameters = self._parameters(x, delta)
+        lower, upper = t.lower.copy(), t.upper.copy()
+        lower[own], upper[own] = np.maximum(lower[own], x[own] - radius), np.minimum(upper[own], x[own] + radius)
+        limits = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
+        lam_x, lam_g = multipliers or self._completed(x, parameters, np.zeros_like(x), np.zeros(t.assembly.m))
+        duals = {"lam_x0": lam_x, "lam_g0": lam_g}
+        start = time.perf_counter()
+        with interruptible():
+            solution = self._solver(x0=x, p=parameters, **limits, **duals)
+        seconds = time.perf_counter() - start
+        stats = self._solver.stats()
+        x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
+        return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
+
+    def _parameters(self, x: np.ndarray, delta: float) -> np.ndarray:
+        t = self.transcription
+        return self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
+
+    def measured(self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray) -> NlpResult:
+        """The first-order conditions at x, solving nothing, with multipliers of the equations that come closest to them.
+
+        Parameters
+        ----------
+        x : (n,)
+        delta : float
+        lam_x, lam_g : (n,), (m,)
+            Multipliers of the bounds and of the inequalities.
+        """
+        parameters = self._parameters(x, delta)
+        multipliers = self._completed(x, parameters, lam_x, lam_g)
+        bounds = self.transcription.lower, self.transcription.upper
+        nothing = {"return_status": "measured", "iter_count": 0}
+        return self._measured(x, *multipliers, parameters, bounds, nothing, 0.0)
+
+    def _completed(
+        self, x: np.ndarray, parameters: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's gradient, given all others."""
+        t = self.transcription
+        free, equality = t.lower < t.upper, np.flatnonzero(t.constraint_lower == t.constraint_upper)
+        jacobian = as_sparse(self.oracles.options["jac_g"](x, parameters)[1])
+        lam_g = np.where(t.constraint_lower == t.constraint_upper, 0.0, lam_g)
+        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel() + jacobian.T @ lam_g + lam_x
+        lam_g[equality] = estimated_multipliers(jacobian[equality][:, free], gradient[free])
+        return lam_x, lam_g
+
+    def equality_jacobian(self, x: np.ndarray, delta: float) -> tuple[sparse.csr_matrix, np.ndarray]:
+        """Jacobian of the equations in the free variables at x, and their row numbers among all constraints."""
+        t = self.transcription
+        equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
+        return as_sparse(self.oracles.options["jac_g"](x, self._parameters(x, delta))[1])[equality][
+            :, t.lower < t.upper
+        ], equality
+
+    def _measured(
+        self,
+        x: np.ndarray,
+        lam_x: np.ndarray,
+        lam_g: np.ndarray,
+        parameters: np.ndarray,
+        bounds: tuple[np.ndarray, np.ndarray],
+        stats: dict,
+        seconds: float,
+    ) -> NlpResult:
+        t = self.transcription
+        lower, upper = bounds
+        f, gradient = self.oracles.options["grad_f"](x, parameters)
+        g, jacobian = self.oracles.options["jac_g"](x, parameters)
+        g = np.array(g).ravel()
+        free = t.lower < t.upper
+        stationarity = np.array(gradient).ravel() + np.array(jacobian.T @ lam_g).ravel() + lam_x
+        outside = np.maximum(np.maximum(t.constraint_lower - g, g - t.constraint_upper), 0.0)
+        bounds_outside = np.maximum(np.maximum(lower - x, x - upper), 0.0)
+        products = [
+            _complementarity(lam_x[free], x[free], lower[free], upper[free]),
+            _complementarity(lam_g, g, t.constraint_lower, t.constraint_upper),
+        ]
+        evaluation = sum(v for k, v in stats.items() if k.startswith("t_wall_nlp_"))
+        return NlpResult(
+            x,
+            lam_x,
+            lam_g,
+            float(f),
+            float(np.abs(stationarity[free]).max()),
+            float(max(outside.max(), bounds_outside.max())),
+            max(products),
+            stats["return_status"],
+            int(stats["iter_count"]),
+            seconds,
+            float(evaluation),
+            outside,
+        )
+
+
+def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
+    """A CasADi matrix as a SciPy one."""
+    return sparse.csc_matrix((matrix.nonzeros(), matrix.row(), matrix.colind()), shape=matrix.shape).tocsr()
+
+
+def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
+    """Largest |multiplier| x distance to the bound it belongs to; equality rows do not count.
+
+    Where that bound is infinite the multiplier itself ought to vanish and counts as it is.
+    """
+    inequality = lower < upper
+    distance = np.where(multiplier > 0, upper - value, value - lower)
+    with np.errstate(invalid="ignore"):
+        product = np.where(np.isinf(distance), np.abs(multiplier), np.abs(multiplier * distance))
+    return float(product[inequality].max(initial=0.0))

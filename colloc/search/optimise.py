@@ -1,0 +1,121 @@
+"""From a problem to a certified solution: search in the reduced space, answer by the full program, certificate."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from colloc.full_program import answer, level_found
+from colloc.gaits.problem import Problem
+from colloc.gaits.sampling import on_speed_floor
+from colloc.reduced_search import Found, descended, refined, searched
+from colloc.results.certificate import certify
+from colloc.results.solution import Level, Solution
+from colloc.search_space import space_near
+from colloc.system.errors import NotConvergedError
+
+TRIVIAL_EFFICIENCY = 1e-4
+"""Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
+FINER = "a smaller mesh_tolerance"
+ADVICE = {
+    "joint limits": "another guess or a smaller joint_limit",
+    "self-contact": "another guess or a smaller joint_limit",
+    "delta influence": "a smaller delta",
+    "delta step": "a smaller delta",
+}
+"""What helps against a check that failed; anything else is a matter of the mesh."""
+
+Report = Callable[[Level], None]
+
+
+def is_trivial(solution: Solution) -> bool:
+    """Whether the search ended in a gait that goes nowhere, such as a retraced one: a critical point, but no optimum."""
+    return bool(solution.levels) and abs(solution.efficiency) * solution.problem.friction.smallest < TRIVIAL_EFFICIENCY
+
+
+def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
+    """A local optimum of a problem, not certified yet.
+
+    Parameters
+    ----------
+    problem : Problem
+    on_level : callable, optional
+        Called with every `colloc.results.solution.Level` as it ends.
+    before : sequence of Level
+        Levels of an interrupted run of the same problem; it goes on from the last one.
+
+    Returns
+    -------
+    Solution
+        Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
+    """
+    begin, levels = time.perf_counter(), list(before)
+
+    def report(level: Level) -> None:
+        levels.append(level)
+        if on_level is not None:
+            on_level(level)
+
+    def ended(found: Found) -> None:
+        report(level_found(found))
+
+    if before:
+        done = Solution(problem, before)
+        space, v = space_near(problem, done.gait, done.last.edges, done.last.scheme)
+        found, lacks = refined(descended(Found.at(space, v, done.last.delta), problem, ended), ended)
+    else:
+        found, lacks = searched(problem, problem.guess, ended)
+    level, fails = answer(found)
+    report(level)
+    message = " ".join(part for part in (fails, lacks) if part)
+    return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)
+
+
+def maximise_efficiency(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
+    """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
+
+    Parameters
+    ----------
+    problem : Problem
+    on_level : callable, optional
+        Called with every `colloc.results.solution.Level` as it ends.
+    before : sequence of Level
+        Levels of an interrupted run of the same problem; it goes on from the last one.
+
+    Returns
+    -------
+    Solution
+        With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
+    """
+    begin = time.perf_counter()
+    solution = optimum(problem, on_level, before)
+    if is_trivial(solution):
+        solution.message = (
+            "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
+            "efficiency). Try another guess, or an imposed symmetry."
+        )
+    else:
+        _certified(solution)
+    solution.seconds = time.perf_counter() - begin
+    return solution
+
+
+def _certified(solution: Solution) -> None:
+    """Put the certificate into a solution, and what it says into its message."""
+    problem = solution.problem
+    try:
+        solution.certificate = certify(solution)
+    except NotConvergedError as error:
+        solution.message = f"the replay failed: {error}"
+        return
+    failed = solution.certificate.failures
+    if failed:
+        failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
+        advice = " and ".join(dict.fromkeys(ADVICE.get(c.name, FINER) for c in failed))
+        parts = [f"the certificate failed: {failures}. Try {advice}.", solution.message]
+        solution.message = " ".join(p for p in parts if p)
+    elif on_speed_floor(problem, solution.gait):
+        solution.message = (
+            f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: smaller gaits are "
+            "more efficient still. Lower the bound (and delta with it) to see how far that goes."
+        )
