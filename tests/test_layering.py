@@ -1,25 +1,13 @@
 """Data flows one way: imports point down the packages and never in a circle; heavy libraries are named in few places."""
 
 import ast
+import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = (
-    "system",
-    "numerics",
-    "mechanics",
-    "gaits",
-    "smooth",
-    "verification",
-    "collocation",
-    "results",
-    "bounds",
-    "search",
-    "studies",
-    "pictures",
-    "commands",
-)
-"""The packages of the library, lower ones first: a module imports its own package and lower ones."""
+PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+PACKAGES = tuple(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
+"""The packages of the library as the page lists them, lower ones first: a module imports its own package and lower ones."""
 BESIDE = {"__init__", "__main__", "solve"}
 """What lies beside the packages: the face, ``python -m colloc`` and ``python -m colloc.solve``."""
 MOST_FILES, MOST_LINES = 18, 350
@@ -44,7 +32,7 @@ def imported(path):
             yield from (alias.name for alias in node.names)
 
 
-def test_the_packages_are_the_ones_listed_here_and_nothing_lies_beside_them():
+def test_the_packages_are_the_ones_the_page_lists_and_nothing_lies_beside_them():
     assert packages() == set(PACKAGES)
     assert {path.stem for path in (ROOT / "colloc").glob("*.py")} == BESIDE
 
@@ -100,3 +88,9 @@ def test_no_public_name_is_shadowed_by_a_package():
     import colloc
 
     assert not set(colloc.__all__) & (set(PACKAGES) | BESIDE)
+
+
+def test_the_page_names_what_exists_and_fits_a_screen():
+    for name in re.findall(r"`([\w/]+(?:\.py|/))`", PAGE):
+        assert (ROOT / name).exists(), name
+    assert len(PAGE.splitlines()) <= 50

@@ -1,7 +1,7 @@
 """CasADi expressions of one mesh point: what collocation evaluates, each stated for a single instant.
 
-The physics is that of `mechanics.balance` and `mechanics.link_friction`; here it is only arranged into outputs. The balance itself
-is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
+The physics is that of `mechanics.balance` and `mechanics.link_friction`; here it is only arranged into outputs. The balance
+itself is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
 *formulations* of a point:
 
 ``lifted``
