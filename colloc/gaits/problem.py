@@ -78,8 +78,8 @@ class Problem:
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
-        The nonlinear program whose solution is the answer, see `collocation.point_equations`: with tail velocities and link forces as
-        variables and the balance as constraints, or with the velocities tied to those of the balance solver.
+        The nonlinear program whose solution is the answer, see `collocation.point_equations`: with tail velocities and link
+        forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """

@@ -19,7 +19,8 @@ import numpy as np
 from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
 from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
-from colloc.mechanics.friction import Friction, link_dissipation
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_dissipation
 from colloc.system.errors import NotConvergedError, ProblemError
 
 
