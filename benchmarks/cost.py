@@ -48,6 +48,7 @@ def anatomy(name: str) -> dict[str, float]:
         mark = now
 
     from colloc.collocation.reduced_space import Condensed
+
     from colloc.pictures.figure import save_figure, solution_figure
     from colloc.results.certificate import certify
     from colloc.results.store import save
@@ -101,7 +102,7 @@ def anatomy(name: str) -> dict[str, float]:
         mock.patch.object(continuation, "Solver", LoggedSolver),
         mock.patch.object(level_run, "Solver", LoggedSolver),
     ):
-        solution = continuation.continue_delta(problem)
+        solution = continuation.optimum(problem)
     lap("search")
     solution.certificate = certify(solution)
     lap("verification")

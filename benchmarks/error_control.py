@@ -18,9 +18,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from colloc.search.continuation import continue_delta
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
+from colloc.search.optimise import optimum
 from colloc.system.json_cache import load_entries, save_entry
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay
@@ -96,7 +96,7 @@ def case_problem(index: int) -> Problem:
 def outcome(problem: Problem) -> dict:
     """Estimate and true errors of one case; ``optimal`` is False if there is nothing to judge."""
     begin = time.process_time()
-    solution = continue_delta(problem)
+    solution = optimum(problem)
     if not solution.last.optimal or solution.last.delta != problem.delta:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
@@ -108,7 +108,7 @@ def outcome(problem: Problem) -> dict:
     finer = problem.with_(
         guess=gait, delta_start=delta, scheme="gauss-5", intervals=max(problem.intervals, 24), mesh_tolerance=1e-7
     )
-    reference = continue_delta(finer)
+    reference = optimum(finer)
     certificate = certify(reference, tolerance=1e-8) if reference.last.optimal else None
     if certificate is not None and certificate.efficiency < (1.0 - FLOOR) * fine.efficiency:
         certificate = None  # below the gait it started from: an optimum of another basin, not the reference of this one

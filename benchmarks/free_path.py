@@ -7,11 +7,10 @@ on 60 intervals without refinement (design target: 0.5 s and 5 s). Certificates 
 import argparse
 import time
 
-from colloc.search.continuation import continue_delta
-
 from colloc import FreePath, Problem, ellipse
+from colloc.reduced.spaces import transcribed
 from colloc.search.nlp import Solver
-from colloc.search.path_start import transcribed
+from colloc.search.optimise import optimum
 
 
 def main() -> None:
@@ -28,7 +27,7 @@ def main() -> None:
             print(f"{intervals:9d} {built:10.2f}")
             continue
         begin = time.process_time()
-        solution = continue_delta(problem, solver=solver)
+        solution = optimum(problem, solver=solver)
         spent = time.process_time() - begin
         iterations = sum(level.iterations for level in solution.levels)
         found = f"{solution.last.efficiency:.6f}" if solution.last.optimal else solution.last.status

@@ -9,11 +9,11 @@ import time
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-from colloc.search.continuation import continue_delta
 
 from benchmarks.tables import markdown_table
 from colloc import Harmonic, Problem, certify, ellipse
 from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, save, styled
+from colloc.search.optimise import optimum
 
 SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
 COLOURS = dict(zip(SCHEMES, ("#999999", SKY, GREEN, BLUE, PURPLE, ORANGE), strict=True))
@@ -32,7 +32,7 @@ def solved(name: str, tolerance: float) -> list[object]:
         mesh_tolerance=tolerance,
     )
     begin = time.process_time()
-    solution = continue_delta(problem)
+    solution = optimum(problem)
     seconds = time.process_time() - begin
     error = solution.efficiency / certify(solution, tolerance=1e-8, instants=6400).efficiency - 1
     effort = sum(level.iterations for level in solution.levels)

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from colloc.search.continuation import continue_delta
 
 from benchmarks.figures_precision import save_work_precision
 from colloc import FreePath, Harmonic, Problem, certify, ellipse
+from colloc.search.optimise import optimum
 from colloc.system.json_cache import load_entries, save_entry
 
 SECOND_ORDER = "trapezoid"
@@ -92,7 +92,7 @@ PATH = Picture(
 def outcome(problem: Problem) -> dict:
     """What the table needs of a solve."""
     begin = time.process_time()
-    solution = continue_delta(problem)
+    solution = optimum(problem)
     seconds = time.process_time() - begin
     replayed = certify(solution, tolerance=1e-8, instants=6400).efficiency
     return {

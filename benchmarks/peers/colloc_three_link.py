@@ -12,7 +12,6 @@ import os
 import tempfile
 
 import numpy as np
-from colloc.search.continuation import continue_delta
 
 from benchmarks.peers.settings import INTERVALS
 from benchmarks.peers.starts import starts
@@ -20,13 +19,14 @@ from colloc import Harmonic, Problem, ellipse, maximise_efficiency
 from colloc.numerics.machine_code import FOLDER, OFF
 from colloc.results.solution import SOLVED
 from colloc.search.compiled_problem import compile_problem
+from colloc.search.optimise import optimum
 
 
 def solve(start: np.ndarray, refined: bool) -> dict:
     """The gait and efficiency from one start, or what went wrong."""
     same_work: dict = {} if refined else {"scheme": "radau-3", "mesh_tolerance": 0}
     problem = Problem("peer", ellipse(*start), gait=Harmonic(1, "bilateral"), intervals=INTERVALS, **same_work)
-    solution = maximise_efficiency(problem) if refined else continue_delta(problem)
+    solution = maximise_efficiency(problem) if refined else optimum(problem)
     good = solution.status == SOLVED if refined else solution.levels[-1].optimal and solution.levels[-1].delta <= 1e-4
     if not good:
         return {"failed_at": solution.levels[-1].delta, "message": solution.message[:80]}

@@ -84,8 +84,9 @@ def path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) ->
 
 @lru_cache(maxsize=32)
 def full_path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
-    """The same with everything as a variable: outputs that vanish (the place of the point and its direction, then
-    `collocation.point_equations.full_equations`), then those of `path_point`. Locals: theta, angles, rates, z, link forces, shape."""
+    """The same with everything as a variable. Outputs: the place of the point and its direction, then
+    `collocation.point_equations.full_equations`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
+    link forces, shape."""
     piece, n_joint = kind(body.n_joint), body.n_joint
     theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("z", 3)
     angles, rates, force = ca.SX.sym("q", n_joint), ca.SX.sym("r", n_joint), link_forces(body)

@@ -171,6 +171,11 @@ def _dm(matrix: sparse.spmatrix) -> ca.DM:
     return ca.DM(pattern, coo.data.tolist())
 
 
+def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
+    """A CasADi matrix as a SciPy one."""
+    return sparse.csc_matrix((matrix.nonzeros(), matrix.row(), matrix.colind()), shape=matrix.shape).tocsr()
+
+
 @dataclass(frozen=True, eq=False)
 class Oracles:
     """CasADi functions of a nonlinear program: nlp, gradient, Jacobian and Hessian in the form nlpsol takes."""

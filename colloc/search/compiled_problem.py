@@ -6,7 +6,7 @@ from colloc.collocation.path_equations import path_point
 from colloc.collocation.point_equations import balance_steps, point_function
 from colloc.gaits.problem import Problem
 from colloc.numerics.machine_code import compiling
-from colloc.search.path_start import transcribed
+from colloc.reduced.spaces import transcribed
 
 DIFFERENTIATED_ONCE = (point_function, balance_steps, path_point)
 """What keeps functions in memory, as they were when first asked for: interpreted, if there was no code for them yet."""

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.collocation.program import Program
-from colloc.numerics.blocks import Oracles, oracles
+from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
 from colloc.system.interruption import interruptible
 
@@ -249,11 +249,6 @@ class Solver(Generic[AnyProgram]):
             float(evaluation),
             outside,
         )
-
-
-def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
-    """A CasADi matrix as a SciPy one."""
-    return sparse.csc_matrix((matrix.nonzeros(), matrix.row(), matrix.colind()), shape=matrix.shape).tocsr()
 
 
 def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from colloc.full_program import answer, level_found
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
-from colloc.reduced_search import Found, descended, refined, searched
+from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
 from colloc.results.solution import Level, Solution
-from colloc.search_space import space_near
+from colloc.search.full_program import answer, level_found
+from colloc.search.reduced_search import Found, descended, refined, searched
 from colloc.system.errors import NotConvergedError
 
 TRIVIAL_EFFICIENCY = 1e-4

@@ -114,6 +114,6 @@ def test_refined_meshes_reach_one_part_in_a_million(scheme):
 
 @pytest.mark.slow
 def test_lifted_and_map_formulations_find_the_same_optimum(three_link):
-    other = maximise_efficiency(three_link.problem.with_(formulation="lifted", intervals=30))
+    other = maximise_efficiency(three_link.problem.with_(formulation="full", intervals=30))
     assert other.status == "solved"
     assert abs(other.certificate.efficiency - three_link.certificate.efficiency) < 1e-5

@@ -9,9 +9,9 @@ from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.problem import FORMULATIONS, Problem
 from colloc.mechanics.body import Chain
+from colloc.reduced.spaces import transcribed
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.nlp import Solver
-from colloc.search.path_start import transcribed
 
 
 def stated(**changes):
@@ -52,7 +52,7 @@ def test_every_row_of_a_path_has_a_meaning_of_its_own_and_a_phase(gait, links):
 
 
 def test_a_broken_balance_is_named_with_its_window():
-    solver = Solver(transcribe(stated(formulation="map")), {"max_iter": 0})
+    solver = Solver(transcribe(stated(formulation="implicit velocity")), {"max_iter": 0})
     t = solver.transcription
     x = feasible_point(t, stated().gait.parameters(stated().guess), 0.1)
     x[t.layout.z[2, 10:13]] += 0.1

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from colloc.search.continuation import continue_delta
+from colloc.search.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
 
 from colloc.commands import multistart
 from colloc.gaits.equivalence import distance, images, irreversibility, phase_distance, reversed_in_time
@@ -22,8 +22,7 @@ from colloc.results.delta_limit import efficiency_at_zero_delta, resolution_warn
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.results.solution import SOLVED
 from colloc.search import continuation, level_run
-from colloc.search.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
-from colloc.search.optimise import is_trivial, maximise_efficiency
+from colloc.search.optimise import is_trivial, maximise_efficiency, optimum
 from colloc.search.parameter_continuation import continue_parameter, with_parameter
 from colloc.studies import campaign
 from colloc.system.errors import ProblemError, StoreError
@@ -143,7 +142,7 @@ def test_an_almost_retraced_gait_is_opened_without_turning_it_round():
 
 def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retraced_one():
     stated = problem(gait=Harmonic(1, "none"), intervals=20)
-    solution = continue_delta(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
+    solution = optimum(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
     assert solution.last.optimal
     assert not is_trivial(solution)
     assert irreversibility(solution.gait) > 0.1
@@ -210,7 +209,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
         solve.calls += 1
         if solve.calls == 2:
             raise ZeroDivisionError("one bad start")
-        solution = continue_delta(stated, watch)
+        solution = optimum(stated, watch)
         if solve.calls == 3:
             monkeypatch.setattr(campaign.time, "perf_counter", lambda: 1e12)
             watch(solution.last)
@@ -297,7 +296,7 @@ def test_continuation_in_a_friction_coefficient_meets_the_direct_solution():
     steps = continue_parameter(problem(delta=0.03), "friction.mu_t", 2.0, first_step=0.5)
     assert [s.value for s in steps] == [1.0, 1.5, 2.0]
     assert all(s.optimal for s in steps)
-    direct = continue_delta(problem(delta=0.03, friction=Friction(2, 1, 1), guess=steps[-1].solution.gait))
+    direct = optimum(problem(delta=0.03, friction=Friction(2, 1, 1), guess=steps[-1].solution.gait))
     assert steps[-1].solution.efficiency == pytest.approx(direct.efficiency, rel=1e-6)
     assert with_parameter(problem(), "intervals", 15.2).intervals == 15
     for name in ("friction.mu_x", "viscosity", "name"):
@@ -314,7 +313,7 @@ def test_a_failed_step_is_halved_and_kept(monkeypatch):
         return SimpleNamespace(last=SimpleNamespace(optimal=not far, delta=0.1), problem=stated, gait=stated.guess)
 
     solve.last = 3.0
-    monkeypatch.setattr(homotopy, "continue_delta", solve)
+    monkeypatch.setattr(homotopy, "optimum", solve)
     steps = continue_parameter(problem(joint_limit=3.0), "joint_limit", 2.5)
     assert [(s.value, s.optimal) for s in steps] == [(3.0, True), (2.5, False), (2.75, True), (2.5, True)]
 
@@ -327,7 +326,7 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
 
 
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
-    coarse = continue_delta(problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait))
+    coarse = optimum(problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait))
     assert "under-resolved by 5 intervals" in resolution_warning(coarse)
     with pytest.raises(ValueError, match="at least two converged levels"):
         efficiency_at_zero_delta(coarse)

@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from colloc.search.continuation import continue_delta
 
 from benchmarks.error_control import CASES, case_problem, held, outcome
 from colloc.collocation.layout import problem_mesh
@@ -17,7 +16,7 @@ from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.search import continuation
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.optimise import maximise_efficiency, optimum
 from colloc.verification import refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
 from colloc.verification.kinks import kink_phases
@@ -158,7 +157,7 @@ def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
 
 def test_a_refined_solution_knows_its_scheme_and_its_error():
     stated = problem("gauss-2", mesh_tolerance=1e-5)
-    solution = continue_delta(stated)
+    solution = optimum(stated)
     assert solution.last.optimal
     assert solution.last.scheme == solution.mesh.scheme.name != "gauss-2"
     gait = solution.gait

@@ -78,10 +78,11 @@ class HarmonicSpace:
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
         y = (self._matrix @ v).T
-        return (*np.split(y, 2), self._pace)
+        angles, rates = np.split(y, 2)
+        return angles, rates, self._pace
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """See `colloc.reduced_space.Shapes`."""
+        """See `colloc.reduced.motion.Shapes`."""
         return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
 
     def move_checks(self, v: np.ndarray) -> float:

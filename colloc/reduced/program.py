@@ -11,7 +11,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import Pairs
 from colloc.numerics.mesh import Mesh
-from colloc.reduced_space import ReducedSpace, Shapes
+from colloc.reduced.motion import ReducedMotion, Shapes
 
 
 class SearchSpace(Shapes, Protocol):
@@ -69,7 +69,7 @@ class ReducedProgram:
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
         problem = space.problem
-        self.motion = ReducedSpace(problem.body, problem.friction, problem.gait.symmetry, space.mesh, space)
+        self.motion = ReducedMotion(problem.body, problem.friction, problem.gait.symmetry, space.mesh, space)
         self._closes = problem.gait.symmetry == NONE
         self.lower, self.upper = space.lower, space.upper
         none = np.zeros(int(self._closes))

@@ -23,7 +23,8 @@ _EDGE = 1e-9
 
 
 class ReducedProgram(Protocol):
-    """Minimise ``objective(v)`` with ``lower <= v <= upper``, ``row_lower <= rows(v) <= row_upper`` (equal bounds: equations)."""
+    """Minimise ``objective(v)`` with v within ``lower, upper`` and ``rows(v)`` within ``row_lower, row_upper``; where those are
+    equal, rows are equations."""
 
     @property
     def lower(self) -> np.ndarray: ...

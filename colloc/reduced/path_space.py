@@ -12,24 +12,29 @@ import numpy as np
 
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.path_equations import chord
-from colloc.collocation.path_transcription import transcribe_fit
+from colloc.collocation.path_transcription import path_through, transcribe_fit
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.contact import Pairs
-from colloc.numerics.blocks import oracles
+from colloc.numerics.blocks import as_sparse, oracles
+from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
-from colloc.search.nlp import as_sparse
-from colloc.search.path_start import nearest_parameters
+from colloc.numerics.sqp import minimised
+from colloc.system.errors import NotConvergedError
 
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
 """Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
 
+_EXACT, _SETTLED, _ROUNDS = 1e-7, 1e-5, 12
+"""Violation at which a gait is a member; that of a start, where the worst instant of a cell swings between two; and rounds of
+moving the checks to the worst instants: two joints need 2 or 3, three joints up to 8."""
+
 
 class PathSpace:
-    """Members of a class of paths near one of them; attributes as `colloc.reduced_program.SearchSpace`.
+    """Members of a class of paths near one of them; attributes as `colloc.reduced.program.SearchSpace`.
 
     Parameters
     ----------
@@ -54,12 +59,12 @@ class PathSpace:
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
         gait, n_joint = problem.gait, problem.body.n_joint
-        self._arcs = isinstance(gait, FreePath)
+        self.shapes, self._arcs = np.arange(fit.lower.size), isinstance(gait, FreePath)
         self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
         self.own = np.arange(fit.lower.size)
         if self._arcs:
             speed, tangents, shapes = gait.split(self.own, n_joint)
-            self._speed, self._tangents, self._shapes = speed[0, 0], tangents, shapes
+            self._speed, self._tangents, self.shapes = speed[0, 0], tangents, shapes
             last = tangents[:, : -1 if self._closed else None]
             self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
             self.own = self.own[free[self.own]]
@@ -82,6 +87,7 @@ class PathSpace:
         self._value, self._slope = ca.Function("place", arguments, [out]), ca.Function("slope", arguments, [slope])
         self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
         self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
+        self._scatter = selector(self._gather.ravel(), self._fixed.size)
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters of `colloc.gaits.path_classes`: shapes where arcs meet follow from the start."""
@@ -94,11 +100,11 @@ class PathSpace:
                     tangents[:, -1] = tangents[:, 0] * (1 if self.problem.gait.symmetry == NONE else -1)
                 p[self._tangents] = tangents / np.linalg.norm(tangents, axis=0)
             step = self._chord.value(p[self._geometry.shape], self.mesh.h[None], 0.0).full()
-            start = p[self._shapes[:, :1]]
-            p[self._shapes] = np.concatenate([start, start + np.cumsum(step, axis=1)], axis=1)
+            start = p[self.shapes[:, :1]]
+            p[self.shapes] = np.concatenate([start, start + np.cumsum(step, axis=1)], axis=1)
         return p
 
-    def _frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Full parameters ``(m,)`` and their derivatives ``(m, n)``."""
         p, frame = self.full_parameters(v), np.zeros((self._fixed.size, self.n))
         frame[self.own, np.arange(self.n)] = 1.0
@@ -119,12 +125,12 @@ class PathSpace:
         local = self._geometry.shape
         f = self._chord
         nonzeros = f.jacobian(p[local], self.mesh.h[None], 0.0).full()
-        n_joint, n = self._shapes.shape[0], self.mesh.n
+        n_joint, n = self.shapes.shape[0], self.mesh.n
         jacobian = np.zeros((n, n_joint, f.n_local))
         jacobian[:, f.jac_row, f.jac_col] = nonzeros.T
         # a chord does not depend on where the arc starts, so the frame of the shapes is not needed for it
         step = np.einsum("kjs,ksn->kjn", jacobian, frame[local.T])
-        frame[self._shapes[:, 1:].T] = frame[self._shapes[:, 0]] + np.cumsum(step, axis=0)
+        frame[self.shapes[:, 1:].T] = frame[self.shapes[:, 0]] + np.cumsum(step, axis=0)
         return p, frame
 
     def member(self, v: np.ndarray) -> ArcPath | Corners:
@@ -132,8 +138,27 @@ class PathSpace:
         return self._fit.member(self.full_parameters(v))
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
-        """Parameters ``(n,)`` of the member nearest to a gait."""
-        return nearest_parameters(self._fit, gait)[self.own]
+        """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances where arcs or sides meet.
+
+        Raises
+        ------
+        NotConvergedError
+            If no path of the class is found near the gait.
+        """
+        near, _ = path_through(self.problem, gait, self.mesh.edges)
+        laid = self.problem.gait.parameters(near)
+        v, nearest = laid[self.own], _Nearest(self, laid)
+        for _ in range(_ROUNDS):
+            excess = self.move_checks(v)
+            values = self.rows(v)
+            outside = max((self.row_lower - values).max(), (values - self.row_upper).max(), excess)
+            if outside < _EXACT:
+                return v
+            v = minimised(nearest, v, np.inf, _EXACT**2).v
+        if outside < _SETTLED:
+            return v
+        bound = f"; allow more curvature than {self.problem.gait.curvature:g}" if self._arcs else ""
+        raise NotConvergedError(f"found no {self.problem.gait.describe()} near the guess; try another guess{bound}.")
 
     def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
         """The mesh in phases of a member."""
@@ -150,17 +175,16 @@ class PathSpace:
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
         out = self._value(self.full_parameters(v)[self._gather], self._given).full()
-        return (*np.split(out[:-1], 2), out[-1])
+        angles, rates = np.split(out[:-1], 2)
+        return angles, rates, out[-1]
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """See `colloc.reduced_space.Shapes`."""
-        p, frame = self._frame(v)
+        """See `colloc.reduced.motion.Shapes`."""
+        p, frame = self.frame(v)
         n_out, n_shape = on_shape.shape[2] + 1, self._gather.shape[0]
         slope = self._slope(p[self._gather], self._given).full().T.reshape(-1, n_shape, n_out)
         on_local = np.einsum("kto,tso->kst", np.concatenate([on_shape, on_pace[:, :, None]], axis=2), slope)
-        on_full = np.zeros((on_local.shape[0], p.size))
-        np.add.at(on_full, (slice(None), self._gather), on_local)
-        return on_full @ frame
+        return (on_local.reshape(on_local.shape[0], -1) @ self._scatter) @ frame
 
     def move_checks(self, v: np.ndarray) -> float:
         """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
@@ -175,6 +199,25 @@ class PathSpace:
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        p, frame = self._frame(v)
+        p, frame = self.frame(v)
         jacobian = self._oracles.options["jac_g"](p, self._moved)[1]
         return np.asarray(as_sparse(jacobian)[self._kept] @ frame)
+
+
+class _Nearest:
+    """The program of the member nearest to a given vector of full parameters."""
+
+    def __init__(self, space: PathSpace, target: np.ndarray) -> None:
+        self.space, self._target = space, target
+        self.lower, self.upper, self.row_lower, self.row_upper = space.lower, space.upper, space.row_lower, space.row_upper
+        self.rows, self.row_slopes = space.rows, space.row_slopes
+        self._shapes = space.shapes.ravel(order="F")
+
+    def objective(self, v: np.ndarray) -> float:
+        """Half the sum of squared distances of the shapes."""
+        return 0.5 * float(np.sum((self.space.full_parameters(v) - self._target)[self._shapes] ** 2))
+
+    def gradient(self, v: np.ndarray) -> np.ndarray:
+        """Of the objective."""
+        p, frame = self.space.frame(v)
+        return (p - self._target)[self._shapes] @ frame[self._shapes]

@@ -1,8 +1,8 @@
 """The search for an optimum in the reduced space: delta falls, checks move, the mesh is refined, by quasi-Newton SQP.
 
 At every delta the gait is optimised within a box round the last one, with the shape checks at their worst instants; they are
-moved, and the gait optimised again, until it rests. At the final delta a mesh is planned for the gait (`verification.refinement`)
-and the gait optimised on that, until it needs no other.
+moved, and the gait optimised again, until it rests. At the final delta a mesh is planned for the gait
+(`colloc.verification.refinement`) and the gait optimised on that, until it needs no other.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.reduced_program import ReducedProgram, SearchSpace
+from colloc.numerics.sqp import Stationarity, minimised, stationarity
+from colloc.reduced.program import ReducedProgram, SearchSpace
+from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
-from colloc.search_space import space_near
-from colloc.sqp import Stationarity, minimised, stationarity
 from colloc.verification.refinement import AIM, planned_mesh
 
 FACTOR = 0.2
@@ -145,7 +145,7 @@ def refined(found: Found, report: Report) -> tuple[Found, str]:
         space = found.space.remeshed(found.gait, plan.edges, plan.scheme)
         found = settled_apart(space, space.parameters(found.gait), found.delta, REMESH_RADIUS, FINE)
         report(found)
-    return found, f"refinement ended after {_MESHES} meshes, at an estimated efficiency error of {plan.estimate:.1e}."
+    return found, f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
 
 
 def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:

@@ -14,11 +14,11 @@ import numpy as np
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
-from colloc.reduced_search import Found
+from colloc.reduced.spaces import transcribed
 from colloc.results.solution import REDUCED, Level
 from colloc.search.diagnosis import explanation
 from colloc.search.nlp import NlpResult, Solver
-from colloc.search.path_start import transcribed
+from colloc.search.reduced_search import Found
 
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
 RADIUS = 0.01
@@ -47,7 +47,7 @@ def level_found(found: Found) -> Level:
         conditions.complementarity,
         STATIONARY if found.optimal else NOT_STATIONARY,
         found.optimal,
-        found.evaluations,
+        found.iterations,
         found.seconds,
         found.seconds,
         space.mesh.scheme.name,

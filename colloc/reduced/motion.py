@@ -22,7 +22,7 @@ from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
-from colloc.point_slopes import ACROSS, ADVANCE, OMEGA, POWER, point_rates, point_slopes
+from colloc.reduced.point_slopes import ACROSS, ADVANCE, OMEGA, POWER, point_rates, point_slopes
 
 _TOLERANCE = 1e-12
 
@@ -60,7 +60,7 @@ class _State:
     rotation: float
 
 
-class ReducedSpace:
+class ReducedMotion:
     """-d/W and rotation of gaits on a mesh as functions of their parameters.
 
     Parameters
@@ -145,7 +145,8 @@ class ReducedSpace:
             ]
         )
         on_out = np.zeros((*rows.shape[:2], s.pace.size))
-        np.add.at(on_out, (slice(None), slice(None), mesh.points), rows)
+        for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
+            on_out[:, :, points] += rows[..., stage]
         outputs = [OMEGA, ADVANCE, ACROSS, POWER]
         on_pace = np.einsum("krt,rt->kt", on_out, s.out[outputs])
         on_shape = np.einsum("krt,trj->ktj", on_out * s.pace, slopes[:, outputs])
