@@ -27,7 +27,8 @@ FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
 not so far that a step ends in another world. A gait that ends on the edge of its box goes on from there."""
 ROUGH, FINE = 1e-8, 1e-14
 """Accuracy of -d/W at which SQP stops, on the way and at the final delta."""
-STATIONARY = 1e-6
+STATIONARY = {ROUGH: 1e-3, FINE: 1e-6}
+"""What the first-order conditions have to keep to then; the efficiency is off by the square of that."""
 _ROUNDS, _AT_REST = 12, 1e-8
 _ADMISSIBLE = 1e-8
 _MESHES, _SAME_AIM = 8, 2
@@ -49,6 +50,8 @@ class Found:
         -d/W.
     conditions : Stationarity
         Of the reduced program.
+    accuracy : float
+        Of -d/W that was asked for.
     iterations, evaluations : int
     seconds : float
     """
@@ -58,6 +61,7 @@ class Found:
     delta: float
     objective: float
     conditions: Stationarity
+    accuracy: float
     iterations: int
     evaluations: int
     seconds: float
@@ -67,13 +71,13 @@ class Found:
         """A gait as it is, to go on from."""
         space.move_checks(v)
         program = ReducedProgram(space, delta)
-        return cls(space, v, delta, program.objective(v), stationarity(program, v), 0, 0, 0.0)
+        return cls(space, v, delta, program.objective(v), stationarity(program, v), FINE, 0, 0, 0.0)
 
     @property
     def optimal(self) -> bool:
-        """First-order conditions hold to 1e-6 in the reduced space."""
+        """First-order conditions hold in the reduced space, as far as the accuracy asked for needs."""
         c = self.conditions
-        return max(c.kkt_error, c.violation, c.complementarity) < STATIONARY
+        return max(c.kkt_error, c.complementarity) < STATIONARY[self.accuracy] and c.violation < STATIONARY[FINE]
 
     @property
     def gait(self) -> AnyGait:
@@ -94,10 +98,10 @@ def settled(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accu
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = space.move_checks(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
-        stationary = accuracy > FINE or conditions.kkt_error < STATIONARY
+        stationary = conditions.kkt_error < STATIONARY[accuracy]
         if admissible and not result.on_edge and (stationary or np.abs(v - before).max() < _AT_REST):
             break
-    return Found(space, v, delta, result.objective, conditions, iterations, evaluations, time.perf_counter() - begin)
+    return Found(space, v, delta, result.objective, conditions, accuracy, iterations, evaluations, time.perf_counter() - begin)
 
 
 def settled_apart(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float) -> Found:

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from colloc.search.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
 
 from colloc.commands import multistart
 from colloc.gaits.equivalence import distance, images, irreversibility, phase_distance, reversed_in_time
@@ -21,7 +20,7 @@ from colloc.results.archive import Archive, load_archive, save_archive
 from colloc.results.delta_limit import efficiency_at_zero_delta, resolution_warning
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.results.solution import SOLVED
-from colloc.search import continuation, level_run
+from colloc.search import optimise
 from colloc.search.optimise import is_trivial, maximise_efficiency, optimum
 from colloc.search.parameter_continuation import continue_parameter, with_parameter
 from colloc.studies import campaign
@@ -117,30 +116,7 @@ def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, 
         start_gait(stated, "dice", 0, 0)
 
 
-@pytest.mark.parametrize("friction", [REVERSIBLE, IRREVERSIBLE])
-def test_closing_the_rotation_keeps_the_enclosed_area(friction):
-    stated = problem(friction=friction, gait=Harmonic(1, "none"))
-    start = stated.gait.parameters(start_gait(stated, SAMPLERS[0], 0, 3))
-    closed = closed_parameters(stated, start, 0.1)
-    (before, after), _ = net_rotations(stated, np.array([start, closed]), 0.1)
-    assert abs(before) > 1e-3
-    assert abs(after) < 1e-6
-    areas = [enclosed_area(stated.gait.fourier(p, 2)) for p in (start, closed)]
-    assert areas[1] == pytest.approx(areas[0], rel=0.2)
-
-
-def test_an_almost_retraced_gait_is_opened_without_turning_it_round():
-    stated = problem(friction=Friction(10, 1, 1), gait=Harmonic(1, "none"))
-    for sign in (1.0, -1.0):
-        narrow = stated.gait.parameters(Fourier([0.5, -0.3], [[0.9], [0.7]], [[0.0], [0.01 * sign]]))
-        opened = opened_parameters(stated, narrow, 0.1)
-        before, after = (enclosed_area(stated.gait.fourier(p, 2)) for p in (narrow, opened))
-        assert after * before > 0
-        assert abs(after) > 3 * abs(before)
-        assert abs(net_rotations(stated, opened[None], 0.1)[0][0]) < 1e-3
-
-
-def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retraced_one():
+def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
     stated = problem(gait=Harmonic(1, "none"), intervals=20)
     solution = optimum(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
     assert solution.last.optimal
@@ -150,8 +126,7 @@ def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retrac
 
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
-    monkeypatch.setattr(level_run, "TRIVIAL_EFFICIENCY", 2.0)
-    monkeypatch.setattr(continuation, "_FIRST_DELTAS", 2)
+    monkeypatch.setattr(optimise, "TRIVIAL_EFFICIENCY", 2.0)
     solution = maximise_efficiency(problem())
     assert is_trivial(solution)
     assert solution.status != SOLVED
