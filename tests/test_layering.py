@@ -23,6 +23,8 @@ LEVELS = {
         "minimax_program",
         "multiplier_estimate",
         "machine_code",
+        "c_compiler",
+        "native_kernel",
     ],
     1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: [
@@ -32,6 +34,7 @@ LEVELS = {
         "balance",
         "problem",
         "damped_newton",
+        "compiled_balance",
         "bump_body",
         "ellipses",
         "equivalence",
