@@ -1,4 +1,4 @@
-"""The balance by the compiled kernel: the same answers as `colloc.fixed_point`, instant by instant. No CasADi."""
+"""Balances by the compiled kernel: the answers of `colloc.fixed_point` and `colloc.chain_motion`, instant by instant."""
 
 from __future__ import annotations
 
@@ -48,3 +48,31 @@ def balance(
     )
     each_piece(n_time, lambda first, last: library.colloc_balance(*before, first, last, *after))
     return z, residual, iterations, anchor, anchor_velocity
+
+
+_ROWS, _DIFFERENTIATED_ROWS = 7, 6
+
+
+def motion(
+    library: ctypes.CDLL,
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    anchor: np.ndarray,
+    anchor_velocity: np.ndarray,
+    *,
+    with_slopes: bool,
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """What `colloc.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, 2 n_joint, n_time)``."""
+    n_time = angles.shape[1]
+    lengths, coefficients = body_arguments(body, friction)
+    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity)]
+    anchor = np.ascontiguousarray(anchor, dtype=np.int64)
+    values = np.empty((_ROWS, n_time))
+    slopes = np.empty((_DIFFERENTIATED_ROWS, 2 * body.n_joint, n_time)) if with_slopes else None
+    before = (body.n_link, address(lengths), address(coefficients), n_time)
+    after = (*map(address, given[:2]), delta, *map(address, (anchor, given[2], values, slopes)))
+    each_piece(n_time, lambda first, last: library.colloc_motion(*before, first, last, *after))
+    return values, slopes

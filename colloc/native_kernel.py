@@ -10,6 +10,7 @@ nothing but its own data, so it is the same in any batch and on any number of th
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import hashlib
 import multiprocessing
@@ -18,7 +19,7 @@ import platform
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib import resources
@@ -33,7 +34,7 @@ from colloc.replaced_file import replaced_file
 
 _FLAGS = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing that reorders arithmetic. -O3 takes four times as long to compile and gains 5 %."""
-_MAIN = "balance.c"
+_MAIN = "kernel.c"
 _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
 _OWN_THREADS = "OMP_NUM_THREADS"
@@ -42,21 +43,41 @@ _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 _BODY = (ctypes.c_int, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
+    "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 4),
 }
 
 
-@cache
+_switched_off = False
+
+
 def native_kernel() -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
+    return None if _switched_off else library()
+
+
+@contextlib.contextmanager
+def numpy_instead() -> Iterator[None]:
+    """Within it everything is done by NumPy, on all threads: for comparison."""
+    global _switched_off
+    before, _switched_off = _switched_off, True
+    try:
+        yield
+    finally:
+        _switched_off = before
+
+
+@cache
+def library() -> ctypes.CDLL | None:
+    """The kernel, loaded, and compiled before if need be; None if that cannot be."""
     folder = cache_folder()
     if folder is None:
         return None
     try:
         with resources.as_file(resources.files("colloc").joinpath("native")) as sources:
             name = f"kernel-{_fingerprint(sources)}"
-            whole = (library for library in folder.glob(f"{name}-*.so") if library.stem.endswith(_digest(library)))
-            library = next(whole, None) or _compiled(sources, folder, name)
-            return None if library is None else _loaded(library)
+            whole = (found for found in folder.glob(f"{name}-*.so") if found.stem.endswith(_digest(found)))
+            file = next(whole, None) or _compiled(sources, folder, name)
+            return None if file is None else _loaded(file)
     except (OSError, StoreError):
         return None
 
@@ -69,9 +90,9 @@ def _fingerprint(sources: Path) -> str:
     return content.hexdigest()[:32]
 
 
-def _digest(library: Path) -> str:
+def _digest(file: Path) -> str:
     """Of a library; it ends the name, as loading a part of a library kills the process."""
-    return hashlib.sha256(library.read_bytes()).hexdigest()[:16]
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
 
 
 def _compiled(sources: Path, folder: Path, name: str) -> Path | None:
@@ -81,15 +102,15 @@ def _compiled(sources: Path, folder: Path, name: str) -> Path | None:
     with tempfile.TemporaryDirectory(prefix="colloc-") as scratch:
         made = Path(scratch) / "kernel.so"
         compile_library(sources / _MAIN, _FLAGS, made)
-        library = folder / f"{name}-{_digest(made)}.so"
-        with replaced_file(library) as unfinished:
+        file = folder / f"{name}-{_digest(made)}.so"
+        with replaced_file(file) as unfinished:
             shutil.copyfile(made, unfinished)
-    return library
+    return file
 
 
-def _loaded(library: Path) -> ctypes.CDLL:
+def _loaded(file: Path) -> ctypes.CDLL:
     """The library with its functions declared."""
-    loaded = ctypes.CDLL(str(library))
+    loaded = ctypes.CDLL(str(file))
     for name, arguments in _SIGNATURES.items():
         getattr(loaded, name).argtypes = arguments
     return loaded

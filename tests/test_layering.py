@@ -43,6 +43,7 @@ LEVELS = {
     ],
     3: [
         "fixed_point",
+        "chain_motion",
         "layout",
         "blocks",
         "program",

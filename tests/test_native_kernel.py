@@ -10,7 +10,7 @@ import pytest
 
 from colloc import Chain, Friction, solve_balance
 from colloc.c_compiler import BALANCE_ONLY, FOLDER, OFF, c_compiler
-from colloc.native_kernel import native_kernel, threads
+from colloc.native_kernel import library, native_kernel, threads
 
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 N_TIME = 9001
@@ -19,10 +19,10 @@ N_TIME = 9001
 @pytest.fixture
 def fresh(monkeypatch):
     """The kernel is looked for again, before and after."""
-    native_kernel.cache_clear()
+    library.cache_clear()
     yield monkeypatch
     monkeypatch.undo()
-    native_kernel.cache_clear()
+    library.cache_clear()
 
 
 def instants(count, seed=1):
@@ -68,18 +68,18 @@ def test_threads_are_those_asked_for(monkeypatch):
 def test_it_is_compiled_once_and_a_damaged_one_again(fresh, tmp_path):
     fresh.setenv(FOLDER, str(tmp_path / "code"))
     assert native_kernel() is not None
-    (library,) = (tmp_path / "code").glob("kernel-*.so")
-    made = library.stat().st_mtime_ns
-    native_kernel.cache_clear()
+    (compiled,) = (tmp_path / "code").glob("kernel-*.so")
+    made = compiled.stat().st_mtime_ns
+    library.cache_clear()
     assert native_kernel() is not None
-    assert library.stat().st_mtime_ns == made
+    assert compiled.stat().st_mtime_ns == made
     other = tmp_path / "other"
     other.mkdir()
-    (other / library.name).write_bytes(library.read_bytes()[:1000])
+    (other / compiled.name).write_bytes(compiled.read_bytes()[:1000])
     fresh.setenv(FOLDER, str(other))
-    native_kernel.cache_clear()
+    library.cache_clear()
     assert native_kernel() is not None
-    assert (other / library.name).stat().st_size == library.stat().st_size
+    assert (other / compiled.name).stat().st_size == compiled.stat().st_size
 
 
 @pytest.mark.parametrize("missing", ["compiler", "folder", "working compiler", "permission"])
@@ -98,7 +98,7 @@ def test_without_it_numpy_gives_the_answer(fresh, tmp_path, missing):
             fresh.setenv("CC", shutil.which("false"))
         case "permission":
             fresh.setenv(FOLDER, OFF)
-    native_kernel.cache_clear()
+    library.cache_clear()
     assert native_kernel() is None
     np.testing.assert_allclose(solve_balance(Chain(), Friction(), *instants(5), 1e-3).z, known, rtol=0, atol=1e-9)
 

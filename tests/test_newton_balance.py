@@ -9,10 +9,18 @@ from colloc.balance import instant, net_force, secant_matrix
 from colloc.body import TAIL
 from colloc.fixed_point import solve_balance
 from colloc.kernels import balance_steps
+from colloc.native_kernel import numpy_instead
 from colloc.newton_balance import balanced_near
 
 THIRD = Chain((1 / 3,) * 3)
+pytestmark = pytest.mark.usefixtures("without_the_kernel")
 LAWS = [(1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3)]
+
+
+@pytest.fixture
+def without_the_kernel():
+    with numpy_instead():
+        yield
 
 
 def instants(n, seed):

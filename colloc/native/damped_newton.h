@@ -31,7 +31,7 @@ typedef struct {
 } State;
 
 /* x with A x = b after symmetric scaling; zero where that is singular. */
-static inline void solve3(const Matrix3 A, const double b[3], double x[3])
+static inline void solve3(Matrix3 A, const double b[3], double x[3])
 {
     double d[3], m[3][4];
     for (int i = 0; i < 3; ++i)
