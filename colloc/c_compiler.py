@@ -8,8 +8,8 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.errors import StoreError
-from colloc.replaced_file import replaced_file
+from colloc.system.errors import StoreError
+from colloc.system.replaced_file import replaced_file
 
 FOLDER, OFF, BALANCE_ONLY = "COLLOC_CODE", "off", "balance"
 _PATIENCE = 600.0

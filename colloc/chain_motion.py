@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.balance import balance_jacobian, instant, total_power
-from colloc.body import Chain
 from colloc.compiled_balance import motion
-from colloc.damped_newton import solve3
-from colloc.fixed_point import BalanceSolution
-from colloc.friction import Friction, link_force_jacobian
+from colloc.mechanics.balance import balance_jacobian, instant, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.damped_newton import solve3
+from colloc.mechanics.fixed_point import BalanceSolution
+from colloc.mechanics.friction import Friction, link_force_jacobian
 from colloc.native_kernel import native_kernel
 
 N_SLOPES = 6
@@ -52,7 +52,7 @@ class ChainMotion(NamedTuple):
 def chain_motion(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> ChainMotion:
-    """The motion at instants that were solved for; arguments as for `colloc.fixed_point.solve_balance`."""
+    """The motion at instants that were solved for; arguments as for `colloc.mechanics.fixed_point.solve_balance`."""
     library, arguments = native_kernel(), (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity)
     values = _numpy_values(*arguments) if library is None else motion(library, *arguments, with_slopes=False)[0]
     return _named(values)

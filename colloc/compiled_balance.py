@@ -1,4 +1,4 @@
-"""Balances by the compiled kernel: the answers of `colloc.fixed_point` and `colloc.chain_motion`, instant by instant."""
+"""Balances by the compiled kernel: the answers of `mechanics.fixed_point` and `chain_motion`, instant by instant."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import ctypes
 
 import numpy as np
 
-from colloc.body import Chain
-from colloc.damped_newton import METHODS
-from colloc.friction import Friction
+from colloc.mechanics.body import Chain
+from colloc.mechanics.damped_newton import METHODS
+from colloc.mechanics.friction import Friction
 from colloc.native_kernel import address, each_piece
 
 

@@ -28,9 +28,9 @@ from pathlib import Path
 import numpy as np
 
 from colloc.c_compiler import c_compiler, cache_folder, compile_library
-from colloc.errors import StoreError
-from colloc.parallel import available_processes
-from colloc.replaced_file import replaced_file
+from colloc.system.errors import StoreError
+from colloc.system.replaced_file import replaced_file
+from scripts.paper.parallel import available_processes
 
 _FLAGS = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing that reorders arithmetic. -O3 takes four times as long to compile and gains 5 %."""
