@@ -14,7 +14,7 @@ from colloc.collocation.point_equations import balance_steps
 from colloc.mechanics.body import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.native_kernel import native_kernel
+from colloc.mechanics.native_kernel import native_kernel
 
 _ROUNDING = 1e-16
 _STEPS = 40

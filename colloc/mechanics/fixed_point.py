@@ -9,7 +9,7 @@ Velocities are solved for at the midpoint of the slowest link, the *anchor*: a l
 delta, which the tail velocity could only represent to 1e-16 in absolute terms. So forces stay accurate down to
 delta = 1e-14.
 
-The steps are stated here in NumPy, for batches; `colloc.native_kernel` takes the same ones instant by instant, compiled.
+The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.native_kernel`) takes the same ones.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.compiled_balance import balance
 from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
 from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
+from colloc.mechanics.compiled_balance import balance
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
-from colloc.mechanics.friction import Friction, link_dissipation
-from colloc.native_kernel import native_kernel
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_dissipation
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.system.errors import NotConvergedError, ProblemError
 
 
@@ -203,7 +204,7 @@ def _numpy_balance(
     max_iterations: int,
     method: str,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Arguments and results as those of `colloc.compiled_balance.balance`, which it is the reference of."""
+    """Arguments and results as those of `colloc.mechanics.compiled_balance.balance`, which it is the reference of."""
     n_time = angles.shape[1]
     # work in units of the largest rate: the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)

@@ -19,7 +19,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from colloc.c_compiler import BALANCE_ONLY, FOLDER, OFF, c_compiler, cache_folder, compile_library
+from colloc.numerics.c_compiler import BALANCE_ONLY, FOLDER, OFF, c_compiler, cache_folder, compile_library
 from colloc.system.errors import ProblemError, StoreError
 
 _FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.chain_motion import chain_motion
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.numerics.schemes import Scheme, scheme

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_simpson, simpson
 
-from colloc.chain_motion import chain_motion
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError

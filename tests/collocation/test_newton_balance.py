@@ -10,7 +10,7 @@ from colloc.collocation.point_equations import balance_steps
 from colloc.mechanics.balance import instant, net_force, secant_matrix
 from colloc.mechanics.body import TAIL
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.native_kernel import numpy_instead
+from colloc.mechanics.native_kernel import numpy_instead
 
 THIRD = Chain((1 / 3,) * 3)
 pytestmark = pytest.mark.usefixtures("without_the_kernel")

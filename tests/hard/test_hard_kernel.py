@@ -5,7 +5,7 @@ import pytest
 from cases import COEFFICIENTS, DELTAS, HARD
 
 from colloc import Chain, Friction, solve_balance
-from colloc.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 
 ANGLES = np.array([angles for angles, _ in HARD.values()]).T
 RATES = np.array([rates for _, rates in HARD.values()]).T

@@ -16,13 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.compiled_balance import motion
 from colloc.mechanics.balance import balance_jacobian, instant, total_power
 from colloc.mechanics.body import Chain
+from colloc.mechanics.compiled_balance import motion
 from colloc.mechanics.damped_newton import solve3
 from colloc.mechanics.fixed_point import BalanceSolution
-from colloc.mechanics.friction import Friction, link_force_jacobian
-from colloc.native_kernel import native_kernel
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_force_jacobian
+from colloc.mechanics.native_kernel import native_kernel
 
 N_SLOPES = 6
 """Rows of `ChainMotion` that are differentiated: tail velocity, centre velocity, power."""

@@ -1,5 +1,5 @@
 /* Damped Newton with a fixed-point safeguard for one instant: the same steps, attempts and constants as
-   colloc/damped_newton.py, where they are explained. */
+   colloc/mechanics/damped_newton.py, where they are explained. */
 
 #include <float.h>
 #include <string.h>
@@ -68,7 +68,7 @@ static inline void solve3(Matrix3 A, const double b[3], double x[3])
         x[0] = x0 / d[0], x[1] = x1 / d[1], x[2] = x2 / d[2];
 }
 
-/* Friction on a body that moves at unit speed, see colloc/damped_newton.py. */
+/* Friction on a body that moves at unit speed, see colloc/mechanics/damped_newton.py. */
 static inline double force_unit(const Law *law, double delta)
 {
     return law->largest / hypot(1.0, delta);

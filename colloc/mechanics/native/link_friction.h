@@ -1,4 +1,4 @@
-/* Friction on one link in closed form: what colloc/friction.py states for arrays, for one link at one instant.
+/* Friction on one link in closed form: what colloc/mechanics/link_friction.py states for arrays, for one link at one instant.
    The names are those of that module; the formulas are derived and explained there. */
 
 #include <math.h>

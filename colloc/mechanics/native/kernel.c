@@ -1,4 +1,4 @@
-/* What the library offers: chains in balance, instant by instant, as colloc/fixed_point.py and colloc/chain_motion.py
+/* What the library offers: chains in balance, instant by instant, as colloc/mechanics/fixed_point.py and colloc/mechanics/chain_motion.py
    find them for batches in NumPy.
 
    Arrays are (rows, n_time), row by row; a call treats the instants from `first` to `last`, so that threads share a batch.

@@ -9,7 +9,7 @@ import numpy as np
 from colloc.mechanics.body import Chain
 from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
-from colloc.native_kernel import address, each_piece
+from colloc.mechanics.native_kernel import address, each_piece
 
 
 def body_arguments(body: Chain, friction: Friction) -> tuple[np.ndarray, np.ndarray]:
@@ -65,7 +65,7 @@ def motion(
     *,
     with_slopes: bool,
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """What `colloc.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, 2 n_joint, n_time)``."""
+    """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, 2 n_joint, n_time)``."""
     n_time = angles.shape[1]
     lengths, coefficients = body_arguments(body, friction)
     given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity)]

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, solve_balance
-from colloc.c_compiler import BALANCE_ONLY, FOLDER, OFF, c_compiler
-from colloc.native_kernel import library, native_kernel, threads
+from colloc.mechanics.native_kernel import library, native_kernel
+from colloc.numerics.c_compiler import BALANCE_ONLY, FOLDER, OFF, c_compiler
+from colloc.system.processors import available_threads
 
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 N_TIME = 9001
@@ -59,9 +60,9 @@ def test_views_with_any_strides_are_read_right():
 
 def test_threads_are_those_asked_for(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "5")
-    assert threads() == 5
+    assert available_threads() == 5
     monkeypatch.setenv("OMP_NUM_THREADS", "all")
-    assert threads() >= 1
+    assert available_threads() >= 1
 
 
 @pytest.mark.skipif(c_compiler() is None, reason="no C compiler")

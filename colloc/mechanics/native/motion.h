@@ -1,5 +1,5 @@
 /* What follows from a balance: velocities of the tail and of the centre of mass, power, and how they change with joint
-   angles and rates, by the implicit function theorem: colloc/chain_motion.py. All about the anchor, whose velocity is known
+   angles and rates, by the implicit function theorem: colloc/mechanics/chain_motion.py. All about the anchor, whose velocity is known
    to full relative precision. */
 
 #include "damped_newton.h"

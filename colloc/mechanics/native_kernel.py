@@ -1,7 +1,7 @@
 """The compiled kernel of chains: C sources of this package as a shared library, or none. No CasADi.
 
-The sources (colloc/native, plain C11) mirror the NumPy solvers step by step. They are compiled by the system's compiler when
-first needed, in about half a second, and kept in the user's cache folder under a name made of their content: whoever
+The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled by the system's compiler
+when first needed, in about half a second, and kept in the user's cache folder under a name made of their content: whoever
 edits, updates or shares an installation never meets an old library. Without a compiler, or a folder to keep the library in,
 everything is done by NumPy, the reference. Numba was no alternative: its import alone takes longer than that, every time.
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on
@@ -13,8 +13,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import hashlib
-import multiprocessing
-import os
 import platform
 import shutil
 import sys
@@ -27,17 +25,16 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.c_compiler import c_compiler, cache_folder, compile_library
+from colloc.numerics.c_compiler import c_compiler, cache_folder, compile_library
 from colloc.system.errors import StoreError
+from colloc.system.processors import available_threads
 from colloc.system.replaced_file import replaced_file
-from scripts.paper.parallel import available_processes
 
 _FLAGS = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing that reorders arithmetic. -O3 takes four times as long to compile and gains 5 %."""
 _MAIN = "kernel.c"
 _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
-_OWN_THREADS = "OMP_NUM_THREADS"
 
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 _BODY = (ctypes.c_int, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
@@ -73,7 +70,7 @@ def library() -> ctypes.CDLL | None:
     if folder is None:
         return None
     try:
-        with resources.as_file(resources.files("colloc").joinpath("native")) as sources:
+        with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
             name = f"kernel-{_fingerprint(sources)}"
             whole = (found for found in folder.glob(f"{name}-*.so") if found.stem.endswith(_digest(found)))
             file = next(whole, None) or _compiled(sources, folder, name)
@@ -116,14 +113,6 @@ def _loaded(file: Path) -> ctypes.CDLL:
     return loaded
 
 
-def threads() -> int:
-    """Threads for a batch: ``$OMP_NUM_THREADS`` as for BLAS, else all processors; one in a process that shares them."""
-    if multiprocessing.parent_process() is not None:
-        return 1
-    named = os.environ.get(_OWN_THREADS, "")
-    return max(1, int(named)) if named.isdigit() else available_processes()
-
-
 def each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
     """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large.
 
@@ -134,7 +123,7 @@ def each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
     """
     starts = range(0, n_time, _PIECE)
     ends = [min(first + _PIECE, n_time) for first in starts]
-    workers = min(threads(), len(ends)) if len(ends) > 1 else 1
+    workers = min(available_threads(), len(ends)) if len(ends) > 1 else 1
     if workers > 1:
         with ThreadPoolExecutor(workers) as pool:
             failed = any(list(pool.map(treat, starts, ends)))

@@ -1,5 +1,5 @@
-/* A chain of straight links at one instant, seen from one of its links, the reference: colloc/body.py and
-   colloc/balance.py. Positions and velocities are added up from the reference outwards, so that links that rest
+/* A chain of straight links at one instant, seen from one of its links, the reference: colloc/mechanics/body.py and
+   colloc/mechanics/balance.py. Positions and velocities are added up from the reference outwards, so that links that rest
    beside it keep the relative precision of their speed. */
 
 #include <stddef.h>

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, solve_balance
-from colloc.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.balance import instant, total_power
-from colloc.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 
 BODIES = [Chain((0.4, 0.6)), Chain(), Chain((0.3, 0.2, 0.15, 0.35))]
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Friction(0.5, 1, 5)]
