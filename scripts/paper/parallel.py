@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -11,16 +10,10 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import track
 
+from colloc.system.processors import available_processes
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-
-
-def available_processes() -> int:
-    """Processes this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Linux
-        return os.cpu_count() or 1
 
 
 def parallel_map(
