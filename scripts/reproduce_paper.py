@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 
 from colloc.system.errors import CollocError
+from colloc.system.processors import available_processes
 from scripts.paper import crawlers, map, pacing, static, three_link, waves
-from scripts.paper.parallel import available_processes
 from scripts.paper.study import Part, Study
 
 DELTA = 1e-4
