@@ -17,14 +17,18 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.collocation.newton_balance import balanced_near
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.fixed_point import BalanceSolution, solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
-from colloc.reduced.point_slopes import ACROSS, ADVANCE, OMEGA, POWER, point_rates, point_slopes
 
 _TOLERANCE = 1e-12
+_ACCEPTED = 1e3
+"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
+_OMEGA, _OUTPUTS = 2, slice(2, 6)
+"""Among the rows of `colloc.mechanics.chain_motion.chain_slopes`: rotation rate; the same, velocity of the centre, power."""
 
 
 class Shapes(Protocol):
@@ -51,7 +55,7 @@ class _State:
     angles: np.ndarray
     rates: np.ndarray
     pace: np.ndarray
-    z: np.ndarray
+    solved: BalanceSolution
     out: np.ndarray
     turn: np.ndarray
     turned: np.ndarray
@@ -86,28 +90,31 @@ class ReducedMotion:
         if last is not None and last.delta == delta and np.array_equal(last.v, v):
             return last
         angles, rates, pace = self.shapes.at(v)
-        z, converged = balanced_near(self.body, self.friction, angles, rates, delta, self._start(angles, rates), _TOLERANCE)
+        at = (self.body, self.friction, angles, rates, delta)
+        solved = solve_balance(*at, start=self._start(angles, rates), tolerance=_TOLERANCE)
         self.solves += 1
-        out = point_rates(self.body, self.friction, angles, rates, np.where(converged, z, np.nan), delta)
+        now = chain_motion(*at, solved)
+        out = np.vstack([now.z[_OMEGA], now.centre, now.power])
+        out[:, ~(solved.residual < _ACCEPTED * _TOLERANCE)] = np.nan
         mesh, points = self.mesh, self.mesh.points
-        omega, c, power = ((row * pace)[points] for row in (out[OMEGA], out[ADVANCE] + 1j * out[ACROSS], out[POWER]))
+        omega, c, power = ((row * pace)[points] for row in (out[0], out[1] + 1j * out[2], out[3]))
         before = np.concatenate([[0.0], np.cumsum((self._weight * omega).sum(axis=1))])
         theta = before[:-1, None] + mesh.h[:, None] * (omega @ mesh.scheme.A.T)
         turn = np.exp(1j * theta)
         turned = turn * c
         displacement, work = complex((self._weight * turned).sum()), float((self._weight * power).sum())
         self._last = _State(
-            v.copy(), delta, angles, rates, pace, z, out, turn, turned, displacement, work, float(before[-1])
+            v.copy(), delta, angles, rates, pace, solved, out, turn, turned, displacement, work, float(before[-1])
         )  # fmt: skip
         return self._last
 
     def _start(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray | None:
         """Tail velocities to start from: those of the last gait differentiated, moved along their slopes."""
         if self._near is None:
-            return None if self._last is None else self._last.z
+            return None if self._last is None else self._last.solved.z
         near, slopes = self._near
         moved = np.concatenate([angles - near.angles, rates - near.rates])
-        return near.z + np.einsum("tij,jt->it", slopes[:, :3], moved)
+        return near.solved.z + np.einsum("ijt,jt->it", slopes[:3], moved)
 
     def _direction(self, s: _State) -> complex:
         """Unit vector along which the displacement counts."""
@@ -124,7 +131,7 @@ class ReducedMotion:
     def gradients(self, v: np.ndarray, delta: float) -> np.ndarray:
         """Derivatives of `values`, ``(2, n)``."""
         s, mesh, rule, h = self.at(v, delta), self.mesh, self.mesh.scheme, self.mesh.h[:, None]
-        slopes = point_slopes(self.body, self.friction, s.angles, s.rates, s.z, delta)
+        slopes = chain_slopes(self.body, self.friction, s.angles, s.rates, delta, s.solved)[1]
         self._near = (s, slopes)
         back = np.conj(self._direction(s))
         distance = (s.displacement * back).real
@@ -147,8 +154,7 @@ class ReducedMotion:
         on_out = np.zeros((*rows.shape[:2], s.pace.size))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
-        outputs = [OMEGA, ADVANCE, ACROSS, POWER]
-        on_pace = np.einsum("krt,rt->kt", on_out, s.out[outputs])
-        on_shape = np.einsum("krt,trj->ktj", on_out * s.pace, slopes[:, outputs])
+        on_pace = np.einsum("krt,rt->kt", on_out, s.out)
+        on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[_OUTPUTS])
         d, w, rotation = self.shapes.pulled_back(v, on_shape, on_pace)
         return np.stack([(distance / s.work * w - d) / s.work, rotation])
