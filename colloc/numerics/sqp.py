@@ -6,14 +6,16 @@ for: SciPy's SLSQP (Kraft, 1988) builds its own from gradients, and does not min
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from scipy.optimize import minimize, nnls
 
 from colloc.system.interruption import interruptible
 
+Value = TypeVar("Value")
 _NOWHERE = 1e3
 """Objective where the balance cannot be solved: a line search steps back from it."""
 _EVALUATIONS = 150
@@ -138,21 +140,20 @@ def minimised(
         value = program.objective(at)
         return value if np.isfinite(value) else _NOWHERE
 
+    values, slopes = remembered(program.rows), remembered(program.row_slopes)
     rows = [
         {
             "type": "ineq",
-            "fun": lambda at: np.concatenate(
-                [(program.row_upper - program.rows(at))[high], (program.rows(at) - program.row_lower)[low]]
-            ),
-            "jac": lambda at: np.vstack([-program.row_slopes(at)[high], program.row_slopes(at)[low]]),
+            "fun": lambda at: np.concatenate([(program.row_upper - values(at))[high], (values(at) - program.row_lower)[low]]),
+            "jac": lambda at: np.vstack([-slopes(at)[high], slopes(at)[low]]),
         }
     ]
     if equal.any():
         rows.append(
             {
                 "type": "eq",
-                "fun": lambda at: np.nan_to_num((program.rows(at) - program.row_lower)[equal], nan=_NOWHERE),
-                "jac": lambda at: program.row_slopes(at)[equal],
+                "fun": lambda at: np.nan_to_num((values(at) - program.row_lower)[equal], nan=_NOWHERE),
+                "jac": lambda at: slopes(at)[equal],
             }
         )
     with interruptible():
@@ -164,3 +165,17 @@ def minimised(
     at = at if np.isfinite(at).all() else start
     inner = (program.lower < lower - _EDGE) & (at < lower + _EDGE) | (program.upper > upper + _EDGE) & (at > upper - _EDGE)
     return SqpResult(at, objective(at), int(found.nit), int(found.nfev), bool(inner.any()))
+
+
+def remembered(function: Callable[[np.ndarray], Value]) -> Callable[[np.ndarray], Value]:
+    """The function, evaluated once where it is asked for the same point again and again."""
+    known: dict[bytes, Value] = {}
+
+    def remembering(at: np.ndarray) -> Value:
+        key = at.tobytes()
+        if key not in known:
+            known.clear()
+            known[key] = function(at)
+        return known[key]
+
+    return remembering

@@ -22,7 +22,7 @@ from colloc.mechanics.contact import Pairs
 from colloc.numerics.blocks import as_sparse, oracles
 from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.sqp import minimised
+from colloc.numerics.sqp import minimised, remembered
 from colloc.system.errors import NotConvergedError
 
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
@@ -56,6 +56,8 @@ class PathSpace:
         self.mesh, self._geometry = fit.mesh, fit.geometry
         self.layout = problem_layout(problem, self.mesh)
         self._oracles = oracles(fit.assembly)
+        nlp = self._oracles.nlp
+        self._row_values = ca.Function("rows", [nlp["x"], nlp["p"]], [nlp["g"]])
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
         gait, n_joint = problem.gait, problem.body.n_joint
@@ -77,6 +79,7 @@ class PathSpace:
         self.groups = {name: slice(int(a), int(b)) for name, a, b in zip(kept, ends, ends[1:], strict=False)}
         self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
         self._place()
+        self._followed, self._framed = remembered(self._follow), remembered(self._frame)
 
     def _place(self) -> None:
         """Where the collocation points lie, as functions of the parameters."""
@@ -91,6 +94,9 @@ class PathSpace:
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters of `colloc.gaits.path_classes`: shapes where arcs meet follow from the start."""
+        return self._followed(v).copy()
+
+    def _follow(self, v: np.ndarray) -> np.ndarray:
         p = self._fixed.copy()
         p[self.own] = v
         if self._arcs:
@@ -106,6 +112,9 @@ class PathSpace:
 
     def frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Full parameters ``(m,)`` and their derivatives ``(m, n)``."""
+        return self._framed(v)
+
+    def _frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         p, frame = self.full_parameters(v), np.zeros((self._fixed.size, self.n))
         frame[self.own, np.arange(self.n)] = 1.0
         if not self._arcs:
@@ -194,8 +203,7 @@ class PathSpace:
 
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""
-        g = self._oracles.options["jac_g"](self.full_parameters(v), self._moved)[0]
-        return np.array(g).ravel()[self._kept]
+        return self._row_values(self.full_parameters(v), self._moved).full().ravel()[self._kept]
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""

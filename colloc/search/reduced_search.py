@@ -19,7 +19,7 @@ from colloc.numerics.sqp import Stationarity, minimised, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
-from colloc.verification.refinement import AIM, planned_mesh
+from colloc.verification.refinement import AIM, MeshPlan, planned_mesh
 
 FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
@@ -126,36 +126,43 @@ def deltas(problem: Problem, first: float) -> list[float]:
 def descended(found: Found, problem: Problem, report: Report) -> Found:
     """From a gait at some delta down to the problem's, on the same mesh."""
     for delta in deltas(problem, found.delta)[1:]:
-        accuracy = FINE if delta <= problem.delta else ROUGH
-        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, accuracy)
+        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, ROUGH)
         report(found)
     return found
 
 
 def refined(found: Found, report: Report) -> tuple[Found, str]:
-    """The gait on planned meshes until it needs no other, and what is missing if that does not happen."""
+    """The gait on planned meshes until it needs no other, and what is missing if that does not happen.
+
+    On the way it need not be optimised to the last digit: the next mesh moves it by more.
+    """
     problem, kept = found.space.problem, np.empty(0)
-    if problem.mesh_tolerance == 0:
-        return found, ""
-    for count in range(_MESHES):
-        aim = AIM * 0.5 ** max(0, count - _SAME_AIM)
-        delta = found.delta * found.gait.delta_unit
-        plan = planned_mesh(
-            problem, found.space.phase_mesh(found.gait), found.gait, delta, problem.mesh_tolerance, kept=kept, aim=aim
-        )
-        if plan is None:
+    count = 0
+    while True:
+        plan = _plan(found, kept, count) if problem.mesh_tolerance > 0 else None
+        if plan is None and found.accuracy == FINE:
             return found, ""
-        kept = np.concatenate([kept, plan.kept])
-        space = found.space.remeshed(found.gait, plan.edges, plan.scheme)
-        found = settled_apart(space, space.parameters(found.gait), found.delta, REMESH_RADIUS, FINE)
+        if count == _MESHES:
+            return found, f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
+        space, v, radius, accuracy = found.space, found.v, NEXT_RADIUS, FINE
+        if plan is not None:
+            count, kept, radius = count + 1, np.concatenate([kept, plan.kept]), REMESH_RADIUS
+            space = space.remeshed(found.gait, plan.edges, plan.scheme)
+            v, accuracy = space.parameters(found.gait), FINE if count > _SAME_AIM else ROUGH
+        found = settled_apart(space, v, found.delta, radius, accuracy)
         report(found)
-    return found, f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
+
+
+def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
+    """A mesh on which the gait is accurate enough; None if its own will do."""
+    problem, gait, aim = found.space.problem, found.gait, AIM * 0.5 ** max(0, count - _SAME_AIM)
+    mesh, delta = found.space.phase_mesh(gait), found.delta * gait.delta_unit
+    return planned_mesh(problem, mesh, gait, delta, problem.mesh_tolerance, kept=kept, aim=aim)
 
 
 def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:
     """An optimum of a problem from a start, on a mesh that meets its tolerance; the second is what is missing, or ""."""
     space, v = space_near(problem, start)
-    accuracy = FINE if problem.delta_start <= problem.delta else ROUGH
-    found = settled_apart(space, v, problem.delta_start, FIRST_RADIUS, accuracy)
+    found = settled_apart(space, v, problem.delta_start, FIRST_RADIUS, ROUGH)
     report(found)
     return refined(descended(found, problem, report), report)
