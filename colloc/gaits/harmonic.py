@@ -119,6 +119,11 @@ class Harmonic:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
 
+    @property
+    def intervals(self) -> int:
+        """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
+        return round(self.fraction * (30 + 10 * self.harmonics))
+
     def describe(self) -> str:
         """The class in words, for reports."""
         return f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}, symmetry {self.symmetry}"

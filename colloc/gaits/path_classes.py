@@ -58,6 +58,11 @@ class FreePath:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
 
+    @property
+    def intervals(self) -> int:
+        """Intervals that a first mesh wants, each of which is an arc."""
+        return round(self.fraction * 120)
+
     def describe(self) -> str:
         """The class in words, for reports."""
         turns = "" if self.winding is None else f", winding {self.winding}"
@@ -123,6 +128,11 @@ class Polygon:
     def fraction(self) -> float:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
+
+    @property
+    def intervals(self) -> int:
+        """Intervals that a first mesh wants: some on every side."""
+        return max(24, 4 * self.pieces)
 
     def describe(self) -> str:
         """The class in words, for reports."""

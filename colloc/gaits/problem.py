@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait_fields import CLASSES, GAITS, AnyClass, AnyGait, class_from, fields, gait_from
+from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
@@ -56,8 +57,9 @@ class Problem:
     ----------
     name : str
         Used for file names: letters, digits, ``_``, ``-`` and ``.``.
-    guess : Fourier, ArcPath or Corners
-        An admissible gait to start from, of any class; it is projected onto the class `gait`.
+    guess : Fourier, ArcPath or Corners, optional
+        An admissible gait to start from, of any class; it is projected onto the class `gait`. By default a travelling wave
+        (`colloc.gaits.guesses`).
     body : Chain
     friction : Friction
     gait : Harmonic, FreePath or Polygon
@@ -74,7 +76,7 @@ class Problem:
         2 pi. It keeps the search away from gaits
         whose speeds sink to delta, where regularised friction is viscous and efficiency meaningless.
     intervals : int
-        Mesh intervals on the part of the period that is solved.
+        Intervals of the first mesh, on the part of the period that is solved; by default as many as the class asks for.
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
@@ -85,7 +87,7 @@ class Problem:
     """
 
     name: str
-    guess: AnyGait
+    guess: AnyGait = None
     body: Chain = Chain()
     friction: Friction = Friction()
     gait: AnyClass = Harmonic()
@@ -93,12 +95,14 @@ class Problem:
     delta_start: float = None  # type: ignore[assignment]
     joint_limit: float = float(np.pi)
     smallest_shape_speed: float = 0.1
-    intervals: int = 30
+    intervals: int = None  # type: ignore[assignment]
     scheme: str = "gauss-3"
     formulation: str = FULL
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
+        if self.guess is None and isinstance(self.body, Chain):
+            object.__setattr__(self, "guess", travelling_wave(self.body, self.joint_limit))
         self._check_types()
         self._check_numbers()
         self._check_symmetry()
@@ -120,6 +124,8 @@ class Problem:
     def _check_numbers(self) -> None:
         if self.delta_start is None:
             object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
+        if self.intervals is None:
+            object.__setattr__(self, "intervals", self.gait.intervals)
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):

@@ -78,6 +78,30 @@ class Level:
         return self.program != REDUCED
 
 
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """A gait that a search over many starts met.
+
+    Attributes
+    ----------
+    efficiency : float
+        As collocation sees it on a first mesh.
+    delta : float
+        To which it was followed.
+    starts : int
+        How many led to it.
+    on_speed_floor : bool
+        Whether the bound on the shape speed decided its size.
+    gait : AnyGait
+    """
+
+    efficiency: float
+    delta: float
+    starts: int
+    on_speed_floor: bool
+    gait: AnyGait
+
+
 @dataclass(frozen=True)
 class Check:
     """One line of a certificate: what was measured, the largest value allowed, and what it means."""
@@ -176,6 +200,10 @@ class Solution:
     message : str
         What went wrong and what to try, if something did.
     versions : dict
+    starts : int
+        How many the gait is the best of.
+    others : tuple of Alternative
+        Distinct gaits they led to, the one of this solution first; empty for a single start.
     """
 
     problem: Problem
@@ -185,6 +213,8 @@ class Solution:
     source: str = ""
     message: str = ""
     versions: dict[str, str] = field(default_factory=lambda: versions())
+    starts: int = 1
+    others: tuple[Alternative, ...] = ()
 
     @property
     def status(self) -> str:

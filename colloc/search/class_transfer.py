@@ -1,7 +1,7 @@
 """From class to class: an optimum of one class of gaits is where the search in the next begins.
 
 Harmonics n to n + 1, a curvature bound to a larger one, harmonics to a free path to a polygon and back: any gait is laid
-into any class (`search.path_start.nearest_parameters`), and into a chain of other links (`over_links`). What does not carry
+into any class (`reduced.spaces.nearest_parameters`), and into a chain of other links (`over_links`). What does not carry
 over by itself is delta, which harmonic gaits measure per period and paths at unit shape speed.
 
 An optimum is worth keeping. Regularised friction at a large delta prefers other gaits, so a search that begins there leaves
@@ -20,8 +20,8 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through, path_length
 from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import largest_factor
 from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import largest_factor
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.optimise import Report, maximise_efficiency, optimum
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
 from colloc.results.solution import Level, Solution
 from colloc.search.full_program import answer, level_found
+from colloc.search.global_search import STARTS, best_of
 from colloc.search.reduced_search import Found, descended, refined, searched
 from colloc.system.errors import NotConvergedError
 
@@ -96,6 +99,47 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
         )
     else:
         _certified(solution)
+    solution.seconds = time.perf_counter() - begin
+    return solution
+
+
+def best_gait(
+    problem: Problem,
+    starts: int = STARTS,
+    on_level: Report | None = None,
+    seconds: float = np.inf,
+    before: Sequence[Level] = (),
+) -> Solution:
+    """Maximise d/W over the whole class, as far as many starts can tell, and certify the result.
+
+    Parameters
+    ----------
+    problem : Problem
+    starts : int
+        The guess, known gaits and seeded samples (`colloc.search.global_search.starting_gaits`). With 1 the guess alone, as
+        `maximise_efficiency`.
+    on_level : callable, optional
+        Called with every `colloc.results.solution.Level` of the best gait.
+    seconds : float
+        Wall time after which no other start is begun.
+    before : sequence of Level
+        Levels of an interrupted run; it goes on from the last one.
+
+    Returns
+    -------
+    Solution
+        ``solution.starts`` and ``solution.others`` say what it is the best of.
+    """
+    if starts == 1 or before:
+        return maximise_efficiency(problem, on_level, before)
+    begin = time.perf_counter()
+    chosen = best_of(problem, starts, seconds)
+    levels = [level_found(found) for found in chosen.levels]
+    for level in levels:
+        if on_level is not None:
+            on_level(level)
+    solution = maximise_efficiency(problem, on_level, levels)
+    solution.starts, solution.others = chosen.starts, chosen.others
     solution.seconds = time.perf_counter() - begin
     return solution
 

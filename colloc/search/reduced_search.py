@@ -25,9 +25,9 @@ FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
 """Boxes round the last gait [rad], at the first level, later ones, and on a refined mesh: far enough for an optimum to move,
 not so far that a step ends in another world. A gait that ends on the edge of its box goes on from there."""
-ROUGH, FINE = 1e-8, 1e-14
-"""Accuracy of -d/W at which SQP stops, on the way and at the final delta."""
-STATIONARY = {ROUGH: 1e-3, FINE: 1e-6}
+VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
+"""Accuracy of -d/W at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
+STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
 """What the first-order conditions have to keep to then; the efficiency is off by the square of that."""
 _ROUNDS, _AT_REST = 12, 1e-8
 _ADMISSIBLE = 1e-8
@@ -71,7 +71,7 @@ class Found:
         """A gait as it is, to go on from."""
         space.move_checks(v)
         program = ReducedProgram(space, delta)
-        return cls(space, v, delta, program.objective(v), stationarity(program, v), FINE, 0, 0, 0.0)
+        return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0)
 
     @property
     def optimal(self) -> bool:
