@@ -61,9 +61,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--problems", type=int, default=100, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
-    parser.add_argument(
-        "--starts", type=int, default=STARTS, metavar="N", help="more than the default to look for better answers"
-    )
+    parser.add_argument("--starts", type=int, default=STARTS, metavar="N", help="more look for better answers")
     options = parser.parse_args()
     best = json.loads(BEST.read_text(encoding="utf-8")) if BEST.exists() else {}
     solved, quality, seconds = [], [], []

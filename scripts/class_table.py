@@ -18,10 +18,11 @@ import numpy as np
 
 from colloc import Friction, Problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from
+from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import path_length
 from colloc.numerics.machine_code import compiler
 from colloc.results.solution import Solution
-from colloc.search.class_transfer import RESTARTS, delta_in, laid_into, maximise_from, over_links
+from colloc.search.class_transfer import RESTARTS, delta_in, maximise_from
 from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError

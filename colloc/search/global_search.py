@@ -18,13 +18,13 @@ from colloc.gaits.equivalence import distance
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor, seed_class
 from colloc.mechanics.body import Chain
 from colloc.reduced.spaces import space_near
 from colloc.results.solution import Alternative
-from colloc.search.class_transfer import laid_into, over_links
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, descended, settled_apart
 from colloc.system.errors import CollocError, NotConvergedError
 

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.search import class_transfer as prolongation
-from colloc.search.class_transfer import laid_into, maximise_from, over_links, prolonged
+from colloc.search.class_transfer import maximise_from, prolonged
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import ProblemError
 from scripts.class_rows import FEWER, equal_links, named_gait, rows
