@@ -52,7 +52,7 @@ def efficiency_at_zero_delta(solution: Solution) -> Limit:
 
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Share of every mesh interval in the relative efficiency error of the last level, magnitudes, ``(n_interval,)``."""
-    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.last.delta).efficiency)
+    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.delta_per_period).efficiency)
 
 
 def resolution_warning(solution: Solution) -> str | None:

@@ -246,10 +246,11 @@ def _problem(solution: Solution) -> Markup:
 
 def _reproduce(solution: Solution) -> Markup:
     p = solution.problem
+    formulation = "" if p.formulation is None else f" --formulation {p.formulation}"
     commands = [
         f"# save the problem source above as {p.name}.py, then",
         f"colloc solve {p.name}.py --delta {p.delta:g} --delta-start {p.delta_start:g} --mesh {p.intervals} "
-        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation {p.formulation}",
+        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme}{formulation}",
         f"colloc verify results/{p.name}.h5",
     ]
     versions = [[name, version] for name, version in solution.versions.items()]

@@ -22,7 +22,7 @@ import numpy as np
 
 from colloc.errors import StoreError
 from colloc.gait_fields import fields
-from colloc.problem import Problem
+from colloc.problem import Problem, statement_hash
 from colloc.solution import Certificate, Check, Level, Solution
 from colloc.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text
 
@@ -119,8 +119,9 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
 
 
 def _read(file: h5py.File) -> Solution:
-    problem = Problem.from_dict(json.loads(text(file, "problem")))
-    if problem.hash != attribute(file, "problem_hash"):
+    stated = json.loads(text(file, "problem"))
+    problem = Problem.from_dict(stated)
+    if statement_hash(stated) != attribute(file, "problem_hash"):
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
     levels = []
     found = child(file, "levels") if "levels" in file else ()

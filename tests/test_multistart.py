@@ -14,18 +14,20 @@ from colloc.body import Chain
 from colloc.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
 from colloc.contact import crossing_depth
 from colloc.continuation import continue_delta
-from colloc.delta_limit import efficiency_at_zero_delta, resolution_warning
+from colloc.delta_limit import efficiency_at_zero_delta, mesh_errors, resolution_warning
 from colloc.equivalence import distance, images, irreversibility, phase_distance, reversed_in_time
 from colloc.errors import ProblemError, StoreError
 from colloc.friction import Friction
 from colloc.gait import Fourier, Harmonic, ellipse, shifted
 from colloc.homotopy import continue_parameter, with_parameter
 from colloc.optimise import is_trivial, maximise_efficiency
+from colloc.path_class import Polygon
 from colloc.path_replay import replay
 from colloc.problem import Problem
 from colloc.sampling import BLOCK, SAMPLERS, on_speed_floor, shape_speed, start_gait
 from colloc.solution import SOLVED
 from colloc.store_archive import Archive, load_archive, save_archive
+from colloc.verify import corner_phases
 
 REVERSIBLE, IRREVERSIBLE = Friction(3, 1, 1), Friction(0.5, 1, 5)
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
@@ -322,6 +324,16 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
     assert limit.error < 1e-3 * limit.value
     assert abs(limit.value - three_link.certificate.efficiency_at_zero_delta) < 3 * limit.error
     assert resolution_warning(three_link) is None
+
+
+def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
+    stated = Problem("p", ellipse(0.1, 2.0, 1.0), gait=Polygon(3, "bilateral"), delta=1e-2, intervals=24, mesh_tolerance=0.0)
+    solution = continue_delta(stated)
+    gait = solution.gait
+    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
+    exact = replay(stated.body, stated.friction, path, stated.delta * gait.length, breaks=corner_phases(gait), tolerance=1e-8)
+    # at the problem's own number, which is at unit shape speed, it would come out 40 times too large
+    assert mesh_errors(solution).sum() == pytest.approx(abs(solution.efficiency / exact.efficiency - 1), rel=0.2)
 
 
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
