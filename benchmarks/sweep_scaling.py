@@ -24,7 +24,7 @@ from typing import NamedTuple
 from colloc import Friction, Harmonic, Problem, ellipse, study_run
 from colloc.basins import Outcome
 from colloc.problem_study import Axis, Study
-from colloc.study_cell import Attempt, Work, run_chunk, start_key
+from colloc.study_cell import Attempt, Visit, Work, run_chunk, start_key
 from colloc.study_run import StudyRun
 from colloc.task_pool import one_thread_each, process_pool
 
@@ -46,7 +46,7 @@ def problem(x: float) -> Problem:
 def study(cells: int, chunk: int = 1) -> Study:
     """Cells that do not wait for each other."""
     axis = Axis("x", tuple(range(cells)), travels=False)
-    return Study("scaling", (axis,), problem, cold_starts=0, passes=0, chunk=chunk)
+    return Study("scaling", (axis,), problem, cold_starts=0, chunk=chunk)
 
 
 def nothing(chunk: tuple[Work, ...]) -> list:
@@ -54,7 +54,8 @@ def nothing(chunk: tuple[Work, ...]) -> list:
     results = []
     for work in chunk:
         guess = work.problem.guess
-        results.append((work.cell, [Attempt("none", start_key(guess), Outcome(0, "solved", "", guess, guess, 0.2))]))
+        attempt = Attempt("none", start_key(guess), Outcome(0, "solved", "", guess, guess, 0.2))
+        results.append(Visit(work.cell, [attempt]))
     return results
 
 

@@ -25,6 +25,7 @@ from colloc.command_options import (
     output_path,
 )
 from colloc.errors import ProblemError
+from colloc.gait_fields import fields
 from colloc.problem import Problem
 from colloc.problem_file import read_problem_file
 from colloc.progress import StatusLine
@@ -105,7 +106,7 @@ def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[
                 "frequency": b.frequency,
                 "starts": list(b.starts),
                 "on_speed_floor": on_speed_floor(problem, b.best.gait),
-                "gait": {key: getattr(b.best.gait, key).tolist() for key in ("mean", "cos", "sin")},
+                "gait": fields(b.best.gait),
             }
             for b in found
         ],

@@ -18,7 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.basins import Outcome, basins
+from colloc.basins import Outcome, basins, fourier_series
 from colloc.errors import StoreError
 from colloc.file_lock import locked
 from colloc.gait import Fourier
@@ -110,8 +110,9 @@ def _write(file: h5py.File, archive: Archive) -> None:
         _dataset(group, name, [getattr(o, name) for o in outcomes], units)
     for name in ("guess", "gait"):
         own = group.create_group(name)
+        gaits = [fourier_series(archive.problem, getattr(o, name)) for o in outcomes]
         for part, dims in (("mean", "start, joint"), ("cos", "start, joint, harmonic"), ("sin", "start, joint, harmonic")):
-            _dataset(own, part, [getattr(getattr(o, name), part) for o in outcomes], "rad", dims)
+            _dataset(own, part, [getattr(gait, part) for gait in gaits], "rad", dims)
     found = basins(archive.problem, outcomes)
     group = file.create_group("basins")
     _dataset(group, "best_start", [b.best.start for b in found], "1", "basin")

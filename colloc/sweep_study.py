@@ -130,7 +130,7 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
                 best = progress.state.best
                 what = f"{best.outcome.efficiency:9.6f}" if best else "     none"
                 tries = Counter(a.outcome.status for a in progress.new)
-                told = ", ".join(f"{n} {status}" for status, n in tries.items()) or "nothing to improve"
+                told = ", ".join(f"{n} {status}" for status, n in tries.items())
                 left = (time.perf_counter() - begin) / progress.done * (progress.total - progress.done)
                 print(
                     f"{cell_text(run.study, progress.cell)}: {what}  ({told}; round {number}: {progress.done} of "
@@ -172,7 +172,14 @@ def _summary(run, path: Path) -> dict:
     counts = Counter(
         "solved" if s.best else NO_PROBLEM if s.problem is None else "no certified gait" for s in run.cells.values()
     )
-    return {"name": run.study.name, "file": str(path), "cells": len(run.cells), "counts": dict(counts)}
+    below = [run.study.coordinates(cell) for cell in run.cells if run.below_neighbour(cell)]
+    return {
+        "name": run.study.name,
+        "file": str(path),
+        "cells": len(run.cells),
+        "counts": dict(counts),
+        "below_neighbour": below,
+    }
 
 
 def _summary_lines(run, path: Path) -> list[str]:
@@ -180,6 +187,12 @@ def _summary_lines(run, path: Path) -> list[str]:
 
     counts = ", ".join(f"{n} {what}" for what, n in _summary(run, path)["counts"].items())
     lines = [f"{run.study.name}: {len(run.cells)} cells: {counts}; saved {path}"]
+    below = [cell for cell in run.cells if run.below_neighbour(cell)]
+    if below:
+        lines.append(f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more starts may find more")
+    for cell in below[:_MOST_FAILURES_SHOWN]:
+        found, could = run.cells[cell].best.outcome.efficiency, run.neighbour_efficiency(cell)
+        lines.append(f"  {cell_text(run.study, cell)}: {found:.6f}, where a neighbour's gait achieves {could:.6f}")
     failed = [(cell, state) for cell, state in run.cells.items() if not state.best]
     for cell, state in failed[:_MOST_FAILURES_SHOWN]:
         message = state.attempts[-1].outcome.message if state.attempts else state.message or "not tried yet"
