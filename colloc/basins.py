@@ -30,8 +30,7 @@ def series_class(problem: Problem) -> Harmonic:
 
 def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
     """The Fourier series that stands for a gait of a problem."""
-    kind = series_class(problem)
-    return fourier_through(gait, kind).resized(kind.harmonics)
+    return fourier_through(gait, series_class(problem))
 
 
 @dataclass(frozen=True, eq=False)

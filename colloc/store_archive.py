@@ -111,8 +111,9 @@ def _write(file: h5py.File, archive: Archive) -> None:
     for name in ("guess", "gait"):
         own = group.create_group(name)
         gaits = [fourier_series(archive.problem, getattr(o, name)) for o in outcomes]
+        harmonics = max((gait.n_harmonic for gait in gaits), default=0)
         for part, dims in (("mean", "start, joint"), ("cos", "start, joint, harmonic"), ("sin", "start, joint, harmonic")):
-            _dataset(own, part, [getattr(gait, part) for gait in gaits], "rad", dims)
+            _dataset(own, part, [getattr(gait.resized(harmonics), part) for gait in gaits], "rad", dims)
     found = basins(archive.problem, outcomes)
     group = file.create_group("basins")
     _dataset(group, "best_start", [b.best.start for b in found], "1", "basin")
