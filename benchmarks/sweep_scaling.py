@@ -123,7 +123,7 @@ def main() -> None:
     if options.dask:
         from distributed import Client
 
-        client = Client(n_workers=2, threads_per_worker=1, dashboard_address=None)
+        client = Client(n_workers=2, threads_per_worker=1, dashboard_address=":0")
         makers.append(("Dask", lambda n: client.get_executor(pure=False)))
     for name, maker in makers:
         for chunk in (1, 10):

@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from colloc.command_options import INTERRUPTED, NONE_FOUND, OK, add_printing, exit_code, new_parser
-from colloc.errors import ProblemError, StoreError
+from colloc.errors import CollocError, ProblemError, StoreError
 from colloc.problem_study import Study, read_study_file
 
 _SAVE_EVERY = 60.0
@@ -63,18 +63,9 @@ def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | 
     """What runs the tasks (None: processes), and how many workers it has."""
     if options.dask is None:
         return None, options.workers
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ProblemError("--dask needs the package distributed: pip install 'colloc[dask]'.") from None
-    try:
-        if options.dask == "local":
-            client = Client(n_workers=options.workers, threads_per_worker=1, dashboard_address=None)
-        else:
-            client = Client(options.dask, timeout=20)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise ProblemError(f"no Dask scheduler at {options.dask}: {error}") from None
-    return (lambda n: client.get_executor(pure=False)), max(1, sum(client.nthreads().values()))
+    from colloc.dask_pool import connected
+
+    return connected(options.dask, options.workers, lambda text: print(f"colloc: {text}", file=sys.stderr, flush=True))
 
 
 def _run(study: Study, source: str, command: str, options: argparse.Namespace) -> int:
@@ -94,7 +85,11 @@ def _run(study: Study, source: str, command: str, options: argparse.Namespace) -
         run = StudyRun(study, folder, retry=options.retry)
         if not quiet:
             _announce(run, folder)
-        interrupted = _work(run, options, quiet, lambda: _save(run, out, source, command))
+        try:
+            interrupted = _work(run, options, quiet, lambda: _save(run, out, source, command))
+        except CollocError:
+            _save(run, out, source, command)
+            raise
         path = _save(run, out, source, command)
     if options.json:
         print(json.dumps(_summary(run, path)))

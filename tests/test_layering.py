@@ -18,6 +18,7 @@ LEVELS = {
         "progress",
         "interruption",
         "task_pool",
+        "dask_pool",
         "sealed_file",
         "file_lock",
         "minimax_program",

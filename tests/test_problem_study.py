@@ -394,7 +394,7 @@ def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
     path.write_text(FILE.replace('"mu_b", (1.0,)', '"mu_b", (1.0, 1.05)'), encoding="utf-8")
     study, _ = read_study_file(path)
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         run = StudyRun(study, tmp_path)
