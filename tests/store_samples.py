@@ -12,7 +12,7 @@ from colloc.json_cache import load_entries, save_entry
 from colloc.problem import Problem
 from colloc.problem_study import Axis, Study
 from colloc.store import load, save
-from colloc.store_archive import Archive, load_archive, save_archive
+from colloc.store_archive import Archive, StartName, load_archive, save_archive
 from colloc.store_study import load_study, save_study
 from colloc.study_cell import Attempt
 from colloc.study_journal import Journal, Record, read_journal
@@ -34,7 +34,7 @@ def outcome(start, efficiency=0.2):
 
 
 def archive(starts=range(3)):
-    return Archive(problem(), "latin-hypercube", 0, "command", {k: outcome(k) for k in starts})
+    return Archive(problem(), "command", {StartName("latin-hypercube", 0, k): outcome(k) for k in starts})
 
 
 def record(k=0):
@@ -96,7 +96,7 @@ class Samples:
             found = load(path)
             return found.seconds, found.problem.hash, found.last.x.tobytes(), found.certificate
         if kind == "archive":
-            return {k: o.efficiency for k, o in load_archive(path).outcomes.items()}
+            return {name: o.efficiency for name, o in load_archive(path).outcomes.items()}
         if kind == "arrays":
             return {k: v.tolist() for k, v in read_arrays(path).items()}
         if kind == "study":

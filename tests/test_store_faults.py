@@ -18,7 +18,7 @@ from colloc.errors import CollocError, StoreError
 from colloc.file_lock import locked
 from colloc.json_cache import load_entries, save_entry
 from colloc.replaced_file import replaced_file
-from colloc.store_archive import load_archive, save_archive
+from colloc.store_archive import StartName, load_archive, save_archive
 from colloc.study_journal import Journal, read_journal
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits and processes")
@@ -139,7 +139,7 @@ def _write_many(kind, folder, who, count):
             save_entry(folder / "c.json", f"{who}-{k}", {"value": k})
         elif kind == "archive":
             mine = archive([])
-            mine.outcomes[1000 * who + k] = outcome(1000 * who + k, 0.1 + 0.001 * k)
+            mine.outcomes[StartName("latin-hypercube", who, k)] = outcome(k, 0.1 + 0.001 * k)
             save_archive(mine, folder / "a.h5")
         else:
             append(folder, [record(1000 * who + k)])
@@ -159,8 +159,8 @@ def test_two_writers_at_once_end_with_both_results(kind, tmp_path):
         assert found == {f"{who}-{k}" for who in (1, 2) for k in range(count)}
     elif kind == "archive":
         outcomes = load_archive(tmp_path / "a.h5").outcomes
-        assert sorted(outcomes) == [1000 * who + k for who in (1, 2) for k in range(count)]
-        assert outcomes[2003].efficiency == 0.1 + 0.001 * 3
+        assert sorted(outcomes) == [("latin-hypercube", who, k) for who in (1, 2) for k in range(count)]
+        assert outcomes["latin-hypercube", 2, 3].efficiency == 0.1 + 0.001 * 3
     else:
         text = read_journal(tmp_path)
         assert text.damaged == 0
