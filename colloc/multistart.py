@@ -124,7 +124,7 @@ def _others_lines(kept: Mapping[StartName, Outcome], shown: int) -> list[str]:
         return []
     best = max(kept, key=lambda name: kept[name].efficiency if kept[name].status == SOLVED else -1.0)
     what = f"; the best of all, {kept[best].efficiency:.6f}, is start {best.number} of seed {best.seed} ({best.sampler})"
-    return [f"  the file holds {len(kept) - shown} other starts{what if kept[best].status == SOLVED else ''}"]
+    return [f"  starts in the file besides: {len(kept) - shown}{what if kept[best].status == SOLVED else ''}"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -284,7 +284,7 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     # another seed joins the same archive, and says what else is there
     assert multistart.main([str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 0
     assert asked == [2, 3, 0, 1]
-    assert "the file holds 4 other starts; the best of all, 0.200000" in capsys.readouterr().out
+    assert "starts in the file besides: 4; the best of all, 0.200000" in capsys.readouterr().out
     archive = load_archive(out / "quick.starts.h5")
     assert sorted(archive.of_search(SAMPLERS[0], 0)) == [0, 1, 2, 3]
     assert sorted(archive.of_search(SAMPLERS[0], 1)) == [0, 1]

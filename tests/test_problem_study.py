@@ -17,6 +17,8 @@ from colloc.errors import ProblemError, StoreError
 from colloc.friction import Friction
 from colloc.gait import Fourier, Harmonic, ellipse
 from colloc.gait_class import DIRECT, RETROGRADE, gait_class, wave_direction, winding
+from colloc.path_class import FreePath, Polygon
+from colloc.path_gait import ArcPath, Corners
 from colloc.path_replay import replay
 from colloc.problem import Problem
 from colloc.problem_study import Axis, Study, read_study_file
@@ -304,6 +306,56 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
     best, where = best_over(np.array([[1.0, np.nan], [np.nan, np.nan]]), 1)
     np.testing.assert_array_equal(best, [1.0, np.nan])
     assert where[0] == 0
+
+
+CLASSES = {"ellipse": Harmonic(1, "bilateral"), "triangle": Polygon(3, "bilateral"), "path": FreePath(4.0, "bilateral")}
+
+
+def in_class(kind, guess=None, intervals=12):
+    near = ellipse(0.1, 2.0, 1.0) if guess is None else guess
+    return Problem("p", near, gait=CLASSES[kind], delta=1e-3, intervals=intervals)
+
+
+def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_kept_exactly(tmp_path, monkeypatch):
+    def next_to(stated, start_from, start, time_limit):
+        guess = start_from()
+        gait = study_cell.member(stated, guess)
+        return outcome(start, guess, gait, study_cell.efficiency_as_it_is(stated, gait))
+
+    monkeypatch.setattr(study_cell, "run_guess", next_to)
+    study = Study("kinds", (Axis("kind", tuple(CLASSES)),), in_class, cold_starts=0)
+    run = StudyRun(study, tmp_path)
+    finished(run)
+    assert [type(run.cells[k,].best.outcome.gait) for k in range(3)] == [Fourier, Corners, ArcPath]
+    # the ellipse was looked at in both other classes, as it is
+    ellipses = run.cells[0,].best
+    for k in (1, 2):
+        assert run.cells[k,].scores[ellipses.gait_key] == pytest.approx(ellipses.outcome.efficiency, rel=0.02)
+    again = StudyRun(study, tmp_path)
+    assert [again.cells[k,].best.gait_key for k in range(3)] == [run.cells[k,].best.gait_key for k in range(3)]
+    table = load_study(save_study(study_table(run), tmp_path / "kinds.nc"))
+    assert set(table.variables["status"]) == {SOLVED}
+    triangle = run.cells[1,].best.outcome.gait
+    assert table.variables["delta"][1] == pytest.approx(1e-4 * triangle.length)
+    series = Fourier(*(table.variables[name][1] for name in ("mean", "cos", "sin")))
+    t = np.linspace(0, 1, 100)
+    np.testing.assert_allclose(series.angles(t), triangle.angles(t), atol=0.2)
+    assert np.isnan(table.variables["cos"][0, :, 1:]).all()
+
+
+@pytest.mark.slow
+def test_a_study_over_classes_is_solved_and_certified(tmp_path):
+    corners = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
+    guesses = {"ellipse": ellipse(0.0, 2.8, 1.3), "triangle": corners, "path": ellipse(0.0, 2.8, 1.3)}
+    axis = Axis("kind", tuple(CLASSES), travels=False)
+    study = Study("kinds", (axis,), lambda kind: in_class(kind, guesses[kind], 60 if kind == "path" else 24), cold_starts=0)
+    run = StudyRun(study, tmp_path)
+    finished(run)
+    efficiency = study_table(run).variables["efficiency"]
+    # harmonics, triangles and paths of curvature 4: docs/gait_classes.md
+    assert efficiency[0] == pytest.approx(0.260, abs=2e-3)
+    assert efficiency[1] > 0.39
+    assert efficiency[2] > 0.36
 
 
 def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
