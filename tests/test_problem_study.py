@@ -443,7 +443,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
 def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
     distributed = pytest.importorskip("distributed")
     path = tmp_path / "tiny.py"
-    path.write_text(FILE.replace('"mu_b", (1.0,)', '"mu_b", (1.0, 1.05)'), encoding="utf-8")
+    path.write_text(FILE, encoding="utf-8")
     study, _ = read_study_file(path)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
@@ -455,7 +455,7 @@ def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
     assert study_table(run).variables["efficiency"].min() > 0.25
 
 
-def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(tmp_path, capsys):
+def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(fake, tmp_path, capsys):
     pytest.importorskip("distributed")
     path = tmp_path / "tiny.py"
     path.write_text(FILE, encoding="utf-8")
