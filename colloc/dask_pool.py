@@ -13,8 +13,8 @@ from concurrent.futures import CancelledError, Executor, Future
 from contextlib import suppress
 from typing import Any
 
-from colloc.errors import ProblemError
-from colloc.task_pool import EngineGone
+from colloc.system.errors import ProblemError
+from colloc.system.task_pool import EngineGone
 
 PATIENCE = 60.0
 """Seconds for which a scheduler may be without workers."""
@@ -26,7 +26,7 @@ _HOW = "dask worker ADDRESS --nthreads 1"
 def connected(
     address: str, workers: int, say: Callable[[str], None] = print, patience: float = PATIENCE
 ) -> tuple[Callable[[int], Executor], int]:
-    """What makes executors for `colloc.task_pool.completed` of a cluster, and how many workers it has.
+    """What makes executors for `colloc.system.task_pool.completed` of a cluster, and how many workers it has.
 
     Parameters
     ----------

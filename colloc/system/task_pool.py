@@ -1,0 +1,171 @@
+"""Run tasks on any `concurrent.futures` executor; a worker that dies costs a repetition, never the run.
+
+Which task comes next is asked only when a worker is free, so tasks may depend on results of earlier ones.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Hashable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from multiprocessing.connection import wait as wait_for_handles
+from signal import SIG_IGN, SIGINT, signal
+from typing import Any
+
+from colloc.system.errors import CollocError
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One call: a name of its own, and the arguments."""
+
+    key: Hashable
+    arguments: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Lost:
+    """In place of a result: the engine failed twice to give one (worker killed, out of memory, lost connection)."""
+
+    message: str
+
+
+class EngineGone(CollocError, RuntimeError):
+    """What runs the tasks is gone as a whole, so no task is to blame."""
+
+
+@contextlib.contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Processes started inside use one BLAS thread each; the environment is put back afterwards."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _started() -> None:
+    """A worker leaves interrupts to its parent, and does not outlive it."""
+    signal(SIGINT, SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def leave() -> None:
+        wait_for_handles([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=leave, daemon=True).start()
+
+
+def process_pool(workers: int) -> Executor:
+    """Fresh processes: they inherit no state, and their number of BLAS threads is settled before NumPy is loaded."""
+    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_started)
+
+
+def _failure(future: Future) -> BaseException | None:
+    try:
+        return future.exception()
+    except CancelledError as cancelled:
+        return cancelled
+
+
+def completed(
+    function: Callable[..., Any],
+    ready: Callable[[], Task | None],
+    *,
+    workers: int,
+    executor: Callable[[int], Executor] = process_pool,
+    ahead: int = 0,
+) -> Iterator[tuple[Task, Any]]:
+    """Tasks with their results, each as soon as it is there.
+
+    Parameters
+    ----------
+    function : callable
+        Called as ``function(*task.arguments)`` on a worker. It must not raise: an exception counts as a lost worker.
+    ready : callable
+        The next task, or None if there is none now. Asked again after each result has been taken; the run ends when
+        there is none and nothing is under way.
+    workers, ahead : int
+        So many tasks, together, are handed over at a time; `ahead` of them wait so that no worker has to.
+    executor : callable
+        Makes an executor for a number of workers: processes by default; threads, or the one a Dask client gives
+        (``lambda n: client.get_executor()``), will do.
+
+    Yields
+    ------
+    Task, result
+        The result is `Lost` for a task whose worker died, which was tried again alone, and whose worker died again.
+
+    Raises
+    ------
+    BrokenExecutor
+        If not even a first task can be handed over.
+    EngineGone
+        If the executor says that of itself: nothing is tried again, and no task recorded as lost.
+    """
+    suspects: list[Task] = []
+    more = True
+    with one_thread_each():
+        while more or suspects:
+            alone = bool(suspects)
+            pool = executor(1 if alone else workers)
+            pending: dict[Future, Task] = {}
+            submitted, listened = False, True
+            try:
+                while True:
+                    while len(pending) < (1 if alone else workers + ahead):
+                        task = (suspects[-1] if suspects else None) if alone else ready()
+                        if task is None:
+                            break
+                        try:
+                            pending[pool.submit(function, *task.arguments)] = task
+                        except BrokenExecutor:
+                            if not alone:
+                                suspects.append(task)
+                            raise
+                        if alone:
+                            suspects.pop()
+                        submitted = True
+                    if not pending:
+                        more = alone or bool(suspects)
+                        break
+                    for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                        error = _failure(future)
+                        if isinstance(error, (BrokenExecutor, EngineGone)):
+                            raise error
+                        task = pending.pop(future)
+                        if error is None:
+                            yield task, future.result()
+                        elif alone:
+                            yield task, Lost(f"its worker failed twice ({type(error).__name__}: {error}).")
+                        else:
+                            suspects.append(task)
+            except BrokenExecutor:
+                if not submitted:
+                    listened = False
+                    raise
+                if alone:
+                    for task in pending.values():
+                        yield task, Lost("its worker process died twice (killed, or out of memory).")
+                else:
+                    suspects += pending.values()
+            except BaseException:
+                listened = False
+                raise
+            finally:
+                # interrupted, or nobody listens any more: do not wait for what is under way
+                for future in pending:
+                    future.cancel()
+                pool.shutdown(wait=listened)
