@@ -135,7 +135,7 @@ def _spread(values: np.ndarray, axis: int) -> np.ndarray:
 def _cell_bounds(
     body: Chain, reference: _Reference, low: np.ndarray, size: np.ndarray, multiplier: float, delta: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Upper bounds of |V_c|/P over cells with low corners ``(3, n)`` and common size ``(3,)``, infinite if unknown; M(1 + t)."""
+    """Upper bounds of |V_c|/P over cells with low corners ``(3, n)`` and size ``(3,)``, infinite if unknown; M(1 + t)."""
     n = low.shape[1]
     corner = low[:, :, None] + size[:, None, None] * _CORNERS.T[:, None, :]
     index = np.rint((corner - low.min(axis=1)[:, None, None]) / size[:, None, None]).astype(np.int64)

@@ -69,7 +69,7 @@ def _summary(solution: Solution, reference: Reference | None, gap: str) -> Marku
     if certificate is not None:
         facts = [
             (f"{certificate.efficiency:.5f}", f"efficiency d/W, ± {certificate.efficiency_error:.0e}, replayed"),
-            (f"{certificate.efficiency_at_zero_delta:.5f}", "for δ → 0, same gait"),
+            (f"{certificate.efficiency_at_zero_delta:.5f}", f"for δ → 0, same gait, ± {certificate.error_at_zero_delta:.0e}"),
             (f"{certificate.distance:.5f}", "distance d a period [body lengths]"),
             (f"{certificate.work:.5f}", "work W a period [weight × length]"),
         ]

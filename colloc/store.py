@@ -134,7 +134,8 @@ def _read(file: h5py.File) -> Solution:
         group = child(file, "certificate")
         columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
         checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+        stated = [f.name for f in dataclasses.fields(Certificate) if f.default is dataclasses.MISSING or f.name in group.attrs]
+        rest = {name: attribute(group, name) for name in stated if name != "checks"}
         certificate = Certificate(checks, **rest)
     solution = Solution(
         problem,
