@@ -207,7 +207,8 @@ def replay(
         gap = astray / max(distance, 1e-300) + np.abs(spent - once[2]) / work
         residual = float(panels.residual.max())
         order = np.argsort(gap)
-        excess = np.cumsum(gap[order]) + residual > tolerance
+        # finer panels do not make up for what the balance leaves over
+        excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
         chosen = order[excess & (panels.width[order] > _NARROWEST)]
         n = 4 * (panels.left.size + chosen.size)
         if chosen.size == 0 or n > most_instants:
