@@ -103,6 +103,7 @@ LEVELS = {
         "continuation",
         "compiled_problem",
         "level_run",
+        "friction_unit",
         "concertina",
         "epsilon_study",
         "chain_study",
