@@ -10,9 +10,9 @@ import dataclasses
 
 import numpy as np
 
-from colloc.friction import Friction
-from colloc.problem import Problem
-from colloc.solution import Level
+from colloc.gaits.problem import Problem
+from colloc.mechanics.friction import Friction
+from colloc.results.solution import Level
 
 
 def friction_unit(friction: Friction) -> float:

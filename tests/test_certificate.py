@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import verify
-from colloc.path_gait import ArcPath
-from colloc.path_replay import replay
-from colloc.recheck import main as recheck
-from colloc.solution import Solution
-from colloc.store import load, save
-from colloc.verify import certify
+from colloc.commands.verify import main as recheck
+from colloc.gaits.paths import ArcPath
+from colloc.results import certificate as verify
+from colloc.results.certificate import certify
+from colloc.results.solution import Solution
+from colloc.results.store import load, save
+from colloc.verification.replay import replay
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05
 
@@ -225,7 +225,7 @@ def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch
 
 
 def test_files_without_an_error_of_the_limit_are_read(three_link, tmp_path, monkeypatch):
-    import colloc.store as store
+    import colloc.results.store as store
 
     put = store.put_attribute
     monkeypatch.setattr(store, "put_attribute", lambda o, n, v: None if n == "error_at_zero_delta" else put(o, n, v))

@@ -1,0 +1,27 @@
+"""How far a gait is from the best possible: efficiency, upper bound and gap, in one line for reports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
+from colloc.gaits.problem import Problem
+
+CACHE = "bounds.json"
+"""Where bounds are kept, beside the results."""
+
+
+def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
+    """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for."""
+    cache = folder / CACHE
+    if compute:
+        return efficiency_bound(problem.body, problem.friction, problem.joint_limit, cache=cache)
+    return known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
+
+
+def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
+    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq. lambdaupper)."""
+    if bound is not None:
+        return f"  {bound.report(efficiency)}"
+    limit = 1.0 / problem.friction.smallest
+    return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}; --bound computes a tighter one"

@@ -1,0 +1,230 @@
+"""Independent replay of a gait: from the joint angles alone to distance, work and rotation, by the NumPy solver.
+
+It shares nothing with collocation but the friction law: no scheme, no mesh, no symmetry, no interpolant. Velocities are
+solved for at five instants of every panel of the period and integrated by Simpson's rule, once over the panel and once over
+its halves; panels are halved where the two differ. The differences add up as magnitudes: kinks of stick and slip lie anywhere
+between the instants, so those of different panels may well cancel by accident, and a difference of two sums be no error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.balance import Instant, instant, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.system.errors import ProblemError
+
+Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
+
+_ONE_SIDED = 1e-12
+_NARROWEST = 1e-10
+_HALF = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24
+"""Integrals from the first of three instants to each of them of the parabola through them, over unit distance of the outer."""
+_WHOLE = np.zeros((5, 5))
+_WHOLE[:3, :3] = 0.5 * _HALF
+_WHOLE[3:] = _WHOLE[2]
+_WHOLE[2:, 2:] += 0.5 * _HALF
+"""The same for five instants, parabola by parabola."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A gait replayed over one period.
+
+    Attributes
+    ----------
+    distance, work, efficiency : float
+        The distance is that of the centre of mass.
+    rotation : float
+        Net rotation over the period [rad].
+    lever : float
+        Largest distance of a point of the body from its centre of mass [body lengths].
+    actuator_work : float
+        Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
+    residual : float
+        Largest force or torque left over, at any instant, in units of the largest friction coefficient.
+    error : float
+        Relative error of the efficiency: what halving the panels changes, summed as magnitudes, and the residual.
+    instants : int
+    """
+
+    distance: float
+    work: float
+    efficiency: float
+    rotation: float
+    lever: float
+    actuator_work: float
+    residual: float
+    error: float
+    instants: int
+
+    @property
+    def turning(self) -> float:
+        """How much the distance depends on the point of the body that is followed, relative: rotation times lever over it."""
+        return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
+
+
+def _actuator_power(body: Chain, now: Instant, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Power of the joint moments, ``(n_time,)``: moment at a joint balances the friction on all links ahead of it."""
+    x, y = body.joints(angles)
+    fx = now.force.tangential * now.posture.cos - now.force.normal * now.posture.sin
+    fy = now.force.tangential * now.posture.sin + now.force.normal * now.posture.cos
+    power = np.zeros(angles.shape[1])
+    for joint in range(body.n_joint):
+        ahead = slice(joint + 1, None)
+        arm_x, arm_y = now.posture.x[ahead] - x[joint + 1], now.posture.y[ahead] - y[joint + 1]
+        moment = (arm_x * fy[ahead] - arm_y * fx[ahead] + now.force.couple[ahead]).sum(axis=0)
+        power -= moment * rates[joint]
+    return power
+
+
+class _Panels(NamedTuple):
+    """Panels in order of time: left end and width ``(n,)``, and at five instants of each ``(n, 5)``: rotation rate, velocity of
+    the centre of mass in the body frame (complex), power, power of the joints, residual and lever."""
+
+    left: np.ndarray
+    width: np.ndarray
+    omega: np.ndarray
+    centre: np.ndarray
+    power: np.ndarray
+    actuator: np.ndarray
+    residual: np.ndarray
+    lever: np.ndarray
+
+    def take(self, chosen: np.ndarray) -> _Panels:
+        return _Panels(*(a[chosen] for a in self))
+
+    def joined(self, other: _Panels) -> _Panels:
+        """These and others, in order of time."""
+        both = _Panels(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+        return both.take(np.argsort(both.left))
+
+
+def _evaluated(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The last six of `_Panels` at instants t ``(n, k)``."""
+    angles, rates = path(t.ravel())
+    solved = solve_balance(body, friction, angles, rates, delta).require()
+    now = instant(body, friction, angles, rates, solved.z, delta)
+    (cx, cy), (x, y) = body.centre_velocity(now.posture, now.velocity), body.joints(angles)
+    gx, gy = body.centre(now.posture)
+    values = (
+        solved.z[2],
+        cx[0] + 1j * cy[0],
+        total_power(now.velocity, now.force)[0],
+        _actuator_power(body, now, angles, rates),
+        solved.residual,
+        np.hypot(x - gx, y - gy).max(axis=0),
+    )
+    return tuple(value.reshape(t.shape) for value in values)
+
+
+def _halves(panels: _Panels, new: tuple[np.ndarray, ...]) -> _Panels:
+    """Both halves of panels, from the values at their instants and half way between these ``(n, 4)``."""
+    fields = []
+    for old, between in zip(panels[2:], new, strict=True):
+        merged = np.empty((old.shape[0], 9), dtype=old.dtype)
+        merged[:, ::2], merged[:, 1::2] = old, between
+        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, 5))
+    left, width = np.repeat(panels.left, 2), 0.5 * np.repeat(panels.width, 2)
+    left[1::2] += width[1::2]
+    return _Panels(left, width, *fields)
+
+
+def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rotation, displacement in the axes at the panel's begin (complex) and work of panels, on every `every`-th instant."""
+    omega, centre, power = (a[:, ::every] for a in (panels.omega, panels.centre, panels.power))
+    h, b = panels.width, rule[-1]
+    turn = np.exp(1j * h[:, None] * (omega @ rule.T))
+    return h * (omega @ b), h * ((turn * centre) @ b), h * (power @ b)
+
+
+def replay(
+    body: Chain,
+    friction: Friction,
+    path: Path,
+    delta: float,
+    *,
+    instants: int = 1600,
+    tolerance: float = 1e-6,
+    most_instants: int = 100_000,
+    breaks: np.ndarray | tuple[float, ...] = (),
+) -> Replay:
+    """Distance, work and efficiency of a path over one period, to a relative error in the efficiency.
+
+    Parameters
+    ----------
+    body, friction
+    path : callable
+        Joint angles and rates at phases in [0, 1].
+    delta : float
+        Regularisation speed, per period.
+    instants : int
+        Uniform instants to begin with, about; panels are halved until the error is below `tolerance`.
+    tolerance : float
+        Relative error of the efficiency.
+    most_instants : int
+        No panel is halved once there are so many.
+    breaks : (n,), optional
+        Phases in (0, 1) where the rates jump (corners); they are integrated up to and from there.
+
+    Raises
+    ------
+    ProblemError
+        If the path does not move, or the grid is too small.
+    NotConvergedError
+        If the balance cannot be solved at some instant.
+    """
+    if instants < 4 or instants % 2:
+        raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
+    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
+    counts = [max(1, round(instants * (b - a) / 4)) for a, b in pairwise(ends)]
+    edges = np.concatenate([np.linspace(a, b, n + 1)[:-1] for (a, b), n in zip(pairwise(ends), counts, strict=True)] + [[1.0]])
+    left, width = edges[:-1], np.diff(edges)
+    t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
+    # one-sided limits at jumps
+    t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
+    t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
+    panels = _Panels(left, width, *_evaluated(body, friction, path, delta, t))
+    while True:
+        turn, move, spent = _increments(_WHOLE, panels, 1)
+        heading = np.concatenate([[0.0], np.cumsum(turn)])
+        travelled = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
+        distance, work = float(abs(travelled[-1])), float(spent.sum())
+        if not work > 0:
+            raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
+        once = _increments(_HALF, panels, 2)
+        # an error of rotation turns all that comes after it
+        reach = np.abs(travelled - travelled[-1]).max()
+        astray = np.abs(move - once[1]) + reach * np.abs(turn - once[0])
+        gap = astray / max(distance, 1e-300) + np.abs(spent - once[2]) / work
+        residual = float(panels.residual.max())
+        order = np.argsort(gap)
+        # finer panels do not make up for what the balance leaves over
+        excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
+        chosen = order[excess & (panels.width[order] > _NARROWEST)]
+        n = 4 * (panels.left.size + chosen.size)
+        if chosen.size == 0 or n > most_instants:
+            break
+        old = panels.take(chosen)
+        between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
+        kept = np.setdiff1d(order, chosen)
+        panels = panels.take(kept).joined(_halves(old, _evaluated(body, friction, path, delta, between)))
+    return Replay(
+        distance,
+        work,
+        distance / work,
+        float(heading[-1]),
+        float(panels.lever.max()),
+        float(((panels.actuator @ _WHOLE[-1]) * panels.width).sum()),
+        residual,
+        float(gap.sum()) + residual,
+        4 * panels.left.size,
+    )
