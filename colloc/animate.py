@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.command_options import OK, add_result, exit_code, new_parser, output_path
+from colloc.command_end import OK, run
+from colloc.command_options import add_result, new_parser, output_kind, output_path
 from colloc.errors import ProblemError
 from colloc.progress import StatusLine
 from colloc.replaced_file import replaced_file
@@ -155,16 +156,13 @@ def _counted(pictures: Iterator[np.ndarray], total: int, line: StatusLine) -> It
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _animate(options))
+    return run(_parser(), _animate, arguments)
 
 
 def _animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
-    suffix = Path(options.output).suffix.lstrip(".") if options.output else ""
-    kind = options.format or (suffix if suffix in ("gif", "mp4") else "gif")
-    path = output_path(options.output, source.with_suffix(f".{kind}"))
+    path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('gif', 'mp4'))}"))
     settings = {"periods": options.periods, "seconds": options.seconds, "fps": options.fps, "width": options.width}
     animate(solution, path, **settings, arrows=not options.no_arrows)
     print(f"saved {path} ({path.stat().st_size / 1000:.0f} kB)")

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from colloc.basins import SAME_EFFICIENCY, SAME_GAIT
-from colloc.command_options import OK, add_printing, exit_code, new_parser
+from colloc.command_end import OK, run
+from colloc.command_options import add_printing, new_parser
 from colloc.errors import ProblemError
 from colloc.solution import Solution
 from colloc.store import load
@@ -120,8 +121,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _compare(options))
+    return run(_parser(), _compare, arguments)
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.command_options import OK, add_result, exit_code, new_parser, output_path
+from colloc.command_end import OK, run
+from colloc.command_options import add_result, new_parser, output_kind, output_path
 from colloc.errors import ProblemError
 from colloc.replaced_file import replaced_file
 from colloc.solution import Solution
@@ -96,8 +97,7 @@ def json_text(facts: dict, trajectory: Trajectory, periods: int = 1) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _export(options))
+    return run(_parser(), _export, arguments)
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -107,8 +107,7 @@ def _export(options: argparse.Namespace) -> int:
     solution = load(source)
     if not solution.levels:
         raise ProblemError(f"{source} holds no gait: its solve failed before the first level.")
-    suffix = Path(options.output).suffix.lstrip(".") if options.output else ""
-    kind = options.format or (suffix if suffix in ("csv", "json") else "csv")
+    kind = output_kind(options, ("csv", "json"))
     path = output_path(options.output, source.with_suffix(f".{kind}"))
     limits = options.max_speed
     trajectory = timed(gait_path(solution), options.rate, options.period, None if limits is None else np.array(limits))

@@ -22,6 +22,8 @@ from colloc.schemes import scheme
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
 CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
 FORMULATIONS = (CONDENSED, MAP, LIFTED)
+LONGEST_NAME = 200
+"""File systems allow 255 bytes, and results of a problem add endings to its name."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
@@ -55,7 +57,7 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``.
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200.
     guess : Fourier, ArcPath or Corners
         An admissible gait to start from, of any class; it is projected onto the class `gait`.
     body : Chain
@@ -106,6 +108,8 @@ class Problem:
     def _check_types(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        if len(self.name) > LONGEST_NAME:
+            raise ProblemError(f"name has {len(self.name)} characters, and files are named after it; {LONGEST_NAME} are allowed.")
         for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
             if not isinstance(getattr(self, field), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)

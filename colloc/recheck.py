@@ -13,7 +13,8 @@ import json
 import sys
 from collections.abc import Sequence
 
-from colloc.command_options import FAILED, OK, add_printing, add_result, exit_code, new_parser
+from colloc.command_end import FAILED, OK, run
+from colloc.command_options import add_printing, add_result, new_parser
 from colloc.errors import ProblemError
 from colloc.progress import StatusLine
 from colloc.solution import Certificate, Solution
@@ -69,8 +70,7 @@ def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _verify(options))
+    return run(_parser(), _verify, arguments)
 
 
 def _verify(options: argparse.Namespace) -> int:

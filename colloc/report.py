@@ -10,7 +10,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.command_options import OK, add_result, exit_code, new_parser, output_path
+from colloc.command_end import OK, run
+from colloc.command_options import add_result, new_parser, output_path
 from colloc.problem import Reference
 from colloc.progress import StatusLine
 from colloc.replaced_file import replaced_file
@@ -36,8 +37,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _report(options))
+    return run(_parser(), _report, arguments)
 
 
 def _report(options: argparse.Namespace) -> int:

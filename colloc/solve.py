@@ -16,18 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colloc.command_options import (
-    FAILED,
-    NONE_FOUND,
-    OK,
-    add_bound,
-    add_printing,
-    add_problem,
-    changed,
-    exit_code,
-    new_parser,
-    output_path,
-)
+from colloc.command_end import FAILED, NONE_FOUND, OK, run
+from colloc.command_options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.errors import StoreError
 from colloc.gait import Fourier
 from colloc.gait_fields import fields
@@ -156,8 +146,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _solve(options))
+    return run(_parser(), _solve, arguments)
 
 
 def _solve(options: argparse.Namespace) -> int:

@@ -23,6 +23,7 @@ LEVELS = {
         "minimax_program",
         "multiplier_estimate",
         "machine_code",
+        "command_end",
     ],
     1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: [
@@ -64,6 +65,7 @@ LEVELS = {
         "kinks",
         "mesh_error",
         "smooth_batch",
+        "stop_request",
         "modal_balance",
         "modal_transcription",
         "balanced_velocity",
@@ -213,6 +215,7 @@ def test_the_numpy_side_never_loads_casadi():
         "path_kernels",
         "path_transcription",
         "shape_checks",
+        "stop_request",
         "worst_instants",
         "transcription",
         "velocity_callback",
