@@ -134,8 +134,7 @@ def animate(
         raise ProblemError(f"{periods} periods of {count} pictures cannot be drawn; change --periods, --seconds or --fps.")
     if not 200 <= width <= 4000:
         raise ProblemError(f"--width must lie between 200 and 4000, not {width}.")
-    if not solution.levels:
-        raise ProblemError("the result holds no gait: its solve failed before the first level.")
+    solution.last  # noqa: B018  raises where there is no gait
     if path.suffix == ".mp4":
         _ffmpeg()  # before anything is drawn
     from colloc.figures_animation import pictures

@@ -15,6 +15,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from colloc.errors import ChangedFileWarning, CollocError
 from colloc.interruption import interruptible
@@ -89,11 +90,11 @@ def _notes() -> Iterator[None]:
     with warnings.catch_warnings():
         before = warnings.showwarning
 
-        def show(message, category, *where) -> None:
+        def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
             if issubclass(category, ChangedFileWarning):
                 print(f"colloc: {message}", file=sys.stderr)
             else:
-                before(message, category, *where)
+                before(message, category, *where, **more)
 
         warnings.simplefilter("always", ChangedFileWarning)
         warnings.showwarning = show

@@ -16,7 +16,6 @@ import numpy as np
 from colloc.basins import SAME_EFFICIENCY, SAME_GAIT
 from colloc.command_end import OK, run
 from colloc.command_options import add_printing, new_parser
-from colloc.errors import ProblemError
 from colloc.solution import Solution
 from colloc.store import load
 from colloc.verify import gait_path
@@ -83,13 +82,12 @@ _NAMES = ("status", "efficiency", "  at delta -> 0", "distance d", "work W", "de
 
 
 def _column(solution: Solution) -> list[str]:
-    last, certificate = solution.last, solution.certificate
-    measured = certificate if certificate is not None else last
-    error = f" +- {certificate.efficiency_error:.0e}" if certificate is not None else " (not replayed)"
+    last, certificate, measured = solution.last, solution.certificate, solution.measured
+    error = f" +- {certificate.efficiency_error:.0e}" if certificate.replayed else " (not replayed)"
     return [
         solution.status,
         f"{measured.efficiency:.6f}{error}",
-        f"{certificate.efficiency_at_zero_delta:.6f}" if certificate is not None else "-",
+        f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
         f"{measured.distance:.6f}",
         f"{measured.work:.6f}",
         f"{last.delta:.1e}",
@@ -101,7 +99,7 @@ def _column(solution: Solution) -> list[str]:
 
 def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
     """Whether the two are the same optimum, and why, in a sentence."""
-    values = [s.certificate.efficiency if s.certificate is not None else s.last.efficiency for s in (a, b)]
+    values = [s.measured.efficiency for s in (a, b)]
     difference = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
     apart = gait_distance(a, b)
     if apart is None:
@@ -126,9 +124,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _compare(options: argparse.Namespace) -> int:
     a, b = load(options.first), load(options.second)
-    for solution, path in ((a, options.first), (b, options.second)):
-        if not solution.levels:
-            raise ProblemError(f"{path} holds no gait: its solve failed before the first level.")
     same, sentence = verdict(a, b)
     if options.json:
         table = {name.strip() or "name": [x, y] for name, x, y in rows(a, b)}

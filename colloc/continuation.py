@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from colloc.diagnosis import explanation, redundant_equations
+from colloc.level import Level
 from colloc.level_run import LOWER_START, REMESH_RADIUS, SMALLEST_RADIUS, TRIVIAL, Report, Run
 from colloc.mesh_error import mesh_error
 from colloc.nlp import NlpResult, Solver
@@ -21,7 +22,7 @@ from colloc.path_start import transcribed
 from colloc.problem import Problem
 from colloc.program import GaitProgram
 from colloc.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
-from colloc.solution import Level, Solution
+from colloc.solution import Solution
 from colloc.warm_start import feasible_point
 
 _SMALLEST_STEP = 0.8

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.level import Level
 from colloc.mesh_error import mesh_error
-from colloc.solution import Level, Solution
+from colloc.solution import Solution
 
 RESOLVED = 1e-4
 """Largest relative efficiency error of the mesh at which delta counts as resolved: the certificate's replay gap."""

@@ -11,12 +11,12 @@ from colloc.closure import closed_parameters, opened_parameters
 from colloc.contact import Pairs
 from colloc.far_contact import crossing_pairs, last_free
 from colloc.gait_fields import AnyGait
+from colloc.level import Level
 from colloc.nlp import NlpResult, Solver
 from colloc.path_start import nearest_parameters, transcribed
 from colloc.prediction import Track
 from colloc.problem import CONDENSED, Problem
 from colloc.program import GaitProgram
-from colloc.solution import Level
 from colloc.warm_start import feasible_point
 
 FIRST_FACTOR = 0.2

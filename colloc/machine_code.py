@@ -3,6 +3,9 @@
 CasADi interprets its expressions; compiled, a Hessian of some ten thousand operations runs about ten times faster, with the
 same operations in the same order, so the same results to the last bit. Compiling takes seconds, so callers ask
 for it where it pays: functions whose code is in the folder are loaded, all others are interpreted, except within `compiling`.
+
+Loading a library runs it. So the folder is made for its user alone, and code is neither loaded from nor put into a place that
+anybody else could have written to (`colloc.private_folder`).
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ import casadi as ca
 import numpy as np
 
 from colloc.errors import ProblemError, StoreError
+from colloc.private_folder import is_private, make_private
 from colloc.replaced_file import replaced_file
 
 _FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
@@ -92,8 +96,10 @@ def machine_code(functions: Sequence[ca.Function]) -> list[ca.Function]:
         return list(functions)
     content = "\n".join([ca.__version__, platform.machine(), *_FLAGS, *(f.serialize() for f in functions)])
     library = folder / f"{hashlib.sha256(content.encode()).hexdigest()[:32]}.so"
-    loaded = _loaded(functions, library) if os.path.exists(library) else None  # False where one may not look
+    # os.path.exists is False where one may not look
+    loaded = _loaded(functions, library) if os.path.exists(library) and is_private(library) else None
     if loaded is None and _asked.get():
+        make_private(folder)
         _compile(functions, library)
         loaded = _loaded(functions, library)
     return list(functions) if loaded is None else loaded
@@ -115,6 +121,7 @@ def _compile(functions: Sequence[ca.Function], library: Path) -> None:
             failure = f"could not be run: {error.strerror or error}"
         if failure:
             raise StoreError(f"the C compiler {command[0]} failed ({failure}); set CC to another, or do without compiled code.")
+        os.chmod(unfinished, 0o600)
 
 
 @contextlib.contextmanager

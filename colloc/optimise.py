@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from colloc.continuation import continue_delta
 from colloc.errors import NotConvergedError
+from colloc.level import Level
 from colloc.level_run import TRIVIAL, Report
 from colloc.problem import Problem
 from colloc.sampling import on_speed_floor
-from colloc.solution import Level, Solution
+from colloc.solution import Solution
 from colloc.verify import certify
 
 FINER = "more intervals or a smaller mesh_tolerance"

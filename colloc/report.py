@@ -72,7 +72,7 @@ def _reference(problem_file: str | None) -> Reference | None:
 def _gap(solution, folder: Path) -> str:
     from colloc.gap import gap_line, upper_bound
 
-    if solution.certificate is None:
+    if not solution.certificate.replayed:
         return ""
     bound = upper_bound(solution.problem, folder, compute=False)
     return gap_line(solution.problem, solution.certificate.efficiency, bound)

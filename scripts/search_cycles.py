@@ -43,7 +43,7 @@ def polished(cycle: Cycle, friction: Friction, limit: float, harmonics: int, del
         solution = maximise_efficiency(problem)
     except CollocError as error:
         return f"none ({type(error).__name__})"
-    if solution.certificate is None:
+    if not solution.certificate.replayed:
         return f"none ({solution.status})"
     return f"{solution.certificate.efficiency:.4f} ({solution.status})"
 

@@ -24,6 +24,7 @@ LEVELS = {
         "multiplier_estimate",
         "machine_code",
         "command_end",
+        "private_folder",
     ],
     1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
     2: [
@@ -73,6 +74,7 @@ LEVELS = {
     4: [
         "nlp",
         "path_start",
+        "level",
         "solution",
         "problem_file",
         "store",
