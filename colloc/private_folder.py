@@ -13,11 +13,9 @@ def trespass(path: Path) -> str:
     """Who else could have written a file or folder: "belongs to another user", "can be written by others", or ""."""
     if not hasattr(os, "geteuid"):  # Windows: folders of a user are closed to others
         return ""
-    found = os.lstat(path)
-    if found.st_uid not in (os.geteuid(), 0):
+    found = os.stat(path)
+    if not {found.st_uid, os.lstat(path).st_uid} <= {os.geteuid(), 0}:  # what a link leads to, and the link
         return "belongs to another user"
-    if stat.S_ISLNK(found.st_mode):
-        return "is a link"
     return "can be written by others" if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
 
 

@@ -1,9 +1,10 @@
 """HDF5 files of results: written whole and sealed, opened only with an unbroken seal, read within limits of size and kind.
 
 The HDF5 library is no safe parser of hostile bytes. So nothing reaches it that does not carry the checksum colloc wrote
-(`colloc.sealed_file`), save a result that another program opened to write, which is whole but has lost it (`was_changed`). Whoever forges that checksum meets a second one: files are in the format of HDF5 1.8, whose blocks of
-metadata carry checksums that the library verifies. What is left to read is simple by construction, and anything else is
-refused by its type before its data are touched:
+(`colloc.sealed_file`), save a result that another program opened to write: that one is whole, but has lost it (`was_changed`).
+Whoever forges that checksum meets a second one: files are in the format of HDF5 1.8, whose blocks of metadata carry checksums
+that the library verifies. What is left to read is simple by construction, and anything else is refused by its type before its
+data are touched:
 
 - numbers in one contiguous piece: no chunks, no filters, no external or virtual data, no links out of the file, and no array
   larger than its file;
