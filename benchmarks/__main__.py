@@ -2,7 +2,7 @@
 
 Writes FOLDER/benchmarks/benchmarks.md (FOLDER is results by default) and a figure (PNG and PDF) for the parts that have one.
 A part that is run alone replaces its section and keeps the others. Times are processor time of one core unless a table says
-otherwise; the file says which machine they are from. Statements about counts are tests (tests/test_budgets.py).
+otherwise; the file says which machine they are from. Statements about counts are tests (tests/collocation/test_budgets.py).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import casadi
 
-from colloc.solution import versions
+from colloc.results.solution import versions
 
 PARTS = {
     "link_integrals": "Friction on a link",

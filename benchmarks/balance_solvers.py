@@ -19,7 +19,7 @@ from scipy.optimize import root
 from benchmarks.reference import balanced_velocity
 from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, solve_balance
-from colloc.figures_style import BLUE, GREEN, ORANGE, VERMILION, save, styled
+from colloc.pictures.style import BLUE, GREEN, ORANGE, VERMILION, save, styled
 
 BODY = Chain()
 LAWS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5))

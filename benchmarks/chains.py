@@ -26,11 +26,11 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem
-from colloc.json_cache import load_entries, save_entry
-from colloc.optimise import maximise_efficiency
-from colloc.sampling import latin_hypercube_gait
-from colloc.solution import Solution
-from colloc.transcription import transcribe
+from colloc.collocation.transcription import transcribe
+from colloc.gaits.sampling import latin_hypercube_gait
+from colloc.results.solution import Solution
+from colloc.search.optimise import maximise_efficiency
+from colloc.system.json_cache import load_entries, save_entry
 
 LAWS = ((1, 1, 1), (3, 1, 1))
 LINKS = (4, 5)

@@ -19,20 +19,20 @@ from pathlib import Path
 from unittest import mock
 
 from benchmarks.tables import markdown_table
-from colloc.compiled_problem import compile_problem
-from colloc.machine_code import FOLDER, OFF, compiler
-from colloc.problem_file import read_problem_file
+from colloc.gaits.problem_file import read_problem_file
+from colloc.numerics.machine_code import FOLDER, OFF, compiler
+from colloc.search.compiled_problem import compile_problem
 
 PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")
 MODULES = (
     "numpy",
     "casadi",
     "colloc",
-    "colloc.problem",
-    "colloc.fixed_point",
-    "colloc.optimise",
-    "colloc.figures",
-    "colloc.store",
+    "colloc.gaits.problem",
+    "colloc.mechanics.fixed_point",
+    "colloc.search.optimise",
+    "colloc.pictures.figure",
+    "colloc.results.store",
 )
 
 
@@ -47,11 +47,11 @@ def anatomy(name: str) -> dict[str, float]:
         seconds[part] = seconds.get(part, 0.0) + now - mark
         mark = now
 
-    from colloc import continuation, level_run, nlp
-    from colloc.condensed import Condensed
-    from colloc.figures import save_figure, solution_figure
-    from colloc.store import save
-    from colloc.verify import certify
+    from colloc.collocation.reduced_space import Condensed
+    from colloc.pictures.figure import save_figure, solution_figure
+    from colloc.results.certificate import certify
+    from colloc.results.store import save
+    from colloc.search import continuation, level_run, nlp
 
     lap("imports")
     problem = read_problem_file(Path("problems") / f"{name}.py").problem

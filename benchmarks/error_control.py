@@ -1,7 +1,7 @@
 """Whether the error estimate of a mesh bounds the true error: python -m benchmarks.error_control
 
 Problems with various bodies, frictions, deltas, gaits, schemes and meshes are solved, and each estimate
-(`colloc.mesh_error`) is held against two references that are much finer:
+(`colloc.verification.mesh_error`) is held against two references that are much finer:
 
 - the *replay* of the same gait to 1e-9, which shares neither scheme nor mesh nor panels with collocation;
 - the *optimum* that a refined solve of higher order finds from there (mesh tolerance 1e-7), by its own replay: this
@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
-from colloc.continuation import continue_delta
-from colloc.json_cache import load_entries, save_entry
-from colloc.mesh_error import mesh_error
-from colloc.path_replay import replay
+from colloc.search.continuation import continue_delta
+from colloc.system.json_cache import load_entries, save_entry
+from colloc.verification.mesh_error import mesh_error
+from colloc.verification.replay import replay
 
 OPTIMISM = 2.0
 """The estimate must be at least the true error divided by this."""
@@ -147,7 +147,7 @@ def row(index: int, result: dict) -> str:
 
 HEADER = """# Estimated and true efficiency errors
 
-Written by `python -m benchmarks.error_control`. All errors are relative. *Estimate*: what `colloc.mesh_error` reports, the
+Written by `python -m benchmarks.error_control`. All errors are relative. *Estimate*: what `verification.mesh_error` reports, the
 magnitudes of all intervals added up. *Expected*: their signed sum, without linearisation. *Replay*: true error of the
 collocated efficiency against a replay of the same gait. *Optimum*: against the optimum of a refined solve of higher order.
 *Ratio*: estimate over magnitude of the true error (errors below 3e-8 count as 3e-8); at least 0.5 is required.

@@ -14,11 +14,11 @@ import numpy as np
 
 from benchmarks.robustness import DELTA, TIME_LIMIT, case_problem
 from benchmarks.tables import markdown_table
-from colloc.basins import Outcome
-from colloc.campaign import run_start
-from colloc.problem import FORMULATIONS
-from colloc.sampling import LATIN_HYPERCUBE
-from colloc.solution import SOLVED
+from colloc.gaits.problem import FORMULATIONS
+from colloc.gaits.sampling import LATIN_HYPERCUBE
+from colloc.results.distinct_optima import Outcome
+from colloc.results.solution import SOLVED
+from colloc.studies.campaign import run_start
 
 LAWS = ((1, 1, 1), (10, 1, 1), (1, 1, 3))
 

@@ -8,9 +8,9 @@ import argparse
 import time
 
 from colloc import FreePath, Problem, ellipse
-from colloc.continuation import continue_delta
-from colloc.nlp import Solver
-from colloc.path_start import transcribed
+from colloc.search.continuation import continue_delta
+from colloc.search.nlp import Solver
+from colloc.search.path_start import transcribed
 
 
 def main() -> None:

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Friction
-from colloc.ellipses import gait_grid
-from colloc.sweep import Route, distinct_maxima, performance
+from scripts.models.ellipses import gait_grid
+from scripts.models.sweep import Route, distinct_maxima, performance
 
 LAWS = ((10, 1, 1), (3, 1, 1))
 STEP, INSTANTS, FINE_INSTANTS, CANDIDATES = 0.2, 48, 400, 3

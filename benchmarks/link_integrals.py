@@ -15,8 +15,8 @@ import numpy as np
 
 from benchmarks.reference import link_moments as exact_moments
 from benchmarks.tables import interleaved_seconds, markdown_table
-from colloc.figures_style import BLUE, GREEN, ORANGE, SKY, VERMILION, save, styled
-from colloc.friction import link_moments
+from colloc.mechanics.friction import link_moments
+from colloc.pictures.style import BLUE, GREEN, ORANGE, SKY, VERMILION, save, styled
 
 LENGTH = 1 / 3
 POINTS = (4, 8, 12, 20, 40, 100)

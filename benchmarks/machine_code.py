@@ -20,13 +20,13 @@ import numpy as np
 from benchmarks.robustness import DELTA, LATIN_HYPERCUBE, LAWS, TIME_LIMIT, case_problem
 from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
-from colloc.campaign import run_start
-from colloc.compiled_problem import compile_problem
-from colloc.gait import Fourier
-from colloc.kernels import balance_steps, point_function
-from colloc.machine_code import FOLDER, OFF, compiler
-from colloc.problem import CONDENSED
-from colloc.solution import SOLVED
+from colloc.collocation.point_equations import balance_steps, point_function
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.problem import CONDENSED
+from colloc.numerics.machine_code import FOLDER, OFF, compiler
+from colloc.results.solution import SOLVED
+from colloc.search.compiled_problem import compile_problem
+from colloc.studies.campaign import run_start
 
 POINTS, REPETITIONS = 120, 30
 LAW = Friction(1.7, 1, 1.3)

@@ -1,6 +1,6 @@
 """The tabulated velocity map: resolution against error, build time and look-ups: python -m benchmarks --only map_resolution
 
-Errors are those of `colloc.velocity_map.map_error`: interpolated against directly solved tail velocities at random shapes and
+Errors are those of `scripts.models.velocity_map.map_error`: interpolated against directly solved tail velocities at random shapes and
 rates (larger rate 1), the largest component of (u, v, omega/2). A look-up competes with a direct solve in a batch.
 """
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from benchmarks.balance_solvers import random_instants
 from benchmarks.tables import cpu_seconds, markdown_table
 from colloc import Chain, Friction, solve_balance
-from colloc.velocity_map import map_error, velocity_map
+from scripts.models.velocity_map import map_error, velocity_map
 
 _LOOKUPS = 20_000
 

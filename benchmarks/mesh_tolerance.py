@@ -12,8 +12,8 @@ import matplotlib.pyplot as plt
 
 from benchmarks.tables import markdown_table
 from colloc import Harmonic, Problem, certify, ellipse
-from colloc.continuation import continue_delta
-from colloc.figures_style import BLUE, GREEN, ORANGE, PURPLE, SKY, save, styled
+from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, save, styled
+from colloc.search.continuation import continue_delta
 
 SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
 COLOURS = dict(zip(SCHEMES, ("#999999", SKY, GREEN, BLUE, PURPLE, ORANGE), strict=True))

@@ -25,7 +25,7 @@ import numpy as np
 
 from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, ellipse, replay
-from colloc.ellipses import admissible
+from scripts.models.ellipses import admissible
 
 OPTIMA = (0.260030, 0.207596)
 """Certified by problems/three_link.py and problems/three_link_offset.py."""

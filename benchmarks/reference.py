@@ -1,6 +1,6 @@
 """References at any precision, in mpmath: textbook antiderivatives and plain Newton, nothing shared with colloc.
 
-The closed forms of `colloc.friction` are arranged to lose no digits; these are not: they are what an integral table
+The closed forms of `colloc.mechanics.friction` are arranged to lose no digits; these are not: they are what an integral table
 says (asinh), and digits are bought with precision instead. `quadrature_moments` checks them by quadrature.
 """
 

@@ -8,7 +8,7 @@ every failure and why; the best optimum and the share of starts that found it; a
 optimum that shares neither grid nor start phase with the certificate's. One harmonic, Latin-hypercube starts, seed 0.
 
 Both symmetries are valid for every friction law: a bilateral gait closes its rotation for any mu_b / mu_f
-(`colloc.equivalence`), and the second half of an antipodal one is the mirror image of its first half for any friction.
+(`colloc.gaits.equivalence`), and the second half of an antipodal one is the mirror image of its first half for any friction.
 
 The cases take turns, a few starts at a time, and every start is stored in results/robustness/ as soon as it is done:
 an interrupted run goes on where it stopped, and the tables in results/robustness.md and .json are even at any time.
@@ -27,15 +27,15 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Friction, Harmonic, Problem, ellipse
-from colloc.basins import Outcome, basins, counts
-from colloc.campaign import process_pool, run_starts
-from colloc.compiled_problem import compile_problem
-from colloc.gait import shifted
-from colloc.machine_code import compiler
-from colloc.path_replay import replay
-from colloc.sampling import LATIN_HYPERCUBE, on_speed_floor
-from colloc.solution import SOLVED, versions
-from colloc.store_archive import Archive, load_archive, save_archive
+from colloc.gaits.harmonic import shifted
+from colloc.gaits.sampling import LATIN_HYPERCUBE, on_speed_floor
+from colloc.numerics.machine_code import compiler
+from colloc.results.archive import Archive, load_archive, save_archive
+from colloc.results.distinct_optima import Outcome, basins, counts
+from colloc.results.solution import SOLVED, versions
+from colloc.search.compiled_problem import compile_problem
+from colloc.studies.campaign import process_pool, run_starts
+from colloc.verification.replay import replay
 
 LAWS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
 SYMMETRIES = ("none", "bilateral", "antipodal")
@@ -133,7 +133,7 @@ def markdown(rows: list[dict], asked: int, command: str) -> str:
         "",
         f"One harmonic, Latin-hypercube starts (seed 0). Written by `{command}`.",
         "Certified: first-order conditions and an independent fine replay agree. Time: processor time of one start,",
-        "certificate included, derivatives compiled (`colloc.machine_code`), on one core of a machine that did other work too;",
+        "certificate included, derivatives compiled (`numerics.machine_code`), on one core of a machine that did other work too;",
         "at the smaller delta that of going on from the result at the larger one. Replay: largest relative difference of the",
         "distinct optima's efficiencies from a second replay, on another grid and from another phase. On the floor: optima",
         "that are as slow as smallest_shape_speed = 0.1 allows; that bound, not mechanics, decides their size.",

@@ -19,8 +19,8 @@ import numpy as np
 
 from benchmarks.tables import markdown_table
 from colloc import Chain, Harmonic, Problem
-from colloc.figures_style import BLUE, GREEN, ORANGE, save, styled
-from colloc.gait import Fourier
+from colloc.gaits.harmonic import Fourier
+from colloc.pictures.style import BLUE, GREEN, ORANGE, save, styled
 
 
 def problem_of(intervals: int, links: int, harmonics: int) -> Problem:
@@ -43,9 +43,9 @@ def peak_megabytes() -> float:
 
 def measured(intervals: int, links: int, harmonics: int) -> dict[str, float]:
     """Build and solve one problem (run in a fresh process)."""
-    from colloc.nlp import Solver
-    from colloc.transcription import transcribe
-    from colloc.warm_start import feasible_point
+    from colloc.collocation.transcription import transcribe
+    from colloc.collocation.warm_start import feasible_point
+    from colloc.search.nlp import Solver
 
     before = peak_megabytes()
     problem = problem_of(intervals, links, harmonics)

@@ -17,10 +17,10 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.tables import cpu_seconds, markdown_table
 from colloc import Chain, Friction, solve_balance
-from colloc.balance import instant, total_power
-from colloc.figures_style import BLUE, GREEN, ORANGE, VERMILION, save, styled
-from colloc.motion import Motion, sine_wave
-from colloc.smooth_balance import solve_smooth
+from colloc.mechanics.balance import instant, total_power
+from colloc.pictures.style import BLUE, GREEN, ORANGE, VERMILION, save, styled
+from colloc.smooth.balance import solve_smooth
+from colloc.smooth.motion import Motion, sine_wave
 
 PHASES = np.array([0.03, 0.11, 0.2, 0.31, 0.44])
 MOTION = sine_wave()

@@ -21,12 +21,13 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import NamedTuple
 
-from colloc import Friction, Harmonic, Problem, ellipse, study_run
-from colloc.basins import Outcome
-from colloc.problem_study import Axis, Study
-from colloc.study_cell import Attempt, Work, run_chunk, start_key
-from colloc.study_run import StudyRun
-from colloc.task_pool import one_thread_each, process_pool
+from colloc import Friction, Harmonic, Problem, ellipse
+from colloc.results.distinct_optima import Outcome
+from colloc.studies import run as study_run
+from colloc.studies.cell import Attempt, Work, run_chunk, start_key
+from colloc.studies.run import StudyRun
+from colloc.studies.study import Axis, Study
+from colloc.system.task_pool import one_thread_each, process_pool
 
 
 def problem(x: float) -> Problem:

@@ -17,11 +17,11 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.tables import cpu_seconds, markdown_table
 from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
-from colloc.balance import instant, total_power
-from colloc.figures_style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled
-from colloc.gait import Fourier
-from colloc.transcription import transcribe
-from colloc.warm_start import feasible_point
+from colloc.collocation.transcription import transcribe
+from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.balance import instant, total_power
+from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled
 
 GAIT = ellipse(0, 2.85, 1.29)
 SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")

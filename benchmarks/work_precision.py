@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.figures_precision import save_work_precision
 from colloc import FreePath, Harmonic, Problem, certify, ellipse
-from colloc.continuation import continue_delta
-from colloc.figures_precision import save_work_precision
-from colloc.json_cache import load_entries, save_entry
+from colloc.search.continuation import continue_delta
+from colloc.system.json_cache import load_entries, save_entry
 
 SECOND_ORDER = "trapezoid"
 REFERENCE = ("gauss-5", 20, 1e-7)

@@ -24,19 +24,19 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from colloc.body import Chain
-    from colloc.errors import CollocError, NotConvergedError, ProblemError, StoreError
-    from colloc.fixed_point import solve_balance
-    from colloc.friction import Friction
-    from colloc.gait import Fourier, Harmonic, ellipse
-    from colloc.optimise import maximise_efficiency
-    from colloc.path_class import FreePath, Polygon
-    from colloc.path_gait import ArcPath, Corners
-    from colloc.path_replay import replay
-    from colloc.problem import Problem, Reference
-    from colloc.solution import Solution
-    from colloc.store import load, save
-    from colloc.verify import certify
+    from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+    from colloc.gaits.path_classes import FreePath, Polygon
+    from colloc.gaits.paths import ArcPath, Corners
+    from colloc.gaits.problem import Problem, Reference
+    from colloc.mechanics.body import Chain
+    from colloc.mechanics.fixed_point import solve_balance
+    from colloc.mechanics.friction import Friction
+    from colloc.results.certificate import certify
+    from colloc.results.solution import Solution
+    from colloc.results.store import load, save
+    from colloc.search.optimise import maximise_efficiency
+    from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
+    from colloc.verification.replay import replay
 
 __all__ = [
     "ArcPath",
@@ -64,19 +64,19 @@ __all__ = [
 ]
 
 _HOME = {
-    "body": ("Chain",),
-    "errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
-    "fixed_point": ("solve_balance",),
-    "friction": ("Friction",),
-    "gait": ("Fourier", "Harmonic", "ellipse"),
-    "path_class": ("FreePath", "Polygon"),
-    "path_gait": ("ArcPath", "Corners"),
-    "optimise": ("maximise_efficiency",),
-    "problem": ("Problem", "Reference"),
-    "path_replay": ("replay",),
-    "solution": ("Solution",),
-    "store": ("load", "save"),
-    "verify": ("certify",),
+    "mechanics.body": ("Chain",),
+    "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
+    "mechanics.fixed_point": ("solve_balance",),
+    "mechanics.friction": ("Friction",),
+    "gaits.harmonic": ("Fourier", "Harmonic", "ellipse"),
+    "gaits.path_classes": ("FreePath", "Polygon"),
+    "gaits.paths": ("ArcPath", "Corners"),
+    "search.optimise": ("maximise_efficiency",),
+    "gaits.problem": ("Problem", "Reference"),
+    "verification.replay": ("replay",),
+    "results.solution": ("Solution",),
+    "results.store": ("load", "save"),
+    "results.certificate": ("certify",),
 }
 
 

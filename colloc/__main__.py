@@ -2,6 +2,6 @@
 
 import sys
 
-from colloc.command import main
+from colloc.commands.main import main
 
 sys.exit(main())

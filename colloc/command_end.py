@@ -17,8 +17,8 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from colloc.errors import ChangedFileWarning, CollocError
-from colloc.interruption import interruptible
+from colloc.system.errors import ChangedFileWarning, CollocError
+from colloc.system.interruption import interruptible
 
 OK, BAD_PROBLEM, NONE_FOUND, FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 _IN_WORDS = {"π": " pi ", "δ": "delta", "μ": "mu", "±": "+-", "→": "->", "·": "*", "…": "..."}

@@ -18,7 +18,7 @@ class Level:
     edges : (n_interval + 1,)
         The mesh, in phases of the gait found.
     x, lam_x : (n,)
-        Variables (see `colloc.layout`) and multipliers of their bounds.
+        Variables (see `colloc.collocation.layout`) and multipliers of their bounds.
     lam_g : (m,)
         Multipliers of the constraints.
     efficiency, distance, work : float

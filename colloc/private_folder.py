@@ -6,7 +6,7 @@ import os
 import stat
 from pathlib import Path
 
-from colloc.errors import StoreError
+from colloc.system.errors import StoreError
 
 
 def trespass(path: Path) -> str:

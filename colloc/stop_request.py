@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from colloc.interruption import interrupted
+from colloc.system.interruption import interrupted
 
 
 class StopRequest(ca.Callback):

@@ -7,13 +7,13 @@ states the shape in words; here it is
     Theta = a(t) odd(2 (s - c(t)) / epsilon),    odd(x) = -k x (1 - x^2)^3 on [-1, 1],  max odd = 1,
 
 with a linear in time between 0 and `amplitude` in stages 1 and 3, and c linear from 1/2 - epsilon/2 to 1/2 + epsilon/2
-in stage 2 (colloc.concertina). As epsilon -> 0: d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, efficiency -> 1.
+in stage 2 (colloc.smooth.concertina). As epsilon -> 0: d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, efficiency -> 1.
 
     python -m scripts.continue_epsilon
 """
 
-from colloc.concertina import Concertina
-from colloc.problem import Reference
+from colloc.gaits.problem import Reference
+from colloc.smooth.concertina import Concertina
 
 PROBLEM = Concertina("concertina", epsilon=0.1, amplitude=1.3, delta=2.5e-5)
 REFERENCE = Reference(1.0, 0.05, "the limit epsilon -> 0: the bound 1/min(mu) of the paper, eq. lambdaupper")

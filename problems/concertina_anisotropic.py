@@ -7,8 +7,8 @@ two lengths; so `share`, the bump's part of its region, is smaller than the pape
     python -m scripts.continue_epsilon problems/concertina_anisotropic.py
 """
 
-from colloc.concertina import Concertina
-from colloc.friction import Friction
+from colloc.mechanics.friction import Friction
+from colloc.smooth.concertina import Concertina
 
 PROBLEMS = (
     Concertina("forwards-1.7-1-1.3", amplitude=1.3, friction=Friction(1.7, 1.0, 1.3)),

@@ -4,7 +4,7 @@
     angle 2 =                        b2 sin(2 pi t)
     angle 3 = -a0 - a1 cos(2 pi t) + b1 sin(2 pi t)
 
-Maximise d/W. Links 1 and 4 are kept apart once a gait is found in which they cross (`colloc.far_contact`).
+Maximise d/W. Links 1 and 4 are kept apart once a gait is found in which they cross (`colloc.search.far_contact`).
 """
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem

@@ -2,7 +2,7 @@
 
 At a shape q a small gait spends times w_i in directions r_i of the joint rates, with sum w_i r_i = 0 (the path closes) and
 sum w_i omega_i = 0 (so does the rotation). Dry friction is homogeneous of degree 1 but not linear, so such a gait moves in
-first order of its size: d/W = sum w_i e.v_i / sum w_i P_i, a linear program (`colloc.infinitesimal`, docs/bound.md section 4).
+first order of its size: d/W = sum w_i e.v_i / sum w_i P_i, a linear program (`bounds.infinitesimal`, docs/bound.md section 4).
 
 `PROBLEM` starts collocation from the best of them: the triangle about (c, -c), whose efficiency tends to 2/5 as it shrinks,
 here of finite size and with three harmonics (0.349 at delta = 1e-3; 0.383 at 1e-4, which takes minutes, as the loop shrinks

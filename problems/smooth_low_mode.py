@@ -4,10 +4,10 @@ The paper's wave, Theta = sin(2 pi (s + t)), is the guess; it reaches 0.737.
 Solve it with python -m scripts.optimise_smooth problems/smooth_low_mode.py
 """
 
-from colloc.friction import Friction
-from colloc.gait import Harmonic
-from colloc.modal_body import ModalBody
-from colloc.modal_problem import ModalProblem
+from colloc.gaits.harmonic import Harmonic
+from colloc.mechanics.friction import Friction
+from colloc.smooth.modal_body import ModalBody
+from colloc.smooth.modal_problem import ModalProblem
 
 BODY = ModalBody(modes=6, basis="legendre")
 PROBLEM = ModalProblem(

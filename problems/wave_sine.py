@@ -4,9 +4,9 @@ The paper prints an efficiency of 0.76; with its printed parameters the computat
 for mu_t = 1000). python -m scripts.waves
 """
 
-from colloc.friction import Friction
-from colloc.motion import sine_wave
-from colloc.problem import Reference
+from colloc.gaits.problem import Reference
+from colloc.mechanics.friction import Friction
+from colloc.smooth.motion import sine_wave
 
 MOTION = sine_wave(amplitude=1.0, waves=1.0)
 FRICTION = Friction(100.0, 1.0, 1.0)

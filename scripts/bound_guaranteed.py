@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.body import Chain
-from colloc.bound import Budget, efficiency_bound
-from colloc.bound_margin import certify
-from colloc.friction import Friction
+from colloc.bounds.guaranteed import certify
+from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
 
 BUDGET = Budget(intervals=12, harmonics=(1,), shapes=24)
 

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.body import Chain
-from colloc.bound import Bound, Budget, efficiency_bound, known_bound
-from colloc.friction import Friction
-from colloc.infinitesimal import best_small_gait
-from colloc.json_cache import hash_of, load_entries, save_entry
+from colloc.bounds.infinitesimal import best_small_gait
+from colloc.bounds.sampled import Bound, Budget, efficiency_bound, known_bound
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.system.json_cache import hash_of, load_entries, save_entry
 from scripts.certified_gaits import best_efficiency
 
 COEFFICIENTS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.gait import Fourier
-from colloc.gait_fields import gait_from
+from colloc.gaits.gait_fields import gait_from
+from colloc.gaits.harmonic import Fourier
 
 _PHASES = np.arange(2000) / 2000
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.chain_study import chain_period
-from colloc.figures_smooth import chain_convergence
-from colloc.friction import Friction
-from colloc.motion import sine_wave
-from colloc.smooth_period import measured_period
+from colloc.mechanics.friction import Friction
+from colloc.smooth.motion import sine_wave
+from colloc.smooth.period import measured_period
+from scripts.figures_smooth import chain_convergence
+from scripts.models.chain_study import chain_period
 
 LINKS = (10, 20, 40, 80, 160, 320)
 FRICTIONS = (Friction(), Friction(10.0, 1.0, 1.0), Friction(100.0, 1.0, 1.0))

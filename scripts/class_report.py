@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Friction
-from colloc.bound import QUICK, known_bound
-from colloc.figures_classes import GaitPanel, save_body_strips, save_gait_panels
-from colloc.gait_fields import gait_from
-from colloc.infinitesimal import small_gait
+from colloc.bounds.infinitesimal import small_gait
+from colloc.bounds.sampled import QUICK, known_bound
+from colloc.gaits.gait_fields import gait_from
 from scripts.bound_table import BUDGET
 from scripts.class_rows import equal_links, known_small_gait
+from scripts.figures_classes import GaitPanel, save_body_strips, save_gait_panels
 
 CURATED = Path("results/curated")
 DELTA = 1e-4

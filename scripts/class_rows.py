@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc import Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
-from colloc.contact import crossing_depth
-from colloc.gait_fields import AnyClass, AnyGait
-from colloc.infinitesimal import SmallGait, small_gait
-from colloc.json_cache import hash_of, load_entries, save_entry
-from colloc.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.bounds.infinitesimal import SmallGait, small_gait
+from colloc.gaits.gait_fields import AnyClass, AnyGait
+from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.mechanics.contact import crossing_depth
+from colloc.system.json_cache import hash_of, load_entries, save_entry
 
 SIZE = 0.7
 """Length [rad] of polygons made of infinitesimal gaits."""

@@ -17,15 +17,15 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Friction, Problem
-from colloc.compiled_problem import compile_problem
-from colloc.errors import CollocError
-from colloc.gait_fields import AnyGait, fields, gait_from
-from colloc.machine_code import compiler
-from colloc.optimise import maximise_efficiency
-from colloc.path_samples import path_length
-from colloc.prolongation import RESTARTS, delta_in, laid_into, maximise_from, over_links
-from colloc.replaced_file import replaced_file
-from colloc.solution import Solution
+from colloc.gaits.gait_fields import AnyGait, fields, gait_from
+from colloc.gaits.path_samples import path_length
+from colloc.numerics.machine_code import compiler
+from colloc.results.solution import Solution
+from colloc.search.class_transfer import RESTARTS, delta_in, laid_into, maximise_from, over_links
+from colloc.search.compiled_problem import compile_problem
+from colloc.search.optimise import maximise_efficiency
+from colloc.system.errors import CollocError
+from colloc.system.replaced_file import replaced_file
 from scripts.class_report import DELTA, best, load, store, write
 from scripts.class_rows import FEWER, Row, equal_links, named_gait, rows
 

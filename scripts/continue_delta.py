@@ -4,8 +4,8 @@ python -m scripts.continue_delta
 """
 
 from colloc import Harmonic, Problem, ellipse
-from colloc.continuation import continue_delta
-from colloc.delta_limit import efficiency_at_zero_delta, resolution_warning
+from colloc.results.delta_limit import efficiency_at_zero_delta, resolution_warning
+from colloc.search.continuation import continue_delta
 
 if __name__ == "__main__":
     problem = Problem("three_link", gait=Harmonic(1, "bilateral"), guess=ellipse(0.1, 2.6, 1.2), delta=1e-5, delta_start=1e-2)

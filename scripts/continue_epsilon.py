@@ -3,7 +3,7 @@
 import runpy
 import sys
 
-from colloc.epsilon_study import delta_for, epsilon_point, fitted_orders, table
+from scripts.models.epsilon_study import delta_for, epsilon_point, fitted_orders, table
 
 if __name__ == "__main__":
     study = runpy.run_path(sys.argv[1] if len(sys.argv) > 1 else "problems/concertina.py")

@@ -96,7 +96,7 @@ def gallery_page() -> str:
     table = json.loads((ROOT / "results/curated/gallery.json").read_text())
     parts = [
         "# Gallery",
-        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest tests/test_gallery.py` solves them again "
+        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest tests/commands/test_gallery.py` solves them again "
         "and holds them against these numbers.",
     ]
     for path in sorted((ROOT / "problems").glob("[!_]*.py")):
@@ -128,7 +128,7 @@ def commands_page() -> str:
     """What every subcommand says about itself."""
     sys.path.insert(0, str(ROOT))
     os.environ["COLUMNS"] = "100"
-    from colloc.command import SUBCOMMANDS, help_text
+    from colloc.commands.main import SUBCOMMANDS, help_text
 
     parts = ["# Commands", f"```text\n{help_text()}\n```"]
     for name, (module, summary) in SUBCOMMANDS.items():

@@ -1,6 +1,6 @@
 """Figure and table of the friction plane: python -m scripts.friction_plane [--results FOLDER] [--bounds N] [--output FOLDER]
 
-Reads what ``python -m colloc.sweep_study studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
+Reads what ``python -m colloc.commands.sweep studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
 over the classes searched, and writes friction_plane.png, .pdf and .md. With ``--bounds N`` an upper bound for every gait of
 the body is computed first on a subset of N x N points (sampled, with a small spline basis: see docs/bound.md), kept in
 FOLDER/bounds.json; nothing is interpolated between them.
@@ -14,17 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.body import Chain
-from colloc.bound import Bound, Budget, efficiency_bound, known_bound
-from colloc.errors import StoreError
-from colloc.figures_studies import friction_plane_figure
-from colloc.figures_style import save
-from colloc.friction import Friction
-from colloc.store_study import StudyFile, load_study
-from colloc.study_table import best_over
+from colloc.bounds.sampled import Bound, Budget, efficiency_bound, known_bound
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.pictures.style import save
+from colloc.studies.store import StudyFile, load_study
+from colloc.studies.table import best_over
+from colloc.system.errors import StoreError
+from scripts.figures_studies import friction_plane_figure
 
 SMALL_BASIS = Budget(intervals=6, shapes=12, directions=24, rounds=12, starts=60, tolerance=5e-3)
-COMMAND = "python -m colloc.sweep_study studies/friction_plane.py && python -m scripts.friction_plane"
+COMMAND = "python -m colloc.commands.sweep studies/friction_plane.py && python -m scripts.friction_plane"
 
 
 def bounds(mu_t: np.ndarray, mu_b: np.ndarray, count: int, cache: Path) -> np.ndarray:
@@ -89,7 +89,7 @@ def main() -> None:
     try:
         study = load_study(options.results / "friction_plane.nc")
     except StoreError as error:
-        parser.error(f"{error} python -m colloc.sweep_study studies/friction_plane.py makes it.")
+        parser.error(f"{error} python -m colloc.commands.sweep studies/friction_plane.py makes it.")
     mu_t, mu_b = study.coordinates["mu_t"], study.coordinates["mu_b"]
     efficiency, rest = winners(study)
     bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.json")

@@ -1,7 +1,7 @@
 """Solve every problem file for the gallery of the documentation: python -m scripts.gallery [NAME ...]
 
 Writes results/curated/gallery.json (numbers) and results/curated/gallery/NAME.png (a picture each). The test
-tests/test_gallery.py solves the same files and holds them against these numbers and their own REFERENCE.
+tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own REFERENCE.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from colloc.concertina import Concertina
-from colloc.figures import STYLE, draw_filmstrip, draw_shape_path
-from colloc.friction import Friction
-from colloc.modal_optimum import ModalOptimum, optimise_modal
-from colloc.modal_problem import ModalProblem
-from colloc.motion import Motion
-from colloc.optimise import maximise_efficiency
-from colloc.problem import Problem, Reference
-from colloc.smooth_period import measured_period
-from colloc.smooth_record import snapshots
-from colloc.solution import Solution, versions
+from colloc.gaits.problem import Problem, Reference
+from colloc.mechanics.friction import Friction
+from colloc.pictures.figure import STYLE, draw_filmstrip, draw_shape_path
+from colloc.results.solution import Solution, versions
+from colloc.search.modal_optimum import ModalOptimum, optimise_modal
+from colloc.search.optimise import maximise_efficiency
+from colloc.smooth.concertina import Concertina
+from colloc.smooth.modal_problem import ModalProblem
+from colloc.smooth.motion import Motion
+from colloc.smooth.period import measured_period
+from scripts.models.smooth_record import snapshots
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"

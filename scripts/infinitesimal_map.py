@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.body import Chain
-from colloc.coulomb_motion import admissible, fundamental
-from colloc.figures_bound import save_small_gait_map
-from colloc.friction import Friction
-from colloc.infinitesimal import small_gait
+from colloc.bounds.coulomb_motion import admissible, fundamental
+from colloc.bounds.infinitesimal import small_gait
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from scripts.figures_bound import save_small_gait_map
 
 
 def main() -> None:

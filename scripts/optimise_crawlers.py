@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.bump_body import BumpBody
-from colloc.bump_optimum import best_start, optimise_bump, prescribed_vertices
-from colloc.concertina import Concertina
-from colloc.epsilon_study import delta_for
-from colloc.figures_smooth import crawler_comparison
-from colloc.friction import Friction
+from colloc.mechanics.friction import Friction
+from colloc.search.bump_optimum import best_start, optimise_bump, prescribed_vertices
+from colloc.smooth.bump_body import BumpBody
+from colloc.smooth.concertina import Concertina
+from scripts.figures_smooth import crawler_comparison
+from scripts.models.epsilon_study import delta_for
 
 EPSILONS, PIECES, ANGLE, SOFTER = (0.1, 0.05, 0.02, 0.01), 12, 1.5, 32
 

@@ -12,17 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.array_store import write_arrays
-from colloc.body import Chain
-from colloc.continuation import continue_delta
-from colloc.errors import CollocError
-from colloc.friction import Friction
-from colloc.gait import Fourier, Harmonic
-from colloc.modal_body import ModalBody
-from colloc.modal_optimum import ModalOptimum, optimise_modal
-from colloc.modal_problem import ModalProblem
-from colloc.problem import Problem
-from colloc.smooth_period import measured_period
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.problem import Problem
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.search.continuation import continue_delta
+from colloc.search.modal_optimum import ModalOptimum, optimise_modal
+from colloc.smooth.modal_body import ModalBody
+from colloc.smooth.modal_problem import ModalProblem
+from colloc.smooth.period import measured_period
+from colloc.system.errors import CollocError
+from scripts.paper.array_store import write_arrays
 
 FRICTIONS = [Friction(100.0, 1.0, 1.0), Friction(10.0, 1.0, 1.0), Friction(), Friction(1.0, 1.0, 3.0), Friction(1.0, 3.0, 3.0)]
 CLASSES = [(4, 1), (6, 1), (6, 3)]

@@ -4,9 +4,9 @@ import argparse
 
 import numpy as np
 
-from colloc.friction import Friction
-from colloc.smooth_period import measured_period
-from colloc.wave_optimum import odd_wave, optimise_wave
+from colloc.mechanics.friction import Friction
+from colloc.smooth.period import measured_period
+from scripts.models.wave_optimum import odd_wave, optimise_wave
 
 
 def main() -> None:

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from colloc.report import main as report
-from colloc.solve import main as solve
+from colloc.commands.report import main as report
+from colloc.commands.solve import main as solve
 
 ROOT = Path(__file__).resolve().parents[1]
 TARGET = ROOT / "results/curated/report.png"

@@ -12,10 +12,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from colloc.errors import CollocError
-from colloc.parallel import available_processes
-from colloc.study import Part, Study
+from colloc.system.errors import CollocError
 from scripts import paper_crawlers, paper_map, paper_pacing, paper_static, paper_three_link, paper_waves
+from scripts.paper.parallel import available_processes
+from scripts.paper.study import Part, Study
 
 DELTA = 1e-4
 
@@ -174,7 +174,7 @@ def main(arguments: list[str] | None = None) -> int:
         table.write_text(paper_table.table(work), encoding="utf-8")
         print(f"wrote {table}")
         if not options.no_figures:
-            from colloc import figures_paper
+            from scripts.paper import figures as figures_paper
 
             for path in figures_paper.draw_all(work, options.output / name):
                 print(f"wrote {path}")

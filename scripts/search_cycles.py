@@ -2,7 +2,7 @@
 
 python -m scripts.search_cycles [--mu 1 1 1] [--limit 3.14159265] [--cases 24,2 24,4 24,7] [--harmonics 3] [--out results]
 
-A case is INTERVALS,TURNING of `colloc.cycle_search.best_cycle`. Writes `cycles.md` and the polygons as JSON.
+A case is INTERVALS,TURNING of `colloc.bounds.cycle_search.best_cycle`. Writes `cycles.md` and the polygons as JSON.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, CollocError, Friction, Harmonic, Problem, maximise_efficiency
-from colloc.cycle_search import Cycle, best_cycle, polygon_gait, polygon_path
-from colloc.path_replay import replay
+from colloc.bounds.cycle_search import Cycle, best_cycle, polygon_gait, polygon_path
+from colloc.verification.replay import replay
 
 HEAD = """# Cycles of largest ratio on a lattice of shapes, {friction}, |angles| <= {limit:.4g}
 

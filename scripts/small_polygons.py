@@ -2,7 +2,7 @@
 
 Triangles in shape space, at the fold without symmetry and bilateral near (2.2, -2.2), for falling lower bounds on the length of
 the path (`smallest_shape_speed` times 2 pi; delta at unit shape speed falls along, so that friction stays as dry). Beside the
-best infinitesimal gaits at the same places (`colloc.infinitesimal`). Writes results/curated/small_polygons.md.
+best infinitesimal gaits at the same places (`colloc.bounds.infinitesimal`). Writes results/curated/small_polygons.md.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Corners, Friction, Polygon, Problem
-from colloc.infinitesimal import small_gait
-from colloc.optimise import maximise_efficiency
-from colloc.path_samples import path_length
-from colloc.solution import SOLVED
+from colloc.bounds.infinitesimal import small_gait
+from colloc.gaits.path_samples import path_length
+from colloc.results.solution import SOLVED
+from colloc.search.optimise import maximise_efficiency
 
 SPEEDS = (0.1, 0.04, 0.02)
 DELTA_PER_SPEED = 1e-3

@@ -6,7 +6,7 @@ Starts travel from wide limits to narrow ones: a gait that fits is kept, one tha
 import numpy as np
 
 from colloc import Harmonic, Problem, ellipse
-from colloc.problem_study import Axis, Study
+from colloc.studies.study import Axis, Study
 
 
 def problem(symmetry, joint_limit):

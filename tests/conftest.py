@@ -20,8 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @cache
 def solved_problem(name):
-    from colloc.optimise import maximise_efficiency
-    from colloc.problem_file import read_problem_file
+    from colloc.gaits.problem_file import read_problem_file
+    from colloc.search.optimise import maximise_efficiency
 
     stated = read_problem_file(ROOT / "problems" / f"{name}.py")
     solution = maximise_efficiency(stated.problem)
@@ -47,10 +47,10 @@ def unsolved():
 
 
 def guess_in_balance(problem):
-    from colloc.path_replay import replay
-    from colloc.solution import Level, Solution
-    from colloc.transcription import transcribe
-    from colloc.warm_start import feasible_point
+    from colloc.collocation.transcription import transcribe
+    from colloc.collocation.warm_start import feasible_point
+    from colloc.results.solution import Level, Solution
+    from colloc.verification.replay import replay
 
     transcription = transcribe(problem)
     x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)

@@ -5,19 +5,19 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.array_store import read_arrays, write_arrays
-from colloc.basins import Outcome
-from colloc.gait import Fourier, Harmonic, ellipse
-from colloc.json_cache import load_entries, save_entry
-from colloc.problem import Problem
-from colloc.problem_study import Axis, Study
-from colloc.store import load, save
-from colloc.store_archive import Archive, load_archive, save_archive
-from colloc.store_study import load_study, save_study
-from colloc.study_cell import Attempt
-from colloc.study_journal import Journal, Record, read_journal
-from colloc.study_run import StudyRun
-from colloc.study_table import study_table
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.problem import Problem
+from colloc.results.archive import Archive, load_archive, save_archive
+from colloc.results.distinct_optima import Outcome
+from colloc.results.store import load, save
+from colloc.studies.cell import Attempt
+from colloc.studies.journal import Journal, Record, read_journal
+from colloc.studies.run import StudyRun
+from colloc.studies.store import load_study, save_study
+from colloc.studies.study import Axis, Study
+from colloc.studies.table import study_table
+from colloc.system.json_cache import load_entries, save_entry
+from scripts.paper.array_store import read_arrays, write_arrays
 
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
 HDF5_KINDS = ("solution", "archive", "arrays", "study")

@@ -15,9 +15,9 @@ from benchmarks.smooth_panels import MOTION, loads
 from benchmarks.tables import interleaved_seconds, markdown_table
 from benchmarks.time_schemes import GAIT, adaptive_efficiency
 from colloc import Chain, Friction, ellipse, replay, solve_balance
-from colloc.balance import instant, net_force, total_power
-from colloc.ellipses import admissible
-from colloc.smooth_balance import solve_smooth
+from colloc.mechanics.balance import instant, net_force, total_power
+from colloc.smooth.balance import solve_smooth
+from scripts.models.ellipses import admissible
 
 
 @pytest.mark.parametrize("delta", [1e-1, 1e-4])

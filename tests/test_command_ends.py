@@ -10,14 +10,14 @@ import sys
 import h5py
 import pytest
 
-from colloc.bound import QUICK as BUDGET
-from colloc.bound import Domain, bound_key
-from colloc.command import main as colloc
+from colloc.bounds.optimality_gap import upper_bound
+from colloc.bounds.sampled import QUICK as BUDGET
+from colloc.bounds.sampled import Domain, bound_key
 from colloc.command_end import exit_code
-from colloc.gap import upper_bound
-from colloc.problem_file import read_problem_file
-from colloc.solve import summary_lines
-from colloc.store import load, save
+from colloc.commands.main import main as colloc
+from colloc.commands.solve import summary_lines
+from colloc.gaits.problem_file import read_problem_file
+from colloc.results.store import load, save
 
 QUICK = """
 from colloc import *
@@ -260,5 +260,5 @@ def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
 
 
 def test_a_command_imports_nothing_heavy_before_it_can_end_well():
-    code = "import sys, colloc.command; print(any(name in sys.modules for name in ('numpy', 'scipy', 'casadi', 'h5py')))"
+    code = "import sys, colloc.commands.main; print(any(name in sys.modules for name in ('numpy', 'scipy', 'casadi', 'h5py')))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

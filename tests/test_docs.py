@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc.command import SUBCOMMANDS
-from colloc.gait import ellipse
+from colloc.commands.main import SUBCOMMANDS
+from colloc.gaits.harmonic import ellipse
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
@@ -52,7 +52,7 @@ def test_python_in_the_pages_parses_and_imports_what_exists(page):
 
 
 def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys):
-    from colloc.solve import main
+    from colloc.commands.solve import main
 
     text = next(block for block in blocks(ROOT / "docs/tutorial.md", "python") if "PROBLEM" in block)
     (tmp_path / "mine.py").write_text(text, encoding="utf-8")

@@ -16,10 +16,10 @@ import numpy as np
 from benchmarks.peers.settings import INTERVALS
 from benchmarks.peers.starts import starts
 from colloc import Harmonic, Problem, ellipse, maximise_efficiency
-from colloc.compiled_problem import compile_problem
-from colloc.continuation import continue_delta
-from colloc.machine_code import FOLDER, OFF
-from colloc.solution import SOLVED
+from colloc.numerics.machine_code import FOLDER, OFF
+from colloc.results.solution import SOLVED
+from colloc.search.compiled_problem import compile_problem
+from colloc.search.continuation import continue_delta
 
 
 def solve(start: np.ndarray, refined: bool) -> dict:

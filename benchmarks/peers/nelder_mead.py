@@ -15,8 +15,8 @@ from scipy.optimize import minimize
 
 from benchmarks.peers.starts import starts
 from colloc import Chain, Friction, ellipse, solve_balance
-from colloc.balance import instant, total_power
-from colloc.ellipses import admissible
+from colloc.mechanics.balance import instant, total_power
+from scripts.models.ellipses import admissible
 
 INSTANTS = 400
 

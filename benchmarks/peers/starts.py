@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from colloc import Chain, Friction, ellipse, solve_balance
-from colloc.balance import instant, total_power
-from colloc.ellipses import admissible
+from colloc.mechanics.balance import instant, total_power
+from scripts.models.ellipses import admissible
 
 
 def starts(count: int, seed: int = 0) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from colloc.static_friction import SYMMETRIC_CASES, WORKED_CASES
+from scripts.models.static_friction import SYMMETRIC_CASES, WORKED_CASES
 
 PI = np.pi
 HARD = {

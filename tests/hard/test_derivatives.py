@@ -1,7 +1,7 @@
 """Jacobian and Hessian of every block of the nonlinear program against differences, at random and at hard points.
 
 Differences are central, of fourth order, with steps in proportion to delta, over which the law changes. The bump
-crawler's point function is held to differences in tests/test_smooth_bump.py.
+crawler's point function is held to differences in tests/smooth/test_smooth_bump.py.
 """
 
 import casadi as ca
@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from cases import HARD
 
-from colloc.balance import instant
-from colloc.body import Chain
-from colloc.bump_body import BumpBody
-from colloc.bump_transcription import transcribe_bump
-from colloc.fixed_point import solve_balance
-from colloc.friction import Friction
-from colloc.gait import Fourier, Harmonic
-from colloc.kernels import point_function
-from colloc.problem import Problem
-from colloc.transcription import transcribe
+from colloc.collocation.bump_transcription import transcribe_bump
+from colloc.collocation.point_equations import point_function
+from colloc.collocation.transcription import transcribe
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.problem import Problem
+from colloc.mechanics.balance import instant
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.smooth.bump_body import BumpBody
 
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
 THREE, FOUR = Chain(), Chain((0.2, 0.35, 0.3, 0.15))
@@ -134,7 +134,7 @@ def test_every_other_block(name, block):
 @pytest.mark.parametrize("angles", [(np.pi, np.pi / 2), (2 * np.pi / 3, 2 * np.pi / 3), (np.pi, 0.0), (0.0, 0.0)], ids=str)
 def test_contact_at_its_corners(angles):
     """The smoothed minimum bends within 1e-3 rad of the corner; its derivatives hold there too."""
-    from colloc.contact import crossing_bounds
+    from colloc.mechanics.contact import crossing_bounds
 
     q = ca.SX.sym("q", 2)
     bounds = crossing_bounds(THREE, q)
@@ -146,7 +146,7 @@ def test_contact_at_its_corners(angles):
 @pytest.mark.parametrize("vs", [0.0, 0.3])
 def test_second_derivative_where_a_link_does_not_turn(vs):
     """I0 in the rotation rate at w = 0: -l^3 (a^2 - 2 vn^2) / (12 r^5), by expanding the integrand; an even function."""
-    from colloc.friction import link_moments
+    from colloc.mechanics.friction import link_moments
 
     w = ca.SX.sym("w")
     length, vn, delta = 0.4, 0.05, 0.1

@@ -13,11 +13,11 @@ import pytest
 from cases import COEFFICIENTS, DELTAS, HARD
 
 from benchmarks.reference import balanced_velocity
-from colloc.balance import instant, net_force, total_power
-from colloc.body import Chain
-from colloc.fixed_point import solve_balance
-from colloc.friction import Friction
-from colloc.static_friction import SYMMETRIC_CASES, WORKED_CASES
+from colloc.mechanics.balance import instant, net_force, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from scripts.models.static_friction import SYMMETRIC_CASES, WORKED_CASES
 
 BODY = Chain()
 NAMES = list(HARD)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, maximise_efficiency, replay
-from colloc.contact import crossing_depth
-from colloc.solution import CERTIFICATE_FAILED, SOLVED
+from colloc.mechanics.contact import crossing_depth
+from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, replay, solve_balance
-from colloc.gait import Fourier
-from colloc.motion import sine_wave
-from colloc.smooth_balance import solve_smooth
-from colloc.velocity_map import velocity_map
+from colloc.gaits.harmonic import Fourier
+from colloc.smooth.balance import solve_smooth
+from colloc.smooth.motion import sine_wave
+from scripts.models.velocity_map import velocity_map
 
 BAD = [float("nan"), float("inf"), -float("inf")]
 BODY, LAW, GAIT = Chain(), Friction(), ellipse(0.3, 1.0, 0.5)

@@ -4,12 +4,12 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from colloc.balance import balance_jacobian, instant, total_power
-from colloc.body import Chain
-from colloc.fixed_point import solve_balance
-from colloc.friction import Friction
-from colloc.gait import Fourier
-from colloc.path_replay import replay
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.balance import balance_jacobian, instant, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.verification.replay import replay
 
 tried = settings(derandomize=True, max_examples=60, deadline=None, database=None)
 PI = np.pi
@@ -130,7 +130,7 @@ def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed(case, 
 @given(instants(), log_delta)
 def test_isotropic_balance_minimises_the_dissipation(case, exponent):
     """Doing better than any other rigid velocity is what the balance means there; the other is drawn close and far."""
-    from colloc.friction import link_dissipation
+    from colloc.mechanics.friction import link_dissipation
 
     body, angles, rates = case
     delta = 10.0**exponent

@@ -1,0 +1,120 @@
+"""How a balanced body moves and what it pays, sampled: the velocity map at vanishing delta.
+
+Everything that a bound on efficiency needs to know of friction is here: for a shape and joint rates, the velocity of the
+*middle link* ``n_link // 2`` (its midpoint, in its own axes) and the power. The middle link is used, not the tail, because
+the symmetries of the body are then plain: turning the body end for end negates that velocity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.mechanics.balance import instant, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import crossing_bounds
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+
+DELTA = 1e-9
+"""Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
+
+
+_MAX_ITERATIONS = 300
+"""Steps of an attempt: the few motions that need more are left out, as the samples are many."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Balanced motions, one a column.
+
+    Attributes
+    ----------
+    angles, rates : (n_joint, n)
+        Shapes and unit directions of joint rates.
+    velocity : (2, n)
+        Velocity of the midpoint of the middle link, in its own axes.
+    spin : (n,)
+        Its rotation rate.
+    power : (n,)
+        Rate of work against friction.
+    """
+
+    angles: np.ndarray
+    rates: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    power: np.ndarray
+
+    @property
+    def size(self) -> int:
+        return self.spin.size
+
+    def take(self, chosen: np.ndarray) -> Motion:
+        """The motions of the chosen columns."""
+        return Motion(
+            self.angles[:, chosen], self.rates[:, chosen], self.velocity[:, chosen], self.spin[chosen], self.power[chosen]
+        )
+
+    def joined(self, other: Motion) -> Motion:
+        """These motions followed by others."""
+        return Motion(*(np.concatenate([getattr(self, k), getattr(other, k)], axis=-1) for k in _FIELDS))
+
+    def reversed(self) -> Motion:
+        """The motions for the opposite rates; these are balanced only if mu_b = mu_f."""
+        return Motion(self.angles, -self.rates, -self.velocity, -self.spin, self.power)
+
+
+_FIELDS = ("angles", "rates", "velocity", "spin", "power")
+
+
+def solved_motion(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
+) -> tuple[Motion, np.ndarray]:
+    """Solve the balance for shapes and joint rates ``(n_joint, n)``: the motions that converged, and their mask ``(n,)``."""
+    solution = solve_balance(body, friction, angles, rates, delta, max_iterations=_MAX_ITERATIONS)
+    kept = solution.converged
+    angles, rates, z = angles[:, kept], rates[:, kept], solution.z[:, kept]
+    now = instant(body, friction, angles, rates, z, delta)
+    middle = body.n_link // 2
+    velocity = np.stack([now.velocity.vs[middle], now.velocity.vn[middle]])
+    return Motion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0]), kept
+
+
+def balanced_motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA) -> Motion:
+    """Solve the balance for shapes and joint rates ``(n_joint, n)``; motions that do not converge are left out."""
+    return solved_motion(body, friction, angles, rates, delta)[0]
+
+
+def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:
+    """Shapes where links i and i + 2 do not cross (to within an angle `margin`), a mask ``(n,)``."""
+    bounds = crossing_bounds(body, angles)
+    if bounds is None:
+        return np.ones(angles.shape[1], dtype=bool)
+    return (bounds <= np.pi + margin).all(axis=0)
+
+
+def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:
+    """One of the shapes that mirror and end swap make equivalent, a mask ``(n,)`` that keeps at least one of each."""
+    kept = angles.sum(axis=0) >= -1e-12
+    if swaps_ends(body):
+        kept &= angles[0] >= angles[-1] - 1e-12
+    return kept
+
+
+def swaps_ends(body: Chain) -> bool:
+    """Whether turning the body end for end maps its middle link onto itself."""
+    return body.symmetric and body.n_link % 2 == 1
+
+
+def unit_directions(n_joint: int, count: int, half: bool) -> np.ndarray:
+    """About `count` directions of joint rates spread evenly over the sphere, or over half of it, ``(n_joint, count)``."""
+    if n_joint == 1:
+        return np.array([[1.0]]) if half else np.array([[1.0, -1.0]])
+    if n_joint == 2:
+        turn = np.arange(count) * ((np.pi if half else 2 * np.pi) / count)
+        return np.stack([np.cos(turn), np.sin(turn)])
+    points = np.random.default_rng(n_joint).standard_normal((n_joint, count))
+    points /= np.linalg.norm(points, axis=0)
+    return np.where(points[-1] < 0, -points, points) if half else points

@@ -1,0 +1,161 @@
+"""Exchange of samples for the upper bound: a small program on few samples, checked on many, and climbed between them.
+
+Narrow ridges, where a link changes between stick and slip, escape any lattice; so the optimum of the samples held so far is
+climbed from a fresh lattice every round, the summits join the samples, and the round is repeated until none rises above.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from colloc.bounds.coulomb_motion import Motion
+from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.sampling import Domain
+from colloc.numerics.minimax_program import Minimax, smallest_maximum
+
+_SMOOTHING = 1e-5
+"""Weight of the roughness, which is about 0.2: it costs 1e-6 of the bound."""
+_EARLY_SMOOTHING = 1e-4
+_EARLY_ROUNDS = 4
+_LARGEST_CUT = 1500
+_INNER_ROUNDS = 15
+_HELD = 2e-4
+_SIDES = (0.0, 0.08, -0.08)
+"""A motion enters with the heading of its largest gain and these [rad] to the sides of it, as the best heading will move."""
+_WINDOW = 0.03
+_HOPELESS = 0.005
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+
+class Optimum(NamedTuple):
+    """The best potential found.
+
+    free: its coefficients. floor: value of the program, which no potential of the space undercuts by more than the smoothing
+    on the samples held. top, summit: the largest ratio met anywhere, and its motion. samples: motions evaluated. rounds: used.
+    converged: whether the last climbs stayed within the tolerance.
+    """
+
+    free: np.ndarray
+    floor: float
+    top: float
+    summit: Motion
+    samples: int
+    rounds: int
+    converged: bool
+
+
+class _Program:
+    """The inequalities in use, and their optimum."""
+
+    def __init__(self, space: PotentialSpace, samples: Samples, rng: np.random.Generator) -> None:
+        self.roughness, self.smoothing = space.roughness, _EARLY_SMOOTHING
+        self.samples = samples
+        self.rng = rng
+        chosen = np.sort(rng.permutation(samples.motion.size)[: 3 * space.size])
+        pieces = [samples.rows(chosen, np.full(chosen.size, h)) for h in np.arange(12) * (np.pi / 6)]
+        self.rows = sparse.vstack([p[0] for p in pieces], format="csr")
+        self.constants = np.concatenate([p[1] for p in pieces])
+        self.best = self._solved()
+
+    def _solved(self) -> Minimax:
+        return smallest_maximum(self.rows, self.constants, self.smoothing * self.roughness)
+
+    def _exchange(self, ratio: np.ndarray, heading: np.ndarray) -> None:
+        """Keep inequalities that matter, add those that are violated."""
+        level = self.best.value
+        broken = np.flatnonzero(ratio > level + 0.5 * _HELD)
+        broken = broken[np.argsort(-ratio[broken])[: 4 * _LARGEST_CUT]]
+        broken = self.rng.permutation(broken)[:_LARGEST_CUT]
+        near = self.rows @ self.best.x + self.constants > level - 0.01
+        kept = near | (self.best.weights > 1e-6 * self.best.weights.max())
+        pieces = [(self.rows[kept], self.constants[kept])]
+        pieces += [self.samples.rows(broken, heading[broken] + side) for side in _SIDES]
+        self.rows = sparse.vstack([p[0] for p in pieces], format="csr")
+        self.constants = np.concatenate([p[1] for p in pieces])
+        self.best = self._solved()
+
+    def settle(self, excess: float) -> float:
+        """Exchange until no sample exceeds the program's value by more than `excess`; the largest ratio over the samples."""
+        for _ in range(_INNER_ROUNDS):
+            ratio, heading = self.samples.ratio(self.best.x)
+            if ratio.max() <= self.best.value + excess:
+                break
+            self._exchange(ratio, heading)
+        return float(self.samples.ratio(self.best.x)[0].max())
+
+    def add(self, motion: Motion) -> None:
+        if motion.size:
+            self.samples = self.samples.joined(motion)
+
+
+def _starts(motion: Motion, ratio: np.ndarray, level: float, spacing: float, count: int) -> np.ndarray:
+    """Indices of up to `count` of the largest that come near `level`, one for each cell of shapes and directions."""
+    near = np.flatnonzero(ratio > level - _WINDOW)
+    near = near[np.argsort(-ratio[near])]
+    cell = np.concatenate([np.rint(motion.angles[:, near] / spacing), np.rint(motion.rates[:, near] * 4.0)]).T
+    _, first = np.unique(cell, axis=0, return_index=True)
+    return near[np.sort(first)][:count]
+
+
+def exchanged_optimum(
+    domain: Domain,
+    space: PotentialSpace,
+    *,
+    shapes: int,
+    directions: int,
+    rounds: int,
+    starts: int,
+    tolerance: float,
+    seed: int = 0,
+) -> Optimum:
+    """The potential of `space` whose largest ratio over `domain` is smallest.
+
+    Parameters
+    ----------
+    domain : Domain
+    space : PotentialSpace
+    shapes, directions : int
+        The first lattice.
+    rounds : int
+        At most so many rounds of climbs.
+    starts : int
+        Climbs a round; the final check makes three times as many.
+    tolerance : float
+        Excess of the summits over the program's value at which it counts as converged.
+    seed : int
+    """
+    rng = np.random.default_rng(seed)
+    program = _Program(space, Samples(space, domain.lattice(shapes, directions)), rng)
+    spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
+    seen, quiet, surprise = program.samples.motion.size, 0, 0.1
+    for count in range(1, rounds + 1):
+        if count == _EARLY_ROUNDS:
+            program.smoothing = _SMOOTHING
+        # a potential that the next climbs will refute need not be exact
+        held = program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
+        free = program.best.x
+
+        def ratio(motion: Motion, free: np.ndarray = free) -> np.ndarray:
+            return Samples(space, motion).ratio(free)[0]
+
+        last = quiet > 0 or count == rounds
+        fresh = domain.lattice(shapes * (1 + last), directions * (1 + last), max((count * _GOLDEN) % 1.0, 0.01))
+        pooled = fresh.joined(program.samples.motion)
+        values = np.concatenate([ratio(fresh), program.samples.ratio(free)[0]])
+        chosen = _starts(pooled, values, program.best.value, spacing, starts * (1 + 2 * last))
+        summit = domain.summits(ratio, pooled.take(chosen), 0.5 * spacing, 0.5 * turn, 14, rng, program.best.value - _HOPELESS)
+        reached = ratio(summit)
+        seen += fresh.size + chosen.size
+        top = max(float(reached.max()), float(values.max()))
+        # two rounds in a row, the second on a finer lattice, must find nothing
+        surprise = top - program.best.value
+        quiet = quiet + 1 if top <= program.best.value + tolerance else 0
+        if quiet == 2 or count == rounds:
+            break
+        program.add(summit.take(np.flatnonzero(reached > program.best.value + 0.25 * tolerance)))
+    best = int(np.argmax(reached))
+    assert held <= top
+    return Optimum(free, program.best.value, top, summit.take(np.array([best])), seen, count, quiet == 2)

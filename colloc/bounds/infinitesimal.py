@@ -1,0 +1,166 @@
+"""The best infinitesimal gait at a shape: a linear program over rate directions.
+
+Dry friction lets a small closed path in shape space move the body in first order: motions are homogeneous of degree 1 in the
+rates but not linear. A small gait spends times w_i in rate directions r_i, with ``sum w_i r_i = 0`` (the path closes) and
+``sum w_i omega_i = 0`` (so does the rotation); per unit of work ``sum w_i P_i = 1`` it moves ``sum w_i e.v_i`` along e.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+
+from colloc.bounds.coulomb_motion import Motion, admissible, balanced_motion, fundamental, unit_directions
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.system.errors import NotConvergedError
+
+
+class SmallGait(NamedTuple):
+    """The best small gait at a shape.
+
+    efficiency: d/W as its size tends to zero. heading: direction of travel in the axes of the middle link [rad].
+    rates ``(n_joint, m)``, weights ``(m,)``: the directions used, and the time spent in each, for unit work.
+    """
+
+    efficiency: float
+    heading: float
+    rates: np.ndarray
+    weights: np.ndarray
+
+    def path(self, shape: np.ndarray, size: float) -> np.ndarray:
+        """Corners ``(n_joint, m)`` of the closed polygon about `shape` that runs through the directions by angle."""
+        order = np.argsort(np.arctan2(self.rates[-1], self.rates[0]))
+        sides = (self.rates * self.weights)[:, order]
+        corners = np.cumsum(sides, axis=1)
+        corners = corners - corners.mean(axis=1, keepdims=True)
+        return shape[:, None] + size * corners / np.linalg.norm(sides, axis=0).sum()
+
+
+_DELTA = 1e-6
+_CLIMBED = 12
+_STEPS = 14
+_ROUNDS = 12
+_GAIN = 1e-7
+
+
+class _Program:
+    """The linear program over the motions at one shape."""
+
+    def __init__(self, body: Chain, friction: Friction, shape: np.ndarray, delta: float) -> None:
+        self.body, self.friction, self.shape, self.delta = body, friction, np.asarray(shape, dtype=float), delta
+
+    def motion(self, rates: np.ndarray) -> Motion:
+        angles = np.repeat(self.shape[:, None], rates.shape[1], axis=1)
+        return balanced_motion(self.body, self.friction, angles, rates, self.delta)
+
+    def solve(self, motion: Motion, heading: float) -> tuple[float, np.ndarray, np.ndarray]:
+        """Efficiency along `heading`, weights of the motions, and multipliers of closure, rotation and work."""
+        along = np.cos(heading) * motion.velocity[0] + np.sin(heading) * motion.velocity[1]
+        closed = np.vstack([motion.rates, motion.spin, motion.power])
+        right = np.zeros(len(closed))
+        right[-1] = 1.0
+        program = linprog(-along, A_eq=closed, b_eq=right, bounds=(0, None), method="highs-ds")
+        if program.status != 0:
+            raise NotConvergedError(f"the linear program of the small gait failed: {program.message}")
+        return -program.fun, program.x, -program.eqlin.marginals
+
+    def turned(self, motion: Motion, weights: np.ndarray) -> tuple[float, np.ndarray]:
+        """Direction of travel and displacement of a mixture."""
+        way = motion.velocity @ weights
+        return float(np.arctan2(way[1], way[0])), way
+
+    def climbed(self, motion: Motion, heading: float, multipliers: np.ndarray, turn: float) -> np.ndarray:
+        """Rate directions whose reduced gain is locally largest: what the program would most like to add."""
+
+        def reduced(some: Motion) -> np.ndarray:
+            along = np.cos(heading) * some.velocity[0] + np.sin(heading) * some.velocity[1]
+            return (along - multipliers @ np.vstack([some.rates, some.spin, some.power])) / some.power
+
+        gain = reduced(motion)
+        start = np.argsort(-gain)[:_CLIMBED]
+        rates, best, size = motion.rates[:, start], gain[start], np.full(start.size, turn)
+        axes = [(i, j) for i in range(len(rates)) for j in range(i)]
+        for _ in range(_STEPS):
+            tried = []
+            for i, j in axes:
+                for sign in (-size, size):
+                    other = rates.copy()
+                    other[i] = np.cos(sign) * rates[i] - np.sin(sign) * rates[j]
+                    other[j] = np.sin(sign) * rates[i] + np.cos(sign) * rates[j]
+                    tried.append(other)
+            new = self.motion(np.concatenate(tried, axis=1))
+            if new.size != len(tried) * start.size:
+                break
+            found = reduced(new).reshape(len(tried), -1)
+            choice = np.argmax(found, axis=0)
+            up = found.max(axis=0) > best
+            rates = np.where(up, np.stack(tried)[choice, :, np.arange(start.size)].T, rates)
+            best = np.where(up, found.max(axis=0), best)
+            size = np.where(up, size, 0.35 * size)
+        return rates
+
+
+def small_gait(
+    body: Chain, friction: Friction, shape: np.ndarray, directions: int = 180, headings: int = 12, rounds: int = _ROUNDS
+) -> SmallGait:
+    """Best infinitesimal gait at one shape ``(n_joint,)``, any order of the directions being equivalent at first order.
+
+    `directions` are spread over all senses of the rates, `headings` over half a turn (a whole one where mu_b differs from
+    mu_f). Then columns are generated: the directions with the largest reduced gain, found by climbing, join the program, and
+    the heading becomes the direction of travel of its optimum, until neither gains. Sharp stick-slip creases are found so,
+    which no fixed set of directions does.
+    """
+    program = _Program(body, friction, shape, _DELTA)
+    motion = program.motion(unit_directions(body.n_joint, directions, half=False))
+    turn = np.pi if friction.reversible else 2 * np.pi
+    value, heading = max((program.solve(motion, h)[0], h) for h in np.arange(headings) * (turn / headings))
+    for _ in range(rounds):
+        new_value, weights, multipliers = program.solve(motion, heading)
+        if new_value > value:
+            value = new_value
+        way = program.turned(motion, weights)[0]
+        more = program.motion(program.climbed(motion, heading, multipliers, np.pi / directions))
+        motion = motion.joined(more)
+        trial = program.solve(motion, way)[0]
+        heading = way if trial >= program.solve(motion, heading)[0] else heading
+        if program.solve(motion, heading)[0] < value + _GAIN:
+            break
+    value, weights, _ = program.solve(motion, heading)
+    used = weights > 1e-9 * weights.max()
+    return SmallGait(float(value), heading, motion.rates[:, used], weights[used])
+
+
+def best_small_gait(
+    body: Chain, friction: Friction, joint_limit: float = np.pi, steps: int = 10, refined: int = 3
+) -> tuple[SmallGait, np.ndarray]:
+    """The best small gait found over all admissible shapes, and its shape ``(n_joint,)``.
+
+    A lattice of `steps` + 1 values of every joint angle, then pattern searches from the `refined` best of it.
+    """
+    axis = np.linspace(-joint_limit, joint_limit, steps + 1)
+    shapes = np.stack([a.ravel() for a in np.meshgrid(*[axis] * body.n_joint, indexing="ij")])
+    shapes = shapes[:, admissible(body, shapes, 1e-9) & fundamental(body, shapes)]
+
+    def rough(shape: np.ndarray) -> float:
+        return small_gait(body, friction, shape, 180, 4, 0).efficiency
+
+    values = np.array([small_gait(body, friction, s, 36, 3, 0).efficiency for s in shapes.T])
+    moves = np.concatenate([np.eye(body.n_joint), -np.eye(body.n_joint)])
+    found = []
+    for start in np.argsort(-values)[:refined]:
+        shape, value, size = shapes[:, start], rough(shapes[:, start]), joint_limit / steps
+        while size > 0.01:
+            tried = np.clip(shape + size * moves, -joint_limit, joint_limit)
+            tried = tried[admissible(body, tried.T, 1e-9)]
+            tried = tried[np.abs(tried - shape).max(axis=1) > 1e-9]
+            reached = [rough(s) for s in tried]
+            if max(reached, default=-np.inf) > value + 1e-6:
+                shape, value = tried[int(np.argmax(reached))], max(reached)
+            else:
+                size *= 0.4
+        found.append((value, shape))
+    shape = max(found, key=lambda item: item[0])[1]
+    return small_gait(body, friction, shape), shape

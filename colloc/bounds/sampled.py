@@ -1,0 +1,226 @@
+"""An upper bound on the efficiency of every gait of a body: derivation in docs/bound.md.
+
+The bound is the value of a convex problem: choose a potential over shape and heading (`colloc.bounds.potential`) so that the
+largest (gain / power) over all shapes, headings and rate directions is smallest. It is solved by exchange of samples
+(`bounds.cutting_plane`). What comes out is a *sampled* bound; `bounds.guaranteed` guarantees one for isotropic friction.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from colloc.bounds.coulomb_motion import swaps_ends
+from colloc.bounds.cutting_plane import exchanged_optimum
+from colloc.bounds.potential import PotentialSpace
+from colloc.bounds.sampling import Domain
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.numerics.spline import TensorSpline
+from colloc.system.errors import ProblemError
+from colloc.system.json_cache import hash_of, load_entries, save_entry
+
+VERSION = 2
+"""Part of the cache key: raise it when the computation changes its result."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much work a bound is worth.
+
+    Parameters
+    ----------
+    intervals : int
+        Knot intervals of the splines in every joint angle.
+    harmonics : tuple of int, optional
+        Harmonics in the heading; by default (1, 3), or (0, 1) where mu_b differs from mu_f.
+    shapes, directions : int
+        The first lattice: steps of every joint angle, and rate directions.
+    rounds : int
+        Largest number of rounds of climbs between the samples.
+    starts : int
+        Climbs a round.
+    tolerance : float
+        Excess of the summits over the program's value at which a bound counts as converged.
+    """
+
+    intervals: int = 10
+    harmonics: tuple[int, ...] | None = None
+    shapes: int = 20
+    directions: int = 48
+    rounds: int = 24
+    starts: int = 250
+    tolerance: float = 5e-4
+
+
+QUICK = Budget()
+THOROUGH = Budget(intervals=14, harmonics=(1, 3, 5), shapes=28, rounds=30, starts=400)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """An upper bound on the efficiency of every gait, and how well it is known.
+
+    Attributes
+    ----------
+    sampled : float
+        Largest ratio met on any sample; what lies between samples may exceed it.
+    floor : float
+        Value of the last program: no potential of this space does better on the samples held, up to the smoothing (1e-5).
+    converged : bool
+        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`.
+    guaranteed : float or None
+        Value certified between samples too (`colloc.bounds.guaranteed`), if asked for and possible.
+    missing : str
+        What keeps the sampled value from being a theorem; empty if `guaranteed` is set.
+    angles, rates : tuple of float
+        Shape and rate direction where the sampled value is taken.
+    joint_limit : float
+    intervals : int
+    harmonics : tuple of int
+    coefficients : tuple of float
+        Free coefficients of the potential (see `potential_space`).
+    samples : int
+    seconds : float
+        Processor time.
+    """
+
+    sampled: float
+    floor: float
+    converged: bool
+    guaranteed: float | None
+    missing: str
+    angles: tuple[float, ...]
+    rates: tuple[float, ...]
+    joint_limit: float
+    intervals: int
+    harmonics: tuple[int, ...]
+    coefficients: tuple[float, ...]
+    samples: int
+    seconds: float
+
+    def potential_space(self, body: Chain) -> PotentialSpace:
+        """The space `coefficients` belong to."""
+        spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals)
+        return PotentialSpace(spline, self.harmonics, swaps_ends(body))
+
+    def gap(self, efficiency: float) -> float:
+        """How far an efficiency is from the sampled bound."""
+        return self.sampled - efficiency
+
+    def report(self, efficiency: float) -> str:
+        """One line for reports: efficiency, bound, gap, and what is proved."""
+        proved = f"guaranteed {self.guaranteed:.4f}" if self.guaranteed is not None else self.missing
+        return f"efficiency {efficiency:.4f}, upper bound {self.sampled:.4f}, gap {self.gap(efficiency):.4f} ({proved})"
+
+
+MISSING_MARGIN = "sampled at {samples} motions: not certified between them"
+MISSING_LAW = (
+    "sampled at {samples} motions: for unequal coefficients the balance has no convex potential, so neither uniqueness of the "
+    "motion nor a margin between samples is known"
+)
+
+
+def compute_bound(domain: Domain, budget: Budget) -> Bound:
+    """The sampled bound, computed anew (see `efficiency_bound`)."""
+    begin = time.process_time()
+    body = domain.body
+    harmonics = budget.harmonics or ((1, 3) if domain.friction.reversible else (0, 1))
+    space = PotentialSpace(TensorSpline(body.n_joint, domain.joint_limit, budget.intervals), harmonics, swaps_ends(body))
+    found = exchanged_optimum(
+        domain,
+        space,
+        shapes=budget.shapes,
+        directions=budget.directions,
+        rounds=budget.rounds,
+        starts=budget.starts,
+        tolerance=budget.tolerance,
+    )
+    missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW
+    return Bound(
+        sampled=found.top,
+        floor=found.floor,
+        converged=found.converged,
+        guaranteed=None,
+        missing=missing.format(samples=found.samples),
+        angles=tuple(found.summit.angles[:, 0].tolist()),
+        rates=tuple(found.summit.rates[:, 0].tolist()),
+        joint_limit=domain.joint_limit,
+        intervals=budget.intervals,
+        harmonics=harmonics,
+        coefficients=tuple(found.free.tolist()),
+        samples=found.samples,
+        seconds=time.process_time() - begin,
+    )
+
+
+def bound_key(domain: Domain, budget: Budget) -> str:
+    """SHA-256 of what a bound depends on."""
+    fields = {"version": VERSION, "domain": asdict(domain), "budget": asdict(budget)}
+    return hash_of(fields)
+
+
+def known_bound(
+    body: Chain,
+    friction: Friction,
+    joint_limit: float = float(np.pi),
+    *,
+    budget: Budget = QUICK,
+    cache: str | os.PathLike,
+) -> Bound | None:
+    """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
+    entry = load_entries(cache).get(bound_key(Domain(body, friction, float(joint_limit)), budget))
+    if entry is None:
+        return None
+    fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+    return Bound(**fields)
+
+
+def efficiency_bound(
+    body: Chain,
+    friction: Friction,
+    joint_limit: float = float(np.pi),
+    *,
+    budget: Budget = QUICK,
+    cache: str | os.PathLike | None = None,
+) -> Bound:
+    """An upper bound on d/W over all gaits with |joint angles| <= joint_limit and links i, i + 2 not crossing.
+
+    Parameters
+    ----------
+    body : Chain
+        Two or three links; four are possible with a coarse budget.
+    friction : Friction
+        Coulomb friction, delta -> 0 (docs/bound.md states what finite delta changes).
+    joint_limit : float
+        At most pi.
+    budget : Budget
+    cache : path, optional
+        A JSON file where bounds are kept by the hash of all inputs.
+
+    Raises
+    ------
+    ProblemError
+        For a joint limit outside (0, pi], more than four links, even harmonics with mu_b = mu_f, or an unreadable cache.
+    """
+    if not 0 < joint_limit <= np.pi + 1e-12:
+        raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
+    if body.n_joint > 3:
+        raise ProblemError(
+            f"bounds are computed for at most four links, not {body.n_link}: the samples fill all of shape space."
+        )
+    known = known_bound(body, friction, joint_limit, budget=budget, cache=cache) if cache is not None else None
+    if known is not None:
+        return known
+    if friction.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
+        raise ProblemError("even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only.")
+    domain = Domain(body, friction, float(joint_limit))
+    key = bound_key(domain, budget)
+    bound = compute_bound(domain, budget)
+    if cache is not None:
+        save_entry(cache, key, asdict(bound))
+    return bound

@@ -1,0 +1,114 @@
+"""Where a bound is sampled: lattices of shapes and rate directions, and climbs to the summits between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.bounds.coulomb_motion import Motion, admissible, fundamental, solved_motion, unit_directions
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+
+_DELTA = 1e-6
+"""Regularisation speed, at unit shape speed: solving costs half of what it does at 1e-9, the best small gait loses 1.5e-5."""
+_EDGE = 1e-9
+_FRAMES = 4
+_TRIAL_STEPS = 4
+_GROW, _SHRINK = 1.25, 0.5
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The gaits a bound speaks of.
+
+    Parameters
+    ----------
+    body : Chain
+    friction : Friction
+    joint_limit : float
+        Largest |joint angle| [rad].
+    """
+
+    body: Chain
+    friction: Friction
+    joint_limit: float
+
+    def holds(self, angles: np.ndarray) -> np.ndarray:
+        """Mask of shapes within the limits whose links do not cross."""
+        inside = (np.abs(angles) <= self.joint_limit + 1e-12).all(axis=0)
+        return inside & admissible(self.body, angles, _EDGE)
+
+    def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[Motion, np.ndarray]:
+        """Balanced motions and the mask of those that converged."""
+        return solved_motion(self.body, self.friction, angles, rates, _DELTA)
+
+    def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> Motion:
+        """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions.
+
+        One of each class of mirror images; with directed friction the end swap reverses time, so both senses of every rate
+        are sampled. `shift` in [0, 1) moves the lattice by that part of its spacing (then without its last value).
+        """
+        steps = (np.arange(shapes + (shift == 0)) + shift) / shapes
+        axis = self.joint_limit * (2.0 * steps - 1.0)
+        angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.body.n_joint, indexing="ij")])
+        angles = angles[:, self.holds(angles) & fundamental(self.body, angles)]
+        rates = unit_directions(self.body.n_joint, directions, self.friction.reversible)
+        if shift and self.body.n_joint == 2:
+            turn = shift * (np.pi if self.friction.reversible else 2.0 * np.pi) / directions
+            rates = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ rates
+        return self.solved(np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1]))[0]
+
+    def summits(
+        self,
+        value: Callable[[Motion], np.ndarray],
+        start: Motion,
+        spacing: float,
+        turn: float,
+        steps: int,
+        rng: np.random.Generator,
+        hopeless: float = -np.inf,
+    ) -> Motion:
+        """Climb `value` from every motion of `start`, ``(n_joint, n)``, in random directions of shape and rates.
+
+        Pattern search: ridges where a link changes between stick and slip are creases, and run at any angle to the axes.
+        Steps begin at `spacing` [rad] for shapes and `turn` [rad] for directions, and adapt. Climbs that are below `hopeless`
+        after a few steps are given up, and not returned.
+        """
+        n_joint, n = start.angles.shape
+        angles, rates = start.angles, start.rates
+        best = value(start)
+        size = np.ones(n)
+        top = start
+        for step in range(steps):
+            if step == _TRIAL_STEPS and (best < hopeless).any() and (best >= hopeless).any():
+                going = np.flatnonzero(best >= hopeless)
+                top, best, size, n = top.take(going), best[going], size[going], going.size
+                angles, rates = top.angles, top.rates
+            move = rng.standard_normal((2 * n_joint, n, _FRAMES))
+            # a direction of rates means nothing along the rates themselves
+            along = (move[n_joint:] * rates[:, :, None]).sum(axis=0)
+            move[n_joint:] -= along * rates[:, :, None]
+            move /= np.sqrt((move**2).sum(axis=0))
+            move = np.concatenate([move, -move], axis=2) * size[:, None]
+            new_angles = np.clip(angles[:, :, None] + spacing * move[:n_joint], -self.joint_limit, self.joint_limit)
+            new_rates = rates[:, :, None] + turn * move[n_joint:]
+            new_rates /= np.sqrt((new_rates**2).sum(axis=0))
+            flat_angles, flat_rates = new_angles.reshape(n_joint, -1), new_rates.reshape(n_joint, -1)
+            tried = np.flatnonzero(self.holds(flat_angles))
+            motion, kept = self.solved(flat_angles[:, tried], flat_rates[:, tried])
+            found = np.full(flat_angles.shape[1], -np.inf)
+            place = np.zeros(flat_angles.shape[1], dtype=int)
+            found[tried[kept]] = value(motion)
+            place[tried[kept]] = np.arange(motion.size)
+            choice = np.argmax(found.reshape(n, -1), axis=1) + np.arange(n) * 2 * _FRAMES
+            up = found[choice] > best
+            both = top.joined(motion.take(place[choice[up]]))
+            order = np.arange(n)
+            order[up] = n + np.arange(up.sum())
+            top = both.take(order)
+            angles, rates = top.angles, top.rates
+            best = np.where(up, found[choice], best)
+            size = np.where(up, _GROW * size, _SHRINK * size)
+        return top

@@ -1,0 +1,59 @@
+"""The velocity map as a CasADi function: tail velocities from the NumPy solver, for a whole mesh at once."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from colloc.collocation.newton_balance import balanced_near
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+
+_TOLERANCE = 1e-12
+
+
+class VelocityMap(ca.Callback):
+    """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``; not differentiable by CasADi.
+
+    The start only saves steps; NaN stands for the velocities last found. The same arguments are not solved twice. An
+    instant that does not converge gives NaN, which an optimiser takes as a step too far.
+    """
+
+    def __init__(self, body: Chain, friction: Friction, n_time: int) -> None:
+        ca.Callback.__init__(self)
+        self._body, self._friction, self._n_time = body, friction, n_time
+        self._last: tuple[np.ndarray, np.ndarray, float] | None = None
+        self._z: np.ndarray | None = None
+        self.solves = 0
+        self.construct("velocity_map", {"enable_fd": False})
+
+    def get_n_in(self) -> int:
+        return 4
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, index: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(
+            *((self._body.n_joint, self._n_time), (self._body.n_joint, self._n_time), (3, self._n_time), (1, 1))[index]
+        )
+
+    def get_sparsity_out(self, index: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(3, self._n_time)
+
+    def eval(self, arguments: list[ca.DM]) -> list[ca.DM]:
+        angles, rates, start, delta = *(a.full() for a in arguments[:3]), float(arguments[3])
+        if self._last is not None and self._z is not None:
+            same = self._last[2] == delta and np.array_equal(self._last[0], angles) and np.array_equal(self._last[1], rates)
+            if same:
+                return [ca.DM(self._z)]
+        if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
+            return [ca.DM(np.full((3, self._n_time), np.nan))]
+        if np.isnan(start).any() and self._z is not None:
+            start = self._z
+        z, converged = balanced_near(self._body, self._friction, angles, rates, delta, np.nan_to_num(start), _TOLERANCE)
+        self.solves += 1
+        z = np.where(converged, z, np.nan)
+        self._last = (angles, rates, delta)
+        self._z = z
+        return [ca.DM(z)]

@@ -1,0 +1,60 @@
+"""Where each decision variable of a collocated problem sits in the vector x, and its unit of time. No CasADi."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.path_classes import FreePath
+from colloc.gaits.problem import LIFTED, Problem
+from colloc.numerics.mesh import Mesh, uniform_mesh
+from colloc.numerics.schemes import scheme
+
+RADIANS = 2 * np.pi
+"""Radians of phase per period: rates, velocities and delta of the variables are those per period divided by it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where each kind of variable sits in the vector x: index arrays, ``(n_component, n_position)``."""
+
+    parameters: np.ndarray
+    theta: np.ndarray
+    distance: np.ndarray
+    work: np.ndarray
+    angles: np.ndarray
+    rates: np.ndarray
+    z: np.ndarray
+    forces: np.ndarray
+    n: int
+
+
+def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
+    """The mesh of a problem on the part of the period that is solved: uniform, or with the given edges."""
+    if edges is not None:
+        return Mesh(scheme(problem.scheme), edges)
+    return uniform_mesh(scheme(problem.scheme), problem.intervals, problem.gait.fraction)
+
+
+def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
+    """Index arrays of all variables of a problem on a mesh."""
+    n_joint, n_link = problem.body.n_joint, problem.body.n_link
+    gait, path = problem.gait, problem.has_path
+    size = gait.size(n_joint, mesh.n) if isinstance(gait, FreePath) else gait.size(n_joint)
+    n_point = 0 if path else mesh.n_point  # along a path angles, rates and velocities follow from the parameters
+    sizes = {
+        "parameters": (size, 1),
+        "theta": (1, mesh.n_site),
+        "distance": (1, mesh.n + 1),
+        "work": (1, mesh.n + 1),
+        "angles": (n_joint, n_point),
+        "rates": (n_joint, n_point),
+        "z": (3, n_point),
+        "forces": (3 * n_link if problem.formulation == LIFTED else 0, n_point),
+    }
+    indices, start = {}, 0
+    for name, (rows, columns) in sizes.items():
+        indices[name] = start + np.arange(rows * columns).reshape(columns, rows).T
+        start += rows * columns
+    return Layout(n=start, **indices)

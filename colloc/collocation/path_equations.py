@@ -1,0 +1,129 @@
+"""CasADi expressions of gaits given by their path: where a point of a piece lies, and what collocation evaluates there.
+
+The path runs at unit shape speed, so that rates are the unit tangent and delta is measured at unit shape speed; outputs
+are multiplied by the length of path per unit of phase. The tail velocity is eliminated: it is the one that balances the
+body, from the NumPy solver, with derivatives by the implicit function theorem (see `colloc.numerics.blocks.implicit_function`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from colloc.collocation.shape_checks import ShapeCheck
+from colloc.gaits.arcs import advance, direction
+from colloc.mechanics.balance import instant, net_force, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
+
+OMEGA, ADVANCE, POWER = range(3)
+"""Outputs of `path_point`, per unit of phase."""
+
+
+class Piece(NamedTuple):
+    """A point of a piece of the path as an expression: `shape` and `given` are its variables and instance parameters."""
+
+    shape: ca.SX
+    given: ca.SX
+    angles: ca.SX
+    direction: ca.SX
+    speed: ca.SX
+
+
+def arc(n_joint: int) -> Piece:
+    """A point of an arc.
+
+    Shape: angles at its start, tangents at both ends, mean shape speed (length of the whole path over 2 pi). Given: the
+    fraction tau of the arc, and the part of a period h that the arc takes.
+    """
+    rows = 1 if n_joint == 2 else n_joint
+    start, t0, t1 = ca.SX.sym("q", n_joint), ca.SX.sym("t0", rows), ca.SX.sym("t1", rows)
+    speed, tau, h = (ca.SX.sym(name) for name in ("speed", "tau", "h"))
+    length = 2 * np.pi * speed
+    return Piece(
+        ca.vertcat(start, t0, t1, speed),
+        ca.vertcat(tau, h),
+        start + length * h * advance(t0, t1, tau),
+        direction(t0, t1, tau),
+        length,
+    )
+
+
+def side(n_joint: int) -> Piece:
+    """A point of a straight piece.
+
+    Shape: angles at both ends. Given: the fraction sigma of the piece, and the part of the piece per unit of phase.
+    """
+    a, b = ca.SX.sym("a", n_joint), ca.SX.sym("b", n_joint)
+    sigma, gain = ca.SX.sym("sigma"), ca.SX.sym("gain")
+    step = b - a
+    length = ca.sqrt(ca.sumsqr(step))
+    return Piece(ca.vertcat(a, b), ca.vertcat(sigma, gain), a + sigma * step, step / length, gain * length)
+
+
+@lru_cache(maxsize=32)
+def path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+    """Rotation rate, velocity of the centre of mass along the lab's x, and power. Locals: theta, then the piece's shape.
+
+    `kind` is `arc` or `side`. Differentiating takes most of the time in which a program is built, so it is done once.
+    """
+    piece = kind(body.n_joint)
+    theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("Z", 3)
+    now = instant(body, friction, piece.angles, piece.direction, z, delta)
+    cx, cy = body.centre_velocity(now.posture, now.velocity)
+    out = piece.speed * ca.vertcat(z[2], ca.cos(theta) * cx - ca.sin(theta) * cy, total_power(now.velocity, now.force))
+    balance = net_force(now.posture, now.force)
+    return implicit_function("point", ca.vertcat(theta, piece.shape), piece.given, z, delta, balance, out)
+
+
+def chord(piece: Piece) -> LocalFunction:
+    """Displacement along a whole arc."""
+    n_joint = piece.angles.shape[0]
+    whole = ca.substitute(piece.angles - piece.shape[:n_joint], piece.given[0], 1.0)
+    return local_function("chord", piece.shape, piece.given[1], ca.SX.sym("delta"), whole)
+
+
+def placed_check(check: ShapeCheck, piece: Piece) -> LocalFunction:
+    """A shape check at a point of a piece; given are those of the piece and the share of the cut."""
+    share = ca.SX.sym("share")
+    given = ca.vertcat(piece.given, share)
+    return local_function("check", piece.shape, given, ca.SX.sym("delta"), check.cut(piece.angles, share))
+
+
+def side_lengths(n_joint: int, n_piece: int) -> LocalFunction:
+    """Squared length of every piece of a chain of vertices, then the length of the chain."""
+    vertices = ca.SX.sym("v", n_joint, n_piece + 1)
+    step = vertices[:, 1:] - vertices[:, :-1]
+    squared = ca.sum1(step * step).T
+    out = ca.vertcat(squared, ca.sum1(ca.sqrt(squared)))
+    return local_function("sides", ca.vec(vertices), ca.SX(0, 1), ca.SX.sym("delta"), out)
+
+
+def unit_norm(n_joint: int) -> LocalFunction:
+    """Squared norm of a tangent, less 1."""
+    tangent = ca.SX.sym("t", n_joint)
+    return local_function("norm", tangent, ca.SX(0, 1), ca.SX.sym("delta"), ca.sumsqr(tangent) - 1)
+
+
+def excess_turn(n_joint: int, curvature: float) -> LocalFunction:
+    """How far unit tangents at both ends of an arc are apart beyond what the curvature allows, as an angle.
+
+    Locals: both tangents and the mean shape speed; given: the part of a period h that the arc takes. Half a turn an arc is the
+    most that unit tangents can express.
+    """
+    t0, t1 = ca.SX.sym("t0", n_joint), ca.SX.sym("t1", n_joint)
+    speed, h = ca.SX.sym("speed"), ca.SX.sym("h")
+    half = ca.fmin(np.pi * curvature * speed * h, 1.4)
+    out = 0.25 * ca.sumsqr(t1 - t0) / ca.sin(half) - ca.sin(half)
+    return local_function("turn", ca.vertcat(t0, t1, speed), h, ca.SX.sym("delta"), out)
+
+
+def squared_distance(n: int) -> LocalFunction:
+    """Half the sum of squared differences of the locals from given ones."""
+    local, target = ca.SX.sym("q", n), ca.SX.sym("target", n)
+    return local_function("distance", local, target, ca.SX.sym("delta"), 0.5 * ca.sumsqr(local - target))

@@ -1,0 +1,198 @@
+"""What makes variables a path of its class: constraint rows and blocks that know nothing of friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from colloc.collocation.path_equations import Piece, arc, chord, excess_turn, placed_check, side, side_lengths, unit_norm
+from colloc.collocation.shape_checks import ShapeCheck, shape_checks
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.blocks import Block, LocalFunction
+from colloc.numerics.constraint_rows import Group, equalities, selector, stacked
+from colloc.numerics.mesh import Mesh
+
+_FASTEST = 30.0
+_ANGLE_PER_ARC = 2.5
+"""Most that a tangent may turn on one arc [rad]; more could not be told from turning the other way."""
+
+
+@dataclass(eq=False)
+class PathGeometry:
+    """Constraint rows and blocks of a path, and where on it the mesh lies.
+
+    Attributes
+    ----------
+    piece : Piece
+        The expression of a point of a piece.
+    shape : (n_shape, n_interval)
+        Variables of the piece that each mesh interval lies on.
+    on : (n_interval,)
+        Which piece that is.
+    start, width : (n_interval,)
+        Where on its piece an interval begins, and which part of the piece it takes.
+    second : (n_interval,)
+        The second instance parameter of the piece's points (see `colloc.collocation.path_equations`).
+    groups : list of Group
+    blocks : dict of str to (function, gather, instance parameters)
+    checks : list of ShapeCheck
+    lower, upper : (n,)
+    """
+
+    piece: Piece
+    shape: np.ndarray
+    on: np.ndarray
+    start: np.ndarray
+    width: np.ndarray
+    second: np.ndarray
+    groups: list[Group]
+    blocks: dict[str, tuple[LocalFunction, np.ndarray, np.ndarray]]
+    checks: list[ShapeCheck]
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def given(self, tau: np.ndarray) -> np.ndarray:
+        """Instance parameters ``(2, k)`` of points at fractions tau ``(k,)`` of the intervals, k a multiple of their number."""
+        repeat = tau.size // self.start.size
+        start, width, second = (np.repeat(a, repeat) for a in (self.start, self.width, self.second))
+        return np.stack([start + width * tau, second])
+
+    def assembled_blocks(self, groups: list[Group], implicit: dict) -> tuple[Block, ...]:
+        """The blocks with their scatter matrices into all `groups`."""
+        return tuple(
+            Block(function, gather, stacked(groups, name, function.n_out * gather.shape[1]), given, implicit.get(name))
+            for name, (function, gather, given) in self.blocks.items()
+        )
+
+
+def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndarray, n: int) -> Group:
+    first, last = conditions
+    return equalities(name, first @ selector(columns[:, 0], n) + last @ selector(columns[:, -1], n))
+
+
+def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
+    n_cell = geometry.start.size
+    for check in geometry.checks:
+        name = check.name
+        joint = name.startswith("joint")
+        limit = problem.joint_limit if joint else 0.0
+        function = placed_check(check, geometry.piece)
+        given = np.vstack([geometry.given(np.full(n_cell, 0.5)), np.full(n_cell, -1.0)])
+        geometry.blocks[name] = (function, geometry.shape, given)
+        lower, upper = np.full(n_cell, -limit if joint else -np.inf), np.full(n_cell, limit)
+        rows = sparse.csr_matrix((n_cell, n))
+        geometry.groups.append(Group(name, lower, upper, rows, {name: sparse.eye(n_cell, format="csr")}))
+
+
+def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath, far: Pairs) -> PathGeometry:
+    """Arcs that join, close, keep the bound on curvature and admissible, one a mesh interval.
+
+    Parameters
+    ----------
+    problem : Problem
+    mesh : Mesh
+        Of phases.
+    parameters : (n_parameter,)
+        Indices of the variables of the path.
+    n : int
+        Number of all variables.
+    near : ArcPath
+        Fixes the winding and the start phase of a path whose symmetry does not fix it.
+    """
+    gait: FreePath = problem.gait
+    n_joint, symmetry = problem.body.n_joint, gait.symmetry
+    speed, tangents, shapes = gait.split(parameters, n_joint)
+    piece = arc(n_joint)
+    cells = np.arange(mesh.n)
+    shape = np.concatenate([shapes[:, :-1], tangents[:, :-1], tangents[:, 1:], np.repeat(speed, mesh.n, axis=1)])
+    geometry = PathGeometry(
+        piece, shape, cells, np.zeros(mesh.n), np.ones(mesh.n), mesh.h, [], {}, shape_checks(problem.body, far),
+        np.full(n, -np.inf), np.full(n, np.inf),
+    )  # fmt: skip
+    geometry.lower[speed], geometry.upper[speed] = problem.smallest_shape_speed, _FASTEST
+
+    function = chord(piece)
+    geometry.blocks["chord"] = (function, shape, mesh.h[None])
+    columns = selector(shapes[:, 1:].ravel(order="F"), n) - selector(shapes[:, :-1].ravel(order="F"), n)
+    joined = {"chord": -sparse.eye(n_joint * mesh.n, format="csr")}
+    geometry.groups = [
+        equalities("path", columns, joined),
+        _ends("closure", end_conditions(symmetry, n_joint), shapes, n),
+    ]
+    if n_joint == 2:
+        turn = selector(tangents[0, 1:], n) - selector(tangents[0, :-1], n)
+        allowed = sparse.csr_matrix(
+            (2 * np.pi * gait.curvature * mesh.h, (cells, np.full(mesh.n, speed[0, 0]))), shape=(mesh.n, n)
+        )
+        least, most = np.full(mesh.n, -np.inf), np.zeros(mesh.n)
+        geometry.groups += [
+            Group("curvature to the left", least, most, (turn - allowed).tocsr()),
+            Group("curvature to the right", least, most, (-turn - allowed).tocsr()),
+            Group("turn", np.full(mesh.n, -_ANGLE_PER_ARC), np.full(mesh.n, _ANGLE_PER_ARC), turn.tocsr()),
+        ]
+        winding = near.winding if gait.winding is None else gait.winding
+        turned = 2 * np.pi * gait.fraction * float(winding or 0)
+        if symmetry == BILATERAL:
+            first = np.pi * np.round((near.tangents[0, 0] - np.pi / 4) / np.pi) + np.pi / 4
+            for place, value in ((tangents[0, 0], first), (tangents[0, -1], first + turned)):
+                geometry.lower[place] = geometry.upper[place] = value
+        else:
+            row = selector(tangents[0, -1:], n) - selector(tangents[0, :1], n)
+            geometry.groups.append(Group("winding", np.array([turned]), np.array([turned]), row.tocsr()))
+    else:
+        norms = tangents if symmetry == BILATERAL else tangents[:, :-1]
+        geometry.blocks["norm"] = (unit_norm(n_joint), norms, np.empty((0, norms.shape[1])))
+        geometry.blocks["turn"] = (excess_turn(n_joint, gait.curvature), shape[n_joint:], mesh.h[None])
+        zero, one = np.zeros(mesh.n), sparse.eye(mesh.n, format="csr")
+        ones = sparse.eye(norms.shape[1], format="csr")
+        geometry.groups += [
+            equalities("unit tangent", sparse.csr_matrix((norms.shape[1], n)), {"norm": ones}),
+            Group("curvature", np.full(mesh.n, -np.inf), zero, sparse.csr_matrix((mesh.n, n)), {"turn": one}),
+            _ends("smooth closure", tangent_conditions(symmetry, n_joint), tangents, n),
+        ]
+    if symmetry != BILATERAL:
+        # the start phase: start on the plane across the guess at its start
+        normal = near.rates(np.zeros(1))[:, 0] / near.length
+        level = np.array([normal @ near.shapes[:, 0]])
+        geometry.groups.append(Group("start", level, level, sparse.csr_matrix(normal) @ selector(shapes[:, 0], n)))
+    _add_checks(geometry, problem, n)
+    return geometry
+
+
+def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: Corners, far: Pairs) -> PathGeometry:
+    """Straight pieces that close and keep admissible; the mesh, in phases of `near`, has an edge at every vertex of it."""
+    gait: Polygon = problem.gait
+    n_joint, symmetry = problem.body.n_joint, gait.symmetry
+    vertices = gait.split(parameters, n_joint)
+    phases = near.phases
+    middle = 0.5 * (mesh.edges[1:] + mesh.edges[:-1])
+    on = np.searchsorted(phases, middle) - 1
+    span = np.diff(phases)[on]
+    width = mesh.h / span
+    geometry = PathGeometry(
+        side(n_joint), np.concatenate([vertices[:, on], vertices[:, on + 1]]), on, (mesh.edges[:-1] - phases[on]) / span,
+        width, 1.0 / span, [_ends("closure", end_conditions(symmetry, n_joint), vertices, n)], {},
+        shape_checks(problem.body, far),
+        np.full(n, -np.inf), np.full(n, np.inf),
+    )  # fmt: skip
+    across = tangent_conditions(BILATERAL, n_joint)[0][: n_joint // 2]
+    for half, (a, b) in zip(gait.half_ends, ((0, 1), (-1, -2)), strict=True):
+        if half:
+            row = across @ (selector(vertices[:, b], n) - selector(vertices[:, a], n))
+            geometry.groups.append(equalities(f"side across the axis at {'start' if a == 0 else 'end'}", row))
+    n_piece = vertices.shape[1] - 1
+    geometry.blocks["sides"] = (side_lengths(n_joint, n_piece), parameters[:, None], np.empty((0, 1)))
+    shortest = np.full(n_piece, gait.shortest_side)
+    shortest[[0, -1]] *= np.where(gait.half_ends, 0.5, 1.0)
+    least = np.append(shortest**2, 2 * np.pi * problem.smallest_shape_speed * gait.fraction)
+    unbounded = np.full(n_piece + 1, np.inf)
+    own = sparse.eye(n_piece + 1, format="csr")
+    geometry.groups.append(Group("sides", least, unbounded, sparse.csr_matrix((n_piece + 1, n)), {"sides": own}))
+    _add_checks(geometry, problem, n)
+    return geometry

@@ -1,0 +1,222 @@
+"""Direct collocation of gaits given by their path: arcs of bounded curvature, or polygons.
+
+Decision variables: the path's parameters (see `gaits.path_classes`); the tail's orientation theta at every site; distance x
+and work W at every edge. Rates are unit tangents and delta is measured at unit shape speed; the tail velocity is not a
+variable but the one that balances the body. As in `collocation.transcription`, x is the displacement of the centre of mass along
+a fixed direction and the first orientation is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from colloc.collocation.implicit_velocity import VelocityMap
+from colloc.collocation.layout import Layout, problem_layout, problem_mesh
+from colloc.collocation.path_equations import ADVANCE, OMEGA, POWER, arc, path_point, side, squared_distance
+from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
+from colloc.collocation.point_equations import minus_efficiency
+from colloc.collocation.shape_checks import ShapeCheck
+from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.path_classes import FreePath
+from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
+from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.problem import Problem
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.blocks import Assembly, Block
+from colloc.numerics.constraint_rows import Group, equalities, quadrature_group, rotation_groups, selector
+from colloc.numerics.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class PathTranscription:
+    """The nonlinear program of a path; attributes as `collocation.transcription.Transcription`, and the path's geometry."""
+
+    problem: Problem
+    mesh: Mesh
+    layout: Layout
+    geometry: PathGeometry
+    assembly: Assembly
+    lower: np.ndarray
+    upper: np.ndarray
+    constraint_lower: np.ndarray
+    constraint_upper: np.ndarray
+    groups: dict[str, slice]
+    velocity: VelocityMap | None
+
+    @property
+    def lifted(self) -> bool:
+        return False
+
+    @property
+    def speed_unit(self) -> float:
+        return 1.0
+
+    @property
+    def checks(self) -> list[ShapeCheck]:
+        return self.geometry.checks
+
+    def member(self, parameters: np.ndarray) -> ArcPath | Corners:
+        """The gait of a parameter vector."""
+        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.mesh.edges)
+
+    def gait(self, x: np.ndarray) -> ArcPath | Corners:
+        """The gait of a vector of variables."""
+        return self.member(x[self.layout.parameters[:, 0]])
+
+    def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
+        """The mesh in phases of a member: sides that grew take more of the period than the program's mesh gives them."""
+        if isinstance(gait, ArcPath):
+            return self.mesh
+        on = self.geometry.on
+        edges = np.append(gait.phases[on] + self.geometry.start * np.diff(gait.phases)[on], gait.phases[-1])
+        return Mesh(self.mesh.scheme, edges)
+
+    def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
+        """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant."""
+        gait = self.member(parameters)
+        mesh, given = self.phase_mesh(gait), {}
+        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks), strict=True):
+            tau = np.clip((times - mesh.edges[:-1]) / mesh.h, 0.0, 1.0)
+            given[check.name] = np.vstack([self.geometry.given(tau), held_shares(check, gait, times)])
+        blocks = zip(self.geometry.blocks, self.assembly.blocks, strict=True)
+        return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
+
+    def check_excess(self, x: np.ndarray) -> float:
+        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
+        gait = self.gait(x)
+        excess = 0.0
+        for check, times in zip(self.checks, worst_instants(gait, self.phase_mesh(gait), self.checks), strict=True):
+            rows, values = self.groups[check.name], check_values(check, gait, times)
+            excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
+            excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
+        return excess
+
+
+def _geometry(
+    problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath | Corners, far: Pairs
+) -> PathGeometry:
+    if isinstance(near, ArcPath):
+        return arc_geometry(problem, mesh, parameters, n, near, far)
+    return side_geometry(problem, mesh, parameters, n, near, far)
+
+
+def path_through(problem: Problem, gait: Gait, edges: np.ndarray | None) -> tuple[ArcPath | Corners, Mesh]:
+    """A path of the problem's kind laid through a gait, and the mesh in its phases; it need not keep every constraint."""
+    if isinstance(problem.gait, FreePath) and edges is None:
+        edges = graded_edges(gait, problem.gait, problem.intervals)
+    mesh = problem_mesh(problem, edges)
+    if isinstance(problem.gait, FreePath):
+        return arcs_through(gait, problem.gait, mesh.edges), mesh
+    corners = corners_through(gait, problem.gait)
+    if isinstance(gait, Corners) and gait.symmetry == problem.gait.symmetry and gait.corners.shape == corners.corners.shape:
+        corners = gait
+    return corners, Mesh(mesh.scheme, _with_vertices(mesh.edges, corners.phases))
+
+
+def _with_vertices(edges: np.ndarray, phases: np.ndarray) -> np.ndarray:
+    """Edges moved so that every vertex is one of them: each side keeps its share of the intervals, at least two."""
+    if np.abs(edges[:, None] - phases).min(axis=0).max() < 1e-9:
+        nearest = np.abs(edges[:, None] - phases).argmin(axis=0)
+        edges = edges.copy()
+        edges[nearest] = phases
+        return edges
+    counts = np.maximum(2, np.round((edges.size - 1) * np.diff(phases) / phases[-1]).astype(int))
+    parts = [np.linspace(a, b, k + 1)[:-1] for a, b, k in zip(phases, phases[1:], counts, strict=False)]
+    return np.concatenate([*parts, phases[-1:]])
+
+
+def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathTranscription:
+    """The nonlinear program of a problem whose class bounds the path.
+
+    Parameters
+    ----------
+    problem : Problem
+    gait : Gait
+        Where the search begins: it fixes winding, start phase, and which interval lies on which side.
+    edges : (n + 1,), optional
+        Phases; by default graded by the turns of the gait (free paths), or evenly spread over the sides (polygons).
+    """
+    near, mesh = path_through(problem, gait, edges)
+    layout = problem_layout(problem, mesh)
+    geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near, far)
+    point = path_point(problem.body, problem.friction, arc if isinstance(problem.gait, FreePath) else side)
+    interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
+    tau = np.tile(mesh.scheme.c, mesh.n)
+    # a point that two intervals share would have two tangents at a corner: points of each interval are its own
+    theta = layout.theta[:, mesh.sites.ravel()]
+    given = geometry.given(tau)
+    geometry.blocks["point"] = (point, np.concatenate([theta, geometry.shape[:, interval]]), given)
+
+    n_point, n_out = tau.size, point.n_out
+    state, rate = mesh.integration()
+    pick = selector(np.arange(n_point) * n_out + OMEGA, n_out * n_point)
+    groups = [
+        *geometry.groups,
+        equalities("orientation", state @ selector(layout.theta[0], layout.n), {"point": (-rate @ pick).tocsr()}),
+        *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n),
+        quadrature_group("distance", layout.distance, ADVANCE, n_out, mesh, layout.n, 1.0),
+        quadrature_group("work", layout.work, POWER, n_out, mesh, layout.n, 1.0),
+    ]
+    velocity = VelocityMap(problem.body, problem.friction, n_point)
+    piece = geometry.piece
+    place = ca.Function("place", [piece.shape, piece.given], [piece.angles, piece.direction]).map(n_point)
+    unknown = ca.DM(np.full((3, n_point), np.nan))
+
+    def balanced(local: ca.MX, delta: ca.MX) -> ca.MX:
+        angles, direction = place(local[1:, :], ca.DM(given))
+        return velocity(angles, direction, unknown, delta)
+
+    for state_index in (layout.distance[0, 0], layout.work[0, 0]):
+        geometry.lower[state_index] = geometry.upper[state_index] = 0.0
+    ends = np.array([[layout.distance[0, -1]], [layout.work[0, -1]]])
+    objective = Block(minus_efficiency(), ends, sparse.eye(1, format="csr"), np.empty((0, 1)))
+    return _assembled(problem, mesh, layout, geometry, groups, objective, {"point": balanced}, velocity)
+
+
+def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathTranscription:
+    """The nonlinear program of the member of a path class nearest to a gait, without friction, x or W.
+
+    Nearest means in the sum of the squared distances of edges, or corners, to those of a path laid through the gait.
+    """
+    near, mesh = path_through(problem, gait, edges)
+    size = problem_layout(problem, mesh).parameters.size
+    own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
+    layout = Layout(own, none, none, none, none, none, none, none, size)
+    geometry = _geometry(problem, mesh, own[:, 0], size, near, far)
+    shapes = problem.gait.split(own[:, 0], problem.body.n_joint)
+    shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")
+    target = problem.gait.parameters(near)[shapes]
+    objective = Block(squared_distance(shapes.size), shapes[:, None], sparse.eye(1, format="csr"), target[:, None])
+    return _assembled(problem, mesh, layout, geometry, geometry.groups, objective, {}, None)
+
+
+def _assembled(
+    problem: Problem,
+    mesh: Mesh,
+    layout: Layout,
+    geometry: PathGeometry,
+    groups: list[Group],
+    objective: Block,
+    implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]],
+    velocity: VelocityMap | None,
+) -> PathTranscription:
+    rows = np.cumsum([0] + [g.m for g in groups])
+    linear = sparse.vstack([g.linear for g in groups]).tocsr()
+    return PathTranscription(
+        problem,
+        mesh,
+        layout,
+        geometry,
+        Assembly(layout.n, objective, geometry.assembled_blocks(groups, implicit), linear),
+        geometry.lower,
+        geometry.upper,
+        np.concatenate([g.lower for g in groups]),
+        np.concatenate([g.upper for g in groups]),
+        {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, rows, rows[1:], strict=False)},
+        velocity,
+    )

@@ -1,0 +1,69 @@
+"""CasADi expressions of the bounds on shapes: joint limits, and links that must not cross."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import (
+    CLEARANCE_SMOOTHING,
+    SMOOTHING,
+    crossing_sums,
+    intrusions,
+    share_of_first,
+    smooth_minimum,
+    tangent_of_minimum,
+)
+
+
+class ShapeCheck(NamedTuple):
+    """A scalar function of the joint angles that admissibility bounds from above (joint angles also from below).
+
+    value: of the angles. share: of the angles, the weight of the first of two sums of which the function is the minimum,
+    or -1. cut: of the angles and a share, the tangent plane of that weight, or the function itself where it is negative.
+    """
+
+    name: str
+    value: ca.Function
+    share: ca.Function
+    cut: ca.Function
+
+
+def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[ShapeCheck]:
+    """Functions of the joint angles that admissibility bounds.
+
+    Each joint angle, to be kept within its limits; then functions that must not be positive: for all links two apart, and
+    for the pairs `far` of links farther apart.
+    """
+    angles = ca.SX.sym("q", body.n_joint)
+    checks = [_smooth_check(f"joint {j + 1}", angles, angles[j]) for j in range(body.n_joint)]
+    for i, (first, second) in enumerate(crossing_sums(body, angles)):
+        name = f"links {i + 1} and {i + 3}"
+        checks.append(_minimum_check(f"{name} (left)", angles, first - np.pi, second - np.pi))
+        checks.append(_minimum_check(f"{name} (right)", angles, -first - np.pi, -second - np.pi))
+    for i, j in far:
+        checks.append(
+            _minimum_check(f"links {i + 1} and {j + 1}", angles, *intrusions(body, angles, i, j), CLEARANCE_SMOOTHING)
+        )
+    return checks
+
+
+def _smooth_check(name: str, angles: ca.SX, value: ca.SX) -> ShapeCheck:
+    share = ca.SX.sym("share")
+    none = ca.Function("share", [angles], [ca.SX(-1)])
+    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, ca.Function("cut", [angles, share], [value]))
+
+
+def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX, width: float = SMOOTHING) -> ShapeCheck:
+    value, share = smooth_minimum(first, second, width), ca.SX.sym("share")
+    cut = ca.if_else(share < 0, value, tangent_of_minimum(first, second, ca.fmax(share, 0), width))
+    return ShapeCheck(
+        name,
+        ca.Function("check", [angles], [value]),
+        ca.Function("share", [angles], [share_of_first(first, second, width)]),
+        ca.Function("cut", [angles, share], [cut]),
+    )

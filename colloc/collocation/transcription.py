@@ -1,0 +1,244 @@
+"""Direct collocation of a problem: decision variables, constraints and objective on a mesh.
+
+Decision variables: gait parameters p; at every point joint angles, joint rates, tail velocity z and the lifted link
+forces; the tail's orientation theta at every site; distance x and work W at every edge. Rates, velocities and delta are
+per radian of phase, so that all variables are O(1).
+
+The balance itself is a step function of the tail velocity as delta goes to 0. Lifted forces cure that: each force is
+tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0; the balance is linear in the forces.
+x is the displacement of the centre of mass along a fixed direction. The first orientation is free, so maximising x
+turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from colloc.collocation.implicit_velocity import VelocityMap
+from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
+from colloc.collocation.point_equations import N_RATE, gait_check, mean_square, minus_efficiency, point_function
+from colloc.collocation.shape_checks import ShapeCheck, shape_checks
+from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.problem import LIFTED, Problem
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.blocks import Assembly, Block
+from colloc.numerics.constraint_rows import (
+    Group,
+    equalities,
+    gait_group,
+    output_group,
+    quadrature_group,
+    rotation_groups,
+    selector,
+    stacked,
+)
+from colloc.numerics.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Transcription:
+    """A problem on a mesh, ready for a solver of nonlinear programs.
+
+    Attributes
+    ----------
+    problem : Problem
+    mesh : Mesh
+    layout : Layout
+    assembly : Assembly
+    lower, upper : (n,)
+        Bounds of the variables.
+    constraint_lower, constraint_upper : (m,)
+    groups : dict of str to slice
+        Names of the constraint rows, in order.
+    checks : list of ShapeCheck
+        Shape functions whose largest value in each mesh cell is constrained.
+    velocity : VelocityMap
+        Kept alive here for the functions that call it.
+    """
+
+    problem: Problem
+    mesh: Mesh
+    layout: Layout
+    assembly: Assembly
+    lower: np.ndarray
+    upper: np.ndarray
+    constraint_lower: np.ndarray
+    constraint_upper: np.ndarray
+    groups: dict[str, slice]
+    checks: list[ShapeCheck]
+    velocity: VelocityMap
+
+    @property
+    def lifted(self) -> bool:
+        return self.problem.formulation == LIFTED
+
+    @property
+    def speed_unit(self) -> float:
+        return RADIANS
+
+    def gait(self, x: np.ndarray) -> Fourier:
+        """The gait of a vector of variables."""
+        return self.member(x[self.layout.parameters[:, 0]])
+
+    def member(self, parameters: np.ndarray) -> Fourier:
+        """The gait of a parameter vector."""
+        return self.problem.gait.fourier(parameters, self.problem.body.n_joint)
+
+    def phase_mesh(self, gait: Fourier) -> Mesh:
+        """The mesh in phases of a gait: the program's own."""
+        return self.mesh
+
+    def check_excess(self, x: np.ndarray) -> float:
+        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
+        gait = self.gait(x)
+        worst = worst_instants(gait, self.mesh, self.checks)
+        excess = 0.0
+        for check, times in zip(self.checks, worst, strict=True):
+            rows, values = self.groups[check.name], check_values(check, gait, times)
+            excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
+            excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
+        return excess
+
+    def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
+        """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
+
+        An inequality between nodes is kept by constraining it where the gait `parameters` comes closest to it: see
+        `colloc.collocation.worst_instants`.
+        """
+        gait, blocks = self.member(parameters), (self.assembly.objective, *self.assembly.blocks)
+        worst = zip(self.checks, worst_instants(gait, self.mesh, self.checks), strict=True)
+        moved = iter([_check_parameters(self.problem, times, held_shares(check, gait, times)) for check, times in worst])
+        return [next(moved) if b.parameters.shape[0] else b.parameters for b in blocks]
+
+
+def _check_parameters(problem: Problem, times: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    matrix = problem.gait.angle_matrix(times, problem.body.n_joint)
+    return np.vstack([matrix.transpose(0, 2, 1).reshape(times.size, -1).T, shares])
+
+
+def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = ()) -> Transcription:
+    """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges.
+
+    Self-contact is constrained between links two apart, and between the pairs `far` of links farther apart: see
+    `colloc.search.far_contact`.
+    """
+    mesh = problem_mesh(problem, edges)
+    layout = problem_layout(problem, mesh)
+    checks = shape_checks(problem.body, far)
+    point = point_function(problem.formulation, problem.body, problem.friction)
+    n_joint = problem.body.n_joint
+    n_parameter = layout.parameters.shape[0]
+
+    sites = np.empty(mesh.n_point, dtype=int)
+    sites[mesh.points] = mesh.sites
+    point_gather = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces])
+    blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
+    for check in checks:
+        function = gait_check(check, n_joint, n_parameter)
+        middles = _check_parameters(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]), np.full(mesh.n, -1.0))
+        blocks[check.name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
+    blocks["shape speed"] = (
+        mean_square(ca.DM(problem.gait.mean_square_rate(n_joint) / RADIANS**2)),
+        layout.parameters,
+        np.empty((0, 1)),
+    )
+
+    rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
+    groups = [
+        gait_group("angles", layout.angles, layout.parameters, problem.gait.angle_matrix(mesh.times, n_joint), layout.n),
+        gait_group("rates", layout.rates, layout.parameters, rates, layout.n),
+        *_point_groups(problem, point.n_out, mesh.n_point, layout.n),
+        *_orientation_groups(problem, mesh, layout),
+        quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
+        quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
+        *(_check_group(check.name, problem, mesh.n, layout.n) for check in checks),
+        Group(
+            "shape speed",
+            np.array([problem.smallest_shape_speed**2]),
+            np.array([np.inf]),
+            sparse.csr_matrix((1, layout.n)),
+            {"shape speed": sparse.eye(1, format="csr")},
+        ),
+    ]
+    velocity = VelocityMap(problem.body, problem.friction, mesh.n_point)
+
+    def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
+        _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
+        return velocity(angles, rates, z, delta)
+
+    objective = Block(
+        minus_efficiency(),
+        np.array([[layout.distance[0, -1]], [layout.work[0, -1]]]),
+        sparse.eye(1, format="csr"),
+        np.empty((0, 1)),
+    )
+    ends = np.cumsum([0] + [g.m for g in groups])
+    return Transcription(
+        problem,
+        mesh,
+        layout,
+        Assembly(
+            layout.n,
+            objective,
+            tuple(
+                Block(
+                    function,
+                    gather,
+                    stacked(groups, name, function.n_out * gather.shape[1]),
+                    parameters,
+                    velocity_map if name == "point" and problem.formulation != LIFTED else None,
+                )
+                for name, (function, gather, parameters) in blocks.items()
+            ),
+            sparse.vstack([g.linear for g in groups]).tocsr(),
+        ),
+        *_variable_bounds(problem, layout),
+        np.concatenate([g.lower for g in groups]),
+        np.concatenate([g.upper for g in groups]),
+        {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, ends, ends[1:], strict=False)},
+        checks,
+        velocity,
+    )
+
+
+def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
+    # a function bounded by L has Fourier coefficients of at most 4 L / pi
+    lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * problem.joint_limit / np.pi
+    if problem.formulation == LIFTED:
+        friction, length = problem.friction, problem.body.length_column()
+        tangential = max(friction.mu_f, friction.mu_b) * length
+        limit = np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+        lower[layout.forces], upper[layout.forces] = -limit, limit
+    for state in (layout.distance, layout.work):
+        lower[state[0, 0]] = upper[state[0, 0]] = 0.0
+    return lower, upper
+
+
+def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
+    """The equations of every point: lifted force laws, then the balance (or the velocity map in its place)."""
+    n_law = n_out - N_RATE - 3
+    groups = [output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
+    if problem.formulation == LIFTED:
+        groups.insert(0, output_group("force law", range(n_law), n_out, n_point, n))
+    return groups
+
+
+def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Group]:
+    """theta' = omega, and how theta closes where no symmetry does it."""
+    state, rate = mesh.integration()
+    linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
+    return [equalities("orientation", linear), *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n)]
+
+
+def _check_group(name: str, problem: Problem, n_cell: int, n: int) -> Group:
+    is_joint = name.startswith("joint")
+    limit = problem.joint_limit if is_joint else 0.0
+    lower = np.full(n_cell, -limit if is_joint else -np.inf)
+    linear = sparse.csr_matrix((n_cell, n))
+    return Group(name, lower, np.full(n_cell, limit), linear, {name: sparse.eye(n_cell, format="csr")})

@@ -1,0 +1,68 @@
+"""Feasible starting points: from a gait alone to all variables of a transcription, through the fixed-point solver."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.linalg import spsolve
+
+from colloc.collocation.layout import RADIANS
+from colloc.collocation.newton_balance import balanced_near
+from colloc.collocation.program import GaitProgram
+from colloc.mechanics.balance import instant, total_power
+
+_TOLERANCE = 1e-11
+
+
+def feasible_point(
+    transcription: GaitProgram, parameters: np.ndarray, delta: float, start: np.ndarray | None = None
+) -> np.ndarray:
+    """Variables that satisfy every equation of the transcription but net rotation, for a gait and delta.
+
+    Parameters
+    ----------
+    transcription : GaitProgram
+    parameters : (n_parameter,)
+        Gait parameters.
+    delta : float
+        Regularisation speed, in the units of the problem's class of gaits.
+    start : (3, n_point), optional
+        Tail velocities near by, per radian of phase; they only save steps.
+
+    Returns
+    -------
+    (n,) array
+    """
+    problem, layout, gait = transcription.problem, transcription.layout, transcription.member(parameters)
+    mesh = transcription.phase_mesh(gait)
+    x = np.zeros(layout.n)
+    x[layout.parameters[:, 0]] = parameters
+    slow = delta * gait.delta_unit / RADIANS
+    angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
+    z, _ = balanced_near(problem.body, problem.friction, angles, rates, slow, start, _TOLERANCE)
+    now = instant(problem.body, problem.friction, angles, rates, z, slow)
+
+    state, rate = mesh.integration()
+    # theta_0 = 0 closes the system; the matrix is block bidiagonal
+    theta = np.zeros(mesh.n_site)
+    theta[1:] = spsolve(state[:, 1:].tocsc(), RADIANS * (rate @ z[2]))
+    site_of_point = np.empty(mesh.n_point, dtype=int)
+    site_of_point[mesh.points] = mesh.sites
+    cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
+
+    if problem.gait.symmetry == "antipodal":
+        theta -= 0.5 * theta[-1]
+    else:  # turn the motion into +x
+        c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
+        _, quadrature = mesh.quadrature()
+        dx, dy = quadrature @ (c * cx[0] - s * cy[0]), quadrature @ (s * cx[0] + c * cy[0])
+        theta -= np.arctan2(dy.sum(), dx.sum())
+    c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
+    _, quadrature = mesh.quadrature()
+    x[layout.distance[0, 1:]] = np.cumsum(RADIANS * (quadrature @ (c * cx[0] - s * cy[0])))
+    x[layout.work[0, 1:]] = np.cumsum(RADIANS * (quadrature @ total_power(now.velocity, now.force)[0]))
+    x[layout.theta[0]] = theta
+    if layout.z.size:
+        x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
+    if layout.forces.size:
+        x[layout.forces] = np.concatenate(now.force)
+    return x

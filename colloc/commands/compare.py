@@ -1,0 +1,144 @@
+"""Command line: two results side by side: what was asked, what came out, and whether it is the same gait.
+
+Exit codes: 0 the same optimum, 1 different, 2 bad file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from colloc.command_end import OK, run
+from colloc.commands.options import add_printing, new_parser
+from colloc.results.certificate import gait_path
+from colloc.results.distinct_optima import SAME_EFFICIENCY, SAME_GAIT
+from colloc.results.solution import Solution
+from colloc.results.store import load
+
+DIFFERENT = 1
+_EPILOG = """\
+Paths in shape space are compared as sets of shapes: start phase, pacing and direction do not count, nor do mirror image
+and the body read from its other end. Exit codes: 0 the same optimum; 1 different; 2 bad file.
+
+  colloc compare results/a.h5 results/b.h5"""
+_PHASES = 800
+
+
+def path_distance(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest distance [rad] from a point of one closed polygon of shapes to the other polygon, both ways.
+
+    Parameters
+    ----------
+    a, b : (n_joint, n_time)
+        Vertices; the first and the last are joined.
+    """
+    return max(_farthest(a, b), _farthest(b, a))
+
+
+def _farthest(points: np.ndarray, polygon: np.ndarray) -> float:
+    start, edge = polygon, np.roll(polygon, -1, axis=1) - polygon
+    length2 = np.maximum((edge**2).sum(axis=0), 1e-300)
+    worst = 0.0
+    for point in points.T:
+        away = point[:, None] - start
+        along = np.clip((away * edge).sum(axis=0) / length2, 0.0, 1.0)
+        worst = max(worst, float(((away - along * edge) ** 2).sum(axis=0).min()))
+    return worst**0.5
+
+
+def gait_distance(a: Solution, b: Solution) -> float | None:
+    """Distance [rad] of two gaits as paths, modulo mirror image and naming from the other end; None for other bodies."""
+    if a.problem.body != b.problem.body:
+        return None
+    t = np.arange(_PHASES) / _PHASES
+    p, q = (gait_path(solution)(t)[0] for solution in (a, b))
+    images = [q, -q] + ([q[::-1], -q[::-1]] if a.problem.body.symmetric else [])
+    return min(path_distance(p, image) for image in images)
+
+
+def changed_fields(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
+    """Fields of the two problems that differ, as text."""
+    first, second = a.problem.to_dict(), b.problem.to_dict()
+    names = [name for name in {**first, **second} if first.get(name) != second.get(name)]
+    return [(name, _short(first.get(name)), _short(second.get(name))) for name in names]
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 44 else text[:41] + "..."
+
+
+def rows(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
+    """What came out, as text: name, first, second."""
+    return [("", a.problem.name, b.problem.name), *zip(_NAMES, _column(a), _column(b), strict=True)]
+
+
+_NAMES = ("status", "efficiency", "  at delta -> 0", "distance d", "work W", "delta", "intervals", "iterations", "seconds")
+
+
+def _column(solution: Solution) -> list[str]:
+    last, certificate, measured = solution.last, solution.certificate, solution.measured
+    error = f" +- {certificate.efficiency_error:.0e}" if certificate.replayed else " (not replayed)"
+    return [
+        solution.status,
+        f"{measured.efficiency:.6f}{error}",
+        f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
+        f"{measured.distance:.6f}",
+        f"{measured.work:.6f}",
+        f"{last.delta:.1e}",
+        str(last.edges.size - 1),
+        str(sum(level.iterations for level in solution.levels)),
+        f"{solution.seconds:.1f}",
+    ]
+
+
+def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
+    """Whether the two are the same optimum, and why, in a sentence."""
+    values = [s.measured.efficiency for s in (a, b)]
+    difference = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
+    apart = gait_distance(a, b)
+    if apart is None:
+        return False, f"other bodies; efficiencies differ by {100 * difference:.3g} %."
+    text = f"efficiencies differ by {100 * difference:.3g} %, paths by at most {apart:.3g} rad"
+    same = difference <= SAME_EFFICIENCY and apart <= 2 * SAME_GAIT
+    return same, f"{'the same optimum' if same else 'different'}: {text}."
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("compare", "Hold two results against each other.", _EPILOG)
+    parser.add_argument("first", metavar="A.h5")
+    parser.add_argument("second", metavar="B.h5")
+    add_printing(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _compare, arguments)
+
+
+def _compare(options: argparse.Namespace) -> int:
+    a, b = load(options.first), load(options.second)
+    same, sentence = verdict(a, b)
+    if options.json:
+        table = {name.strip() or "name": [x, y] for name, x, y in rows(a, b)}
+        fields = {name: [x, y] for name, x, y in changed_fields(a, b)}
+        print(json.dumps({"same": same, "verdict": sentence, "results": table, "problem": fields}))
+        return OK if same else DIFFERENT
+    lines = [("", Path(options.first).name, Path(options.second).name), *rows(a, b)]
+    changes = changed_fields(a, b) if not options.quiet else []
+    if changes:
+        lines += [("", "", ""), ("problem:", "", ""), *((f"  {name}", x, y) for name, x, y in changes)]
+    widths = [max(len(line[k]) for line in lines) for k in range(2)]
+    print("\n".join(f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines))
+    print(sentence)
+    return OK if same else DIFFERENT
+
+
+if __name__ == "__main__":
+    sys.exit(main())

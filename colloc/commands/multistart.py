@@ -1,0 +1,169 @@
+"""Command line: many starts of a problem file, in parallel and resumable; distinct optima with their frequencies.
+
+Exit codes: 0 at least one certified optimum, 2 bad problem or option, 3 none found, 130 interrupted (what is done is kept).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from colloc.command_end import NONE_FOUND, OK, run
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import read_problem_file
+from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
+from colloc.results.distinct_optima import CRASHED, ERROR, STATUSES, TIME_LIMIT, Basin, Outcome, basins, counts
+from colloc.results.solution import SOLVED
+from colloc.system.errors import ProblemError
+from colloc.system.progress import StatusLine
+
+_MOST_BASINS_SHOWN = 12
+_RETRIED = (ERROR, CRASHED, TIME_LIMIT)
+
+
+_EPILOG = """\
+Exit codes: 0 at least one certified optimum; 2 bad problem or option; 3 none found; 130 interrupted.
+
+Start k is the same gait whatever --starts and --workers are. What an archive holds already is not solved again, so the
+same command goes on after Ctrl-C, and a larger --starts adds to it.
+
+  colloc multistart problems/three_link.py --starts 100 --workers 2"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    what = "Solve a problem from many seeded random starts and list the distinct certified optima."
+    parser = new_parser("multistart", what, _EPILOG)
+    add_problem(parser)
+    parser.add_argument("--starts", type=int, default=20, metavar="N", help="starts 0 to N-1 (default: 20)")
+    parser.add_argument("--seed", type=int, default=0, help="of the sampler (default: 0)")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes, one BLAS thread each (default: 1)")
+    parser.add_argument("--sampler", choices=SAMPLERS, default=LATIN_HYPERCUBE, help="perturbed: near the problem's guess")
+    parser.add_argument("--time-limit", type=float, default=300.0, metavar="S", help="seconds for one start (default: 300)")
+    parser.add_argument("--retry", action="store_true", help="solve again what ended in an error, a crash or the time limit")
+    add_bound(parser)
+    parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.starts.h5)")
+    add_printing(parser)
+    return parser
+
+
+def _checked(options: argparse.Namespace) -> None:
+    for name, least in (("starts", 1), ("workers", 1), ("seed", 0)):
+        if getattr(options, name) < least:
+            raise ProblemError(f"--{name} must be at least {least}, not {getattr(options, name)}.")
+    if not options.time_limit > 0:
+        raise ProblemError(f"--time-limit must be positive, not {options.time_limit:g}.")
+
+
+def outcome_line(outcome: Outcome) -> str:
+    """One line about a start."""
+    return f"{outcome.start:6d} {outcome.efficiency:11.6f} {outcome.iterations:6d} {outcome.seconds:8.2f}  {outcome.status}"
+
+
+OUTCOME_HEADER = " start  efficiency   iter  seconds  status"
+
+
+def summary_lines(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[Basin]) -> list[str]:
+    """What a person wants to know at the end."""
+    tally = ", ".join(f"{n} {status}" for status, n in counts(outcomes).items())
+    lines = [f"{problem.name}: {len(outcomes)} starts: {tally}; {len(found)} distinct optima"]
+    for basin in found[:_MOST_BASINS_SHOWN]:
+        share = f"{len(basin.starts)} of {len(outcomes)} starts"
+        floor = "  on the bound smallest_shape_speed" if on_speed_floor(problem, basin.best.gait) else ""
+        lines.append(f"  efficiency {basin.best.efficiency:.6f}  {share:<20s} best: start {basin.best.start}{floor}")
+    if len(found) > _MOST_BASINS_SHOWN:
+        lines.append(f"  ... and {len(found) - _MOST_BASINS_SHOWN} more")
+    failures = [o for o in outcomes if o.status != SOLVED]
+    lines += [f"  start {o.start}: {o.status}: {o.message}" for o in failures[:_MOST_BASINS_SHOWN]]
+    return lines
+
+
+def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[Basin], path: Path) -> dict:
+    """The same as one JSON object."""
+    return {
+        "name": problem.name,
+        "problem_hash": problem.hash,
+        "file": str(path),
+        "starts": len(outcomes),
+        "counts": {status: counts(outcomes).get(status, 0) for status in STATUSES},
+        "optima": [
+            {
+                "efficiency": b.best.efficiency,
+                "frequency": b.frequency,
+                "starts": list(b.starts),
+                "on_speed_floor": on_speed_floor(problem, b.best.gait),
+                "gait": {key: getattr(b.best.gait, key).tolist() for key in ("mean", "cos", "sin")},
+            }
+            for b in found
+        ],
+        "failures": [{"start": o.start, "status": o.status, "message": o.message} for o in outcomes if o.status != SOLVED],
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    command = " ".join(["colloc multistart", *(sys.argv[1:] if arguments is None else arguments)])
+    return run(_parser(), lambda options: _run(options, command), arguments)
+
+
+def _run(options: argparse.Namespace, command: str) -> int:
+    _checked(options)
+    problem = changed(read_problem_file(options.problem).problem, options)
+    path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
+    # heavy imports only now: a bad problem is refused at once
+    from colloc.bounds.optimality_gap import gap_line, upper_bound
+    from colloc.results.archive import Archive, load_archive, save_archive
+    from colloc.studies.campaign import run_starts
+
+    quiet = options.quiet or options.json
+    table = not quiet and sys.stdout.isatty()
+    archive = Archive(problem, options.sampler, options.seed, command)
+    if path.exists():
+        before = load_archive(path)
+        if (before.problem.hash, before.sampler, before.seed) != (problem.hash, options.sampler, options.seed):
+            raise ProblemError(f"{path} belongs to another problem, sampler or seed; choose another --output.")
+        archive.outcomes = before.outcomes
+    done = {k for k, o in archive.outcomes.items() if not (options.retry and o.status in _RETRIED)}
+    todo = [k for k in range(options.starts) if k not in done]
+    if not quiet:
+        print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go", flush=True)
+    if table:
+        print(OUTCOME_HEADER, flush=True)
+    begin = time.perf_counter()
+    interrupted = False
+    settings = {"sampler": options.sampler, "seed": options.seed, "workers": options.workers, "time_limit": options.time_limit}
+    try:
+        with StatusLine(enabled=not quiet) as line:
+            line.say(f"{problem.name}: 0 of {len(todo)} starts")
+            for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
+                archive.outcomes[outcome.start] = outcome
+                save_archive(archive, path)  # on the disk before it is reported
+                if table:
+                    line.clear()
+                    print(outcome_line(outcome), flush=True)
+                left = (time.perf_counter() - begin) / count * (len(todo) - count)
+                line.say(f"{problem.name}: {count} of {len(todo)} starts", left)
+    except KeyboardInterrupt:
+        interrupted = True
+    save_archive(archive, path)
+    outcomes = [o for o in archive.ordered() if o.start < options.starts]
+    found = basins(problem, outcomes)
+    if options.json:
+        print(json.dumps(summary_dict(problem, outcomes, found, path)))
+    else:
+        lines = summary_lines(problem, outcomes, found)
+        if found:
+            best = max(basin.best.efficiency for basin in found)
+            lines.append(gap_line(problem, best, upper_bound(problem, path.parent, compute=options.bound)))
+        print("\n".join([*lines, f"  saved {path}"]))
+    if interrupted:
+        raise KeyboardInterrupt("run the same command again to go on.")
+    return OK if found else NONE_FOUND
+
+
+if __name__ == "__main__":
+    sys.exit(main())

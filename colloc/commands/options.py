@@ -1,0 +1,134 @@
+"""What the subcommands share: one way to refuse bad options, and to name the problem and the output."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from colloc.gaits.problem import FORMULATIONS, Problem
+from colloc.system.errors import ProblemError
+
+_LONGEST_NAME = 220
+"""Bytes of the name of an output: systems allow 255, and files under way have longer names than finished ones."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Refuses bad options in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ProblemError(f"{message}; see {self.prog} --help.")
+
+
+def new_parser(command: str, description: str, epilog: str) -> Parser:
+    """The parser of ``colloc COMMAND``; line breaks of the epilog are kept."""
+    style = argparse.RawDescriptionHelpFormatter
+    return Parser(prog=f"colloc {command}", description=description, epilog=epilog, formatter_class=style)
+
+
+def add_problem(parser: argparse.ArgumentParser) -> None:
+    """The problem file, and the changes to it that every solving command takes (see `changed`)."""
+    parser.add_argument("problem", help="a Python file that states PROBLEM, for example problems/three_link.py")
+    parser.add_argument("--delta", type=float, metavar="SPEED", help="final regularisation speed of friction")
+    parser.add_argument("--delta-start", type=float, metavar="SPEED", help="where the continuation in delta begins")
+    parser.add_argument("--mesh", dest="intervals", type=int, metavar="N", help="intervals of the first mesh")
+    parser.add_argument("--mesh-tolerance", type=float, metavar="TOL", help="relative efficiency error to refine to; 0: never")
+    parser.add_argument("--scheme", metavar="NAME", help="trapezoid, hermite-simpson, gauss-N or radau-N")
+    parser.add_argument("--formulation", choices=FORMULATIONS, help="how the balance becomes constraints")
+
+
+_CHANGES = ("delta", "delta_start", "intervals", "mesh_tolerance", "scheme", "formulation")
+
+
+def changed(problem: Problem, options: argparse.Namespace) -> Problem:
+    """The problem with the changes of `add_problem`, and with the gait of the result that ``--start`` names as guess.
+
+    Raises
+    ------
+    ProblemError
+        If a value cannot be used, or the gait cannot be the guess; the message names the file.
+    """
+    changes = {name: getattr(options, name) for name in _CHANGES if getattr(options, name) is not None}
+    problem = problem.with_(**changes) if changes else problem
+    if getattr(options, "start", None) is None:
+        return problem
+    from colloc.results.store import load
+
+    gait = load(options.start).gait
+    try:
+        return problem.with_(guess=gait)
+    except ProblemError as error:
+        raise ProblemError(f"the gait of {options.start} cannot be the guess: {error}") from None
+
+
+def add_result(parser: argparse.ArgumentParser) -> None:
+    """The results file that a command reads."""
+    parser.add_argument("result", metavar="FILE.h5", help="a result that colloc solve wrote")
+
+
+def add_printing(parser: argparse.ArgumentParser) -> None:
+    """``--json`` and ``--quiet``."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")
+    parser.add_argument("--quiet", action="store_true", help="no progress, only the final summary")
+
+
+def add_bound(parser: argparse.ArgumentParser) -> None:
+    """``--bound``."""
+    parser.add_argument(
+        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.json)"
+    )
+
+
+def output_kind(options: argparse.Namespace, kinds: Sequence[str]) -> str:
+    """Which of several kinds of files to write: ``--format``, else the ending of ``--output``, else the first.
+
+    Raises
+    ------
+    ProblemError
+        If ``--output`` ends in something else.
+    """
+    ending = "" if _is_folder(options.output) else Path(options.output).suffix
+    if options.format is None and ending and ending.lstrip(".") not in kinds:
+        raise _wrong_ending(options.output, " or ".join(f".{kind}" for kind in kinds))
+    return options.format or ending.lstrip(".") or kinds[0]
+
+
+def _is_folder(output: str | None) -> bool:
+    """Whether what the user named is a folder: by a separator at its end, by having no ending, or because it is one."""
+    return output is None or output.endswith(("/", os.sep)) or not Path(output).suffix or os.path.isdir(output)
+
+
+def _wrong_ending(output: str, wanted: str) -> ProblemError:
+    return ProblemError(f"--output {output} should end in {wanted}; a folder of that name is written {output}/.")
+
+
+def output_path(output: str | None, default: Path) -> Path:
+    """The file to write, in a folder that exists and can be written.
+
+    Parameters
+    ----------
+    output : str or None
+        What the user named: a folder, or a file with the suffix of `default`; None: `default`.
+    default : Path
+
+    Raises
+    ------
+    ProblemError
+        If nothing can be written there, or it ends in another suffix.
+    """
+    path = default if output is None else Path(output) / default.name if _is_folder(output) else Path(output)
+    if path.suffix != default.suffix:
+        raise _wrong_ending(str(path), default.suffix)
+    if len(os.fsencode(path.name)) > _LONGEST_NAME:
+        raise ProblemError(
+            f"the file name {path.name[:30]}... is too long: choose an --output of at most {_LONGEST_NAME} bytes."
+        )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ProblemError(f"cannot make the folder {path.parent}: {error.strerror or error}.") from None
+    if not os.access(path.parent, os.W_OK) or path.is_dir():
+        raise ProblemError(f"cannot write {path}; choose another --output.")
+    return path

@@ -1,0 +1,266 @@
+"""Command line: solve a problem file, certify the result, save it and draw it.
+
+Exit codes: 0 solved, 2 bad problem or option, 3 not converged, 4 certificate failed, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from colloc.command_end import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
+from colloc.gaits.gait_fields import fields
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.paths import ArcPath
+from colloc.gaits.problem import Problem, Reference
+from colloc.gaits.problem_file import read_problem_file
+from colloc.level import Level
+from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
+from colloc.system.errors import CollocError, StoreError
+from colloc.system.progress import StatusLine, duration
+
+if TYPE_CHECKING:
+    from colloc.bounds.sampled import Bound
+
+_MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
+"""Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
+EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED}
+_EPILOG = """\
+Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
+
+A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. Levels are kept in NAME.partial.h5 as they
+end; after Ctrl-C or a crash the same command goes on from there.
+
+  colloc solve problems/three_link.py
+  colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
+  colloc solve mine.py --start results/three_link.h5      begin with the gait of another result"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    what = "Find the gait of largest efficiency d/W for a problem file, and certify it by an independent replay."
+    parser = new_parser("solve", what, _EPILOG)
+    add_problem(parser)
+    parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
+    parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
+    parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
+    add_bound(parser)
+    parser.add_argument("--compile", action="store_true", help="first compile what solves of this body and friction evaluate")
+    parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
+    add_printing(parser)
+    return parser
+
+
+def level_line(level: Level) -> str:
+    """One line about a level of the continuation."""
+    flag = "" if level.optimal else f"   ({level.status})"
+    return (
+        f"{level.delta:9.1e} {level.edges.size - 1:6d} {level.efficiency:11.6f} {level.distance:9.5f} {level.work:9.5f} "
+        f"{level.iterations:6d} {level.seconds:8.2f}{flag}"
+    )
+
+
+LEVEL_HEADER = "    delta   mesh  efficiency         d         W   iter  seconds"
+
+
+def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
+    """What a person wants to know at the end."""
+    lines = [f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"]
+    certificate = solution.certificate
+    if certificate.replayed:
+        lines += [
+            f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
+            f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} for delta -> 0",
+            f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}      "
+            f"at delta {solution.last.delta:.0e}",
+        ]
+        lines += [f"  gait            {text}" for text in _gait_lines(solution)]
+        lines += [f"  {check.line()}" for check in certificate.checks]
+        if reference is not None:
+            difference = certificate.efficiency - reference.efficiency
+            agree = "agrees with" if abs(difference) <= reference.tolerance else "DIFFERS from"
+            lines.append(f"  {agree} {reference.efficiency:g} +- {reference.tolerance:g} ({reference.source})")
+    if solution.message:
+        lines.append(f"  {solution.message}")
+    return lines
+
+
+def _gait_lines(solution: Solution) -> list[str]:
+    gait = solution.gait
+    lines = [f"class: {solution.problem.gait.describe()}"]
+    if isinstance(gait, Fourier):
+        for j in range(gait.n_joint):
+            terms = [f"{gait.mean[j]:+.4f}"]
+            for k in range(gait.n_harmonic):
+                wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
+                terms.append(f"{gait.cos[j, k]:+.4f} cos {wave} {gait.sin[j, k]:+.4f} sin {wave}")
+            lines.append(f"joint {j + 1}: " + " ".join(terms))
+        return lines
+    what = f"path of length {gait.length:.4f} rad"
+    if isinstance(gait, ArcPath):
+        turned = "" if gait.winding is None else f", winding {gait.winding}"
+        return [*lines, f"{what}{turned}, largest curvature {np.abs(gait.curvatures()).max():.3f} per rad"]
+    return [*lines, what, *(f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in gait.corners.T)]
+
+
+def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
+    """The same as one JSON object."""
+    certificate = solution.certificate
+    result: dict = {
+        "name": solution.problem.name,
+        "status": solution.status,
+        "message": solution.message,
+        "file": str(path),
+        "problem_hash": solution.problem.hash,
+        "seconds": solution.seconds,
+        "delta": solution.last.delta,
+        "efficiency": solution.efficiency,
+        "distance": solution.distance,
+        "work": solution.work,
+        "iterations": sum(level.iterations for level in solution.levels),
+        "class": solution.problem.gait.describe(),
+        "gait": fields(solution.gait),
+        "certificate": None,
+        "reference": None,
+        "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
+        "versions": solution.versions,
+    }
+    if certificate.replayed:
+        result["certificate"] = {
+            "passed": certificate.passed,
+            "efficiency": certificate.efficiency,
+            "efficiency_error": certificate.efficiency_error,
+            "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
+            "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
+        }
+    if reference is not None:
+        keys = ("efficiency", "tolerance", "source")
+        result["reference"] = {key: getattr(reference, key) for key in keys}
+    return result
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _solve, arguments)
+
+
+def _solve(options: argparse.Namespace) -> int:
+    stated = read_problem_file(options.problem)
+    problem = changed(stated.problem, options)
+    path = output_path(options.output, Path("results") / f"{problem.name}.h5")
+    # heavy imports only now: a bad problem is refused at once
+    from colloc.bounds.optimality_gap import gap_line, upper_bound
+    from colloc.results.store import save
+
+    quiet = options.quiet or options.json
+    if not quiet and problem.intervals > _MANY_INTERVALS:
+        seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
+        hint = "mesh_tolerance refines a small mesh where it has to be fine"
+        print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
+    if options.compile:
+        from colloc.search.compiled_problem import compile_problem
+
+        with StatusLine(enabled=not quiet) as line:
+            line.say("compiling")
+            compile_problem(problem)
+    solution = _solved(problem, stated.source, path, options.fresh, quiet)
+    if solution.status != SOLVED:
+        path = path.with_suffix(".failed.h5")
+    save(solution, path)
+    _partial(path).unlink(missing_ok=True)
+    bound, saved, complaints = None, str(path), []
+    with StatusLine(enabled=not quiet) as line:
+        if options.bound:
+            line.say("computing an upper bound on every gait")
+        try:
+            bound = upper_bound(problem, path.parent, compute=options.bound)
+        except CollocError as error:  # what is solved is not lost for it
+            complaints.append(f"no bound: {error}")
+    if options.json:
+        print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
+    else:
+        lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
+        print("\n".join(lines), flush=True)
+    if not options.no_figure:
+        from colloc.pictures.figure import save_figure, solution_figure
+
+        with StatusLine(enabled=not quiet) as line:
+            line.say("drawing")
+            try:
+                save_figure(solution_figure(solution), path)
+                saved += f", {path.with_suffix('.png')}"
+            except CollocError as error:
+                complaints.append(f"no figure: {error}")
+    if not options.json:
+        print(f"  saved {saved}")
+    for complaint in complaints:
+        print(f"colloc: {complaint}", file=sys.stderr)
+    return BAD_PROBLEM if complaints else EXIT[solution.status]
+
+
+def _partial(path: Path) -> Path:
+    """Where the levels of a run are kept while it is under way."""
+    return path.with_name(f"{path.name.removesuffix('.h5').removesuffix('.failed')}.partial.h5")
+
+
+def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool) -> Solution:
+    """The solution, from the levels that an interrupted run left if there are any; each level is kept as it ends."""
+    from colloc.results.store import load, save
+    from colloc.search.optimise import maximise_efficiency
+
+    partial = _partial(path)
+    levels: list[Level] = []
+    if partial.exists() and not fresh:
+        try:
+            before = load(partial)
+        except StoreError as error:
+            raise StoreError(f"{error} It was left by an interrupted run; --fresh begins again.") from None
+        if before.problem.hash == problem.hash:
+            levels = list(before.levels)
+    table = not quiet and sys.stdout.isatty()
+    if levels and not quiet:
+        print(f"going on from {partial}: {len(levels)} levels, the last at delta = {levels[-1].delta:.1e}", flush=True)
+    if table:
+        print(LEVEL_HEADER, flush=True)
+    begin = time.monotonic()
+    before_levels = tuple(levels)
+    try:
+        with StatusLine(enabled=not quiet) as line:
+            line.say(f"{problem.name}: building")
+
+            def ended(level: Level) -> None:
+                levels.append(level)
+                save(Solution(problem, levels, source=source, message="interrupted."), partial)
+                if table:
+                    line.clear()
+                    print(level_line(level), flush=True)
+                left = levels_left(problem, level) * (time.monotonic() - begin) / (len(levels) - len(before_levels))
+                what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
+                line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
+
+            solution = maximise_efficiency(problem, ended, before_levels)
+    except KeyboardInterrupt:
+        if not levels:
+            raise
+        raise KeyboardInterrupt(f"{len(levels)} levels are kept in {partial}; the same command goes on from there.") from None
+    solution.source = source
+    return solution
+
+
+def levels_left(problem: Problem, level: Level) -> int:
+    """Levels a solve will probably still take after this one: one a decade of delta, and one on a refined mesh."""
+    if level.delta <= problem.delta:
+        return 1
+    return math.ceil(math.log10(level.delta / problem.delta) - 1e-9) + (problem.mesh_tolerance > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

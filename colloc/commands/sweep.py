@@ -1,0 +1,193 @@
+"""Command line: run a study file over processes or a Dask cluster; resumable, and nothing finished is ever lost.
+
+Exit codes: 0 every cell has a certified gait, 2 bad study, option or folder, 3 some cells have none, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Executor
+from dataclasses import replace
+from pathlib import Path
+
+from colloc.command_end import INTERRUPTED, NONE_FOUND, OK, run
+from colloc.commands.options import add_printing, new_parser
+from colloc.studies.study import Study, read_study_file
+from colloc.system.errors import ProblemError, StoreError
+
+_SAVE_EVERY = 60.0
+_MOST_FAILURES_SHOWN = 12
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser(
+        "sweep",
+        "Solve every problem of a study file; starts travel between neighbours. What is done is not solved again.",
+        "Exit codes: 0 every cell has a certified gait; 2 bad study, option or folder; 3 some cells have none;\n"
+        "130 interrupted (what is done is kept). A study file is Python code, and is executed.",
+    )
+    parser.add_argument("study", help="a Python file that states STUDY, for example studies/friction_plane.py")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes, one BLAS thread each (default: 1)")
+    parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster (tcp://host:8786), or 'local'")
+    parser.add_argument("--chunk", type=int, metavar="N", help="cells to a task, instead of the study's own number")
+    parser.add_argument("--retry", action="store_true", help="solve again what ended in an error, a crash or the time limit")
+    parser.add_argument("--output", metavar="FOLDER", default="results", help="for NAME.nc and NAME.study/ (default: results)")
+    add_printing(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    command = " ".join(["colloc sweep", *(sys.argv[1:] if arguments is None else arguments)])
+    return run(_parser(), lambda options: _study(options, command), arguments)
+
+
+def _study(options: argparse.Namespace, command: str) -> int:
+    for name, value in (("workers", options.workers), ("chunk", options.chunk)):
+        if value is not None and value < 1:
+            raise ProblemError(f"--{name} must be at least 1, not {value}.")
+    study, source = read_study_file(options.study)
+    if options.chunk is not None:
+        study = replace(study, chunk=options.chunk)
+    return _run(study, source, command, options)
+
+
+def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | None, int]:
+    """What runs the tasks (None: processes), and how many workers it has."""
+    if options.dask is None:
+        return None, options.workers
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ProblemError("--dask needs the package distributed: pip install 'colloc[dask]'.") from None
+    try:
+        if options.dask == "local":
+            client = Client(n_workers=options.workers, threads_per_worker=1, dashboard_address=None)
+        else:
+            client = Client(options.dask, timeout=20)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise ProblemError(f"no Dask scheduler at {options.dask}: {error}") from None
+    return (lambda n: client.get_executor(pure=False)), max(1, sum(client.nthreads().values()))
+
+
+def _run(study: Study, source: str, command: str, options: argparse.Namespace) -> int:
+    # heavy imports only now: a bad study is refused at once
+    from colloc.studies.run import StudyRun
+    from colloc.system.file_lock import locked
+
+    out = Path(options.output)
+    folder, quiet = out / f"{study.name}.study", options.quiet or options.json
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"cannot make the folder {folder}: {error.strerror or error}.") from None
+    if not (os.access(folder, os.W_OK) and os.access(out, os.W_OK)):
+        raise StoreError(f"cannot write in {out}; choose another --output.")
+    with locked(folder / "lock"):
+        run = StudyRun(study, folder, retry=options.retry)
+        if not quiet:
+            _announce(run, folder)
+        interrupted = _work(run, options, quiet, lambda: _save(run, out, source, command))
+        path = _save(run, out, source, command)
+    if options.json:
+        print(json.dumps(_summary(run, path)))
+    else:
+        print("\n".join(_summary_lines(run, path)))
+    if interrupted:
+        print("colloc: interrupted; what is done is kept, and the same command goes on from there.", file=sys.stderr)
+        return INTERRUPTED
+    return OK if all(state.best for state in run.cells.values()) else NONE_FOUND
+
+
+def _announce(run, folder: Path) -> None:
+    todo, total = len(run.missing), len(run.cells)
+    print(f"{run.study.name}: {total} cells, {total - todo} done already or without a problem, {todo} to go", flush=True)
+    if run.damaged:
+        print(f"  {run.damaged} damaged records in {folder} were left out; their cells are solved again", flush=True)
+
+
+def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path]) -> bool:
+    """Work until all is done, or interrupted."""
+    from colloc.studies.table import cell_text
+    from colloc.system.task_pool import process_pool
+
+    executor, workers = _executor(options)
+    begin = time.perf_counter()
+    due = begin + _SAVE_EVERY
+    number = 0
+    try:
+        for progress in run.run(workers=workers, executor=executor or process_pool):
+            if progress.round != number:
+                number, begin = progress.round, time.perf_counter()
+            if not quiet:
+                best = progress.state.best
+                what = f"{best.outcome.efficiency:9.6f}" if best else "     none"
+                tries = Counter(a.outcome.status for a in progress.new)
+                told = ", ".join(f"{n} {status}" for status, n in tries.items()) or "nothing to improve"
+                left = (time.perf_counter() - begin) / progress.done * (progress.total - progress.done)
+                print(
+                    f"{cell_text(run.study, progress.cell)}: {what}  ({told}; round {number}: {progress.done} of "
+                    f"{progress.total}, {left:.0f} s left)",
+                    flush=True,
+                )
+            if time.perf_counter() > due:
+                saving = time.perf_counter()
+                save()
+                due = time.perf_counter() + max(_SAVE_EVERY, 20 * (time.perf_counter() - saving))
+    except KeyboardInterrupt:
+        for child in multiprocessing.active_children():
+            child.terminate()
+        return True
+    except BrokenExecutor as error:
+        raise StoreError(f"no worker could be started ({error}); what is done is kept.") from None
+    return False
+
+
+def _save(run, out: Path, source: str, command: str) -> Path:
+    from colloc.bounds.optimality_gap import CACHE
+    from colloc.bounds.sampled import known_bound
+    from colloc.gaits.problem import Problem
+    from colloc.studies.store import save_study
+    from colloc.studies.table import study_table
+
+    cache = out / CACHE
+
+    def bound(problem: Problem) -> float | None:
+        known = known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
+        return None if known is None else known.sampled
+
+    return save_study(study_table(run, bound), out / f"{run.study.name}.nc", source=source, command=command)
+
+
+def _summary(run, path: Path) -> dict:
+    from colloc.studies.table import NO_PROBLEM
+
+    counts = Counter(
+        "solved" if s.best else NO_PROBLEM if s.problem is None else "no certified gait" for s in run.cells.values()
+    )
+    return {"name": run.study.name, "file": str(path), "cells": len(run.cells), "counts": dict(counts)}
+
+
+def _summary_lines(run, path: Path) -> list[str]:
+    from colloc.studies.table import cell_text
+
+    counts = ", ".join(f"{n} {what}" for what, n in _summary(run, path)["counts"].items())
+    lines = [f"{run.study.name}: {len(run.cells)} cells: {counts}; saved {path}"]
+    failed = [(cell, state) for cell, state in run.cells.items() if not state.best]
+    for cell, state in failed[:_MOST_FAILURES_SHOWN]:
+        message = state.attempts[-1].outcome.message if state.attempts else state.message or "not tried yet"
+        lines.append(f"  {cell_text(run.study, cell)}: {message}")
+    if len(failed) > _MOST_FAILURES_SHOWN:
+        lines.append(f"  ... and {len(failed) - _MOST_FAILURES_SHOWN} more; all are in the file, with their messages")
+    return lines
+
+
+if __name__ == "__main__":
+    sys.exit(main())

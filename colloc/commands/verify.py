@@ -1,0 +1,111 @@
+"""Command line: check a result again, from the file alone and without CasADi.
+
+The gait is replayed anew by the NumPy solver, on other instants than before; optimality (KKT error, violation) is what
+the solver recorded, since it takes derivatives of the whole program.
+
+Exit codes: 0 certified, 2 bad file, 4 a check fails or the file's own certificate says something else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+
+from colloc.command_end import FAILED, OK, run
+from colloc.commands.options import add_printing, add_result, new_parser
+from colloc.results.certificate import certify
+from colloc.results.solution import Certificate, Solution
+from colloc.results.store import load
+from colloc.system.errors import ProblemError
+from colloc.system.progress import StatusLine
+
+_EPILOG = """\
+Exit codes: 0 certified; 2 bad file; 4 a check fails, or the certificate in the file says something else.
+
+CasADi is not needed: the gait in the file is replayed with the NumPy solver on a grid of instants that no earlier
+replay used. KKT error and constraint violation are the solver's own record.
+
+  colloc verify results/three_link.h5
+  colloc verify results/three_link.h5 --tolerance 1e-8"""
+_AGREEMENT = 3.0
+"""Certified and rechecked efficiency may differ by so many times the sum of their estimated errors, and 1e-9."""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("verify", "Check a result again by independent replay, without CasADi.", _EPILOG)
+    add_result(parser)
+    parser.add_argument("--tolerance", type=float, default=1e-6, metavar="TOL", help="of the replayed efficiency, relative")
+    add_printing(parser)
+    return parser
+
+
+def disagreement(recorded: Certificate, now: Certificate) -> str:
+    """A sentence if the certificate in a file is not what a new one says; empty if they agree."""
+    if not recorded.replayed:
+        return "the file holds no certificate."
+    allowed = _AGREEMENT * (recorded.efficiency_error + now.efficiency_error) + 1e-9
+    difference = now.efficiency - recorded.efficiency
+    if not abs(difference) <= allowed:
+        return f"the file certifies an efficiency of {recorded.efficiency:.8f}, which is off by {-difference:.1e}."
+    if recorded.passed and not now.passed:
+        return "the file's certificate passed all checks, the new one does not."
+    return ""
+
+
+def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
+    """A new certificate on other instants than the one in the file.
+
+    Raises
+    ------
+    ProblemError
+        If there is nothing to check.
+    """
+    solution.last  # noqa: B018  raises
+    before = solution.certificate.instants or 1600
+    return certify(solution, tolerance=tolerance, instants=2 * (3 * before // 8) + 2)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _verify, arguments)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    if not 0 < options.tolerance < 1:
+        raise ProblemError(f"--tolerance must lie between 0 and 1, not {options.tolerance:g}.")
+    solution = load(options.result)
+    with StatusLine(enabled=not (options.quiet or options.json)) as line:
+        line.say(f"{solution.problem.name}: replaying")
+        certificate = rechecked(solution, options.tolerance)
+    complaint = disagreement(solution.certificate, certificate)
+    good = certificate.passed and not complaint and solution.status == "solved"
+    if options.json:
+        checks = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks}
+        keys = ("efficiency", "efficiency_error", "efficiency_at_zero_delta", "distance", "work", "instants")
+        facts = {"file": options.result, "name": solution.problem.name, "certified": good, "complaint": complaint}
+        facts["changed"] = solution.changed
+        print(json.dumps({**facts, **{key: getattr(certificate, key) for key in keys}, "checks": checks}))
+        return OK if good else FAILED
+    print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
+    print(
+        f"  efficiency d/W  {certificate.efficiency:.8f} +- {certificate.efficiency_error:.0e} by replay "
+        f"({certificate.instants} instants)"
+    )
+    if solution.certificate.replayed:
+        recorded = solution.certificate
+        print(f"  in the file     {recorded.efficiency:.8f} +- {recorded.efficiency_error:.0e} ({recorded.instants} instants)")
+    if not options.quiet:
+        print("\n".join(f"  {check.line()}" for check in certificate.checks))
+    if solution.changed:
+        print("  the file was changed after colloc wrote it; what is said here is of the file as it is now")
+    if complaint:
+        print(f"  {complaint}")
+    if solution.status != "solved" and certificate.passed:
+        print(f"  the solve itself ended as: {solution.status}. {solution.message}")
+    return OK if good else FAILED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

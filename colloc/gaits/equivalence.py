@@ -1,0 +1,90 @@
+"""When two gaits are the same: start phase, and the symmetries of body and friction.
+
+With X(s, t) the position of the body, the following map motions in balance to motions in balance with the same distance
+and work. All are statements about joint angles q_j, counted from the tail, n of them:
+
+- *phase*   q_j(t + a), for every body and friction.
+- *mirror*  -q_j(t), for every body and friction.
+- *reversal*  q_j(-t), if mu_b = mu_f: velocities and forces change sign.
+- *swap*    -q_(n+1-j)(t), the body named from its other end, if it reads the same from there and mu_b = mu_f.
+- *reversed swap*  -q_(n+1-j)(-t), if the body reads the same from both ends, for *every* friction: X(1 - s, -t) has the
+  opposite tangent and the opposite velocity, so every link slides forwards where it did and all forces change sign.
+
+The last one is why a gait of bilateral symmetry closes its rotation whatever mu_b / mu_f is: it is its own image, and
+the image turns the other way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+
+Image = Callable[[Fourier], Fourier]
+_GRID = 64
+_NEWTON_STEPS = 6
+
+
+def mirrored(gait: Fourier) -> Fourier:
+    """The mirror image, -q(t)."""
+    return Fourier(-gait.mean, -gait.cos, -gait.sin)
+
+
+def reversed_in_time(gait: Fourier) -> Fourier:
+    """The gait run backwards, q(-t)."""
+    return Fourier(gait.mean, gait.cos, -gait.sin)
+
+
+def swapped(gait: Fourier) -> Fourier:
+    """The same shapes with tail and head exchanged, -q_(n+1-j)(t)."""
+    return Fourier(-gait.mean[::-1], -gait.cos[::-1], -gait.sin[::-1])
+
+
+def images(gait: Fourier, body: Chain, friction: Friction) -> list[Fourier]:
+    """The gait and all gaits that differ from it by a symmetry of body and friction, but for the start phase."""
+    result = []
+    for mirror, reversal, swap in product((False, True), repeat=3):
+        if swap and not body.symmetric:
+            continue
+        if reversal != swap and not friction.reversible:
+            continue
+        image = mirrored(gait) if mirror else gait
+        image = reversed_in_time(image) if reversal else image
+        result.append(swapped(image) if swap else image)
+    return result
+
+
+def phase_distance(a: Fourier, b: Fourier) -> float:
+    """Root-mean-square distance [rad] of two closed paths of joint angles, at the best relative start phase."""
+    n = max(a.n_harmonic, b.n_harmonic)
+    a, b = a.resized(n), b.resized(n)
+    k = np.arange(1, n + 1)
+    # sum over joints of conj(a_k) b_k: shifting b by phase x multiplies it by exp(i k x)
+    overlap = np.sum((a.cos + 1j * a.sin) * (b.cos - 1j * b.sin), axis=0)
+    x = 2 * np.pi * np.arange(_GRID * n) / (_GRID * n)
+    x = x[np.argmax((np.exp(1j * np.outer(x, k)) @ overlap).real)]
+    for _ in range(_NEWTON_STEPS):
+        wave = overlap * np.exp(1j * k * x)
+        slope, curvature = float((1j * k * wave).real.sum()), float(-(k**2 * wave).real.sum())
+        if curvature >= 0:
+            break
+        x -= slope / curvature
+    shift = np.exp(1j * k * x)
+    difference = (a.cos - 1j * a.sin) - (b.cos - 1j * b.sin) * shift
+    return float(np.sqrt(np.sum((a.mean - b.mean) ** 2) + 0.5 * np.sum(np.abs(difference) ** 2)))
+
+
+def distance(a: Fourier, b: Fourier, body: Chain, friction: Friction) -> float:
+    """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body and friction."""
+    return min(phase_distance(a, image) for image in images(b, body, friction))
+
+
+def irreversibility(gait: Fourier) -> float:
+    """How far a path is from being retraced, ``distance to its own reversal / root-mean-square amplitude``; 0 if it is."""
+    amplitude = np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2))
+    return phase_distance(gait, reversed_in_time(gait)) / float(amplitude) if amplitude > 0 else 0.0

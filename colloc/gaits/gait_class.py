@@ -1,0 +1,127 @@
+"""What kind of gait an optimum is: its symmetry, and how its path runs around the plane of the two joint angles.
+
+A wave of curvature travels along the body where the joints bend one after the other. With the displacement along the
+body's axis that gives the classes of the paper's figure 1: *retrograde* where the wave runs against the motion, *direct*
+where it runs with it, *standing* where the joints bend together or in opposition.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.equivalence import phase_distance, reversed_in_time, swapped
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+
+RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
+_SAME, _STANDING = 0.02, 0.05
+"""Relative distance of a gait to its image that counts as symmetric; |wave| below which it counts as standing."""
+_INSTANTS = 200
+_DELTA = 1e-3
+
+
+@dataclass(frozen=True)
+class GaitClass:
+    """The kind of a gait.
+
+    Attributes
+    ----------
+    bilateral, antipodal : bool
+        Symmetries it has (see `colloc.gaits.harmonic`), whatever class it was searched in.
+    retraced : bool
+        It goes back the way it came.
+    winding : int
+        Turns of the path (angle 1, angle 2) about its mean over a period, positive counter-clockwise.
+    wave : float
+        Direction in which bending travels (see `wave_direction`): 1 if every joint repeats the one behind it a quarter
+        period later, which is a wave towards the head.
+    forward : float
+        Displacement per period along the mean direction of the body, tail to head, over the distance: 1 is head first.
+    """
+
+    bilateral: bool
+    antipodal: bool
+    retraced: bool
+    winding: int
+    wave: float
+    forward: float
+
+    @property
+    def symmetry(self) -> str:
+        """In the words of `colloc.gaits.harmonic`; "both" if it has both."""
+        if self.bilateral and self.antipodal:
+            return "both"
+        return "bilateral" if self.bilateral else "antipodal" if self.antipodal else "none"
+
+    @property
+    def kind(self) -> str:
+        """ "retrograde", "direct" or "standing"."""
+        if self.retraced or abs(self.wave * self.forward) < _STANDING:
+            return STANDING
+        return DIRECT if self.wave * self.forward > 0 else RETROGRADE
+
+    @property
+    def label(self) -> str:
+        """For tables and legends, for example "retrograde, bilateral"."""
+        return f"{self.kind}{' (retraced)' if self.retraced else ''}, {self.symmetry}"
+
+
+def _amplitude(gait: Fourier) -> float:
+    return float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
+
+
+def winding(gait: Fourier, instants: int = 2000) -> int:
+    """Turns of the first two joint angles about their mean in a period."""
+    angles = gait.angles(np.arange(instants + 1) / instants) - gait.mean[:, None]
+    turns = np.unwrap(np.arctan2(angles[1], angles[0]))
+    return round((turns[-1] - turns[0]) / (2 * np.pi))
+
+
+def wave_direction(gait: Fourier) -> float:
+    """In [-1, 1]: how far bending travels from tail to head (positive) or from head to tail.
+
+    With complex amplitudes a_jk of joint j and harmonic k, ``2 sum_jk k Im(conj(a_jk) a_(j+1)k)`` over
+    ``sum_jk k (|a_jk|^2 + |a_(j+1)k|^2)``.
+    """
+    a = gait.cos + 1j * gait.sin
+    k = np.arange(1, gait.n_harmonic + 1)
+    travel = 2 * np.sum(k * (np.conj(a[:-1]) * a[1:]).imag)
+    size = np.sum(k * (np.abs(a[:-1]) ** 2 + np.abs(a[1:]) ** 2))
+    return float(travel / size) if size > 0 else 0.0
+
+
+def headed_displacement(gait: Fourier, body: Chain, friction: Friction) -> float:
+    """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity; 1 is head first.
+
+    From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is enough for a sign.
+    """
+    t = (np.arange(_INSTANTS) + 0.5) / _INSTANTS
+    angles, rates = gait.angles(t), gait.rates(t)
+    z = solve_balance(body, friction, angles, rates, _DELTA, tolerance=1e-8).z
+    posture = body.posture(angles)
+    velocity = body.velocity(posture, rates, z)
+    x, y = body.centre_velocity(posture, velocity)
+    theta = np.concatenate([[0.0], np.cumsum(0.5 * (z[2, 1:] + z[2, :-1])) / _INSTANTS])
+    c, s = np.cos(theta), np.sin(theta)
+    moved = np.array([np.mean(c * x[0] - s * y[0]), np.mean(s * x[0] + c * y[0])])
+    lengths = np.asarray(body.lengths)[:, None]
+    bent = np.vstack([np.zeros_like(theta), np.cumsum(angles, axis=0)]) + theta
+    axis = np.array([np.mean(np.sum(lengths * np.cos(bent), axis=0)), np.mean(np.sum(lengths * np.sin(bent), axis=0))])
+    size = np.linalg.norm(moved) * np.linalg.norm(axis)
+    return float(moved @ axis / size) if size > 0 else 0.0
+
+
+def gait_class(gait: Fourier, body: Chain, friction: Friction) -> GaitClass:
+    """The kind of a gait of a body with at least two joints."""
+    close = _SAME * max(_amplitude(gait), 1e-12)
+    bilateral = body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait))) < close
+    even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
+    antipodal = np.linalg.norm(even) < close
+    retraced = phase_distance(gait, reversed_in_time(gait)) < close
+    turns = 0 if retraced else winding(gait)
+    ahead = headed_displacement(gait, body, friction)
+    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(gait), ahead)

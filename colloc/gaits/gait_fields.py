@@ -1,0 +1,43 @@
+"""Gaits and classes of gaits as plain dictionaries (JSON), and back. Which kind it is shows in the names of the fields."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.paths import ArcPath, Corners
+
+AnyGait: TypeAlias = Any
+"""One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
+AnyClass: TypeAlias = Any
+"""One of `CLASSES`."""
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners)
+CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon)
+
+
+def fields(value: AnyGait | AnyClass) -> dict[str, Any]:
+    """The fields of a gait or a class of gaits as numbers, strings and lists."""
+    found = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+    return {k: v.tolist() if isinstance(v, (np.ndarray, np.generic)) else v for k, v in found.items()}
+
+
+def _from(kinds: tuple[type, ...], given: dict[str, Any]) -> Any:
+    for kind in kinds:
+        # the first field tells the kind
+        if dataclasses.fields(kind)[0].name in given:
+            return kind(**given)
+    raise KeyError(f"one of {', '.join(dataclasses.fields(kind)[0].name for kind in kinds)}")
+
+
+def gait_from(given: dict[str, Any]) -> AnyGait:
+    """The gait that `fields` described. KeyError, TypeError or ProblemError if it did not."""
+    return _from(GAITS, given)
+
+
+def class_from(given: dict[str, Any]) -> AnyClass:
+    """The class of gaits that `fields` described; as `gait_from`."""
+    return _from(CLASSES, given)

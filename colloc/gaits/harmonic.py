@@ -1,0 +1,187 @@
+"""Harmonic gaits: joint angles as finite Fourier series of the phase, with or without a symmetry.
+
+Phase t runs over one period, 0 <= t <= 1. Symmetries of a gait q(t), joints counted from the tail:
+
+- ``bilateral``: q_j(-t) = -q_(n+1-j)(t). The body at -t, seen from its head, has the shape it has at t. For any
+  friction the net rotation vanishes (paper, appendix A; see `colloc.gaits.equivalence`) and the second half period repeats the
+  first half's displacement and work.
+- ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
+- ``none``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.symmetry import SYMMETRIES, fraction
+from colloc.system.errors import ProblemError
+
+
+@dataclass(frozen=True, eq=False)
+class Fourier:
+    """Joint angles ``mean + sum_k cos[:, k-1] cos(2 pi k t) + sin[:, k-1] sin(2 pi k t)``.
+
+    Parameters
+    ----------
+    mean : (n_joint,)
+    cos, sin : (n_joint, n_harmonic)
+    """
+
+    mean: np.ndarray
+    cos: np.ndarray
+    sin: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name, ndim in (("mean", 1), ("cos", 2), ("sin", 2)):
+            try:
+                value = np.array(getattr(self, name), dtype=float)
+            except (TypeError, ValueError):
+                raise ProblemError(f"guess.{name} must be numbers, not {getattr(self, name)!r}.") from None
+            if value.ndim != ndim or not np.isfinite(value).all():
+                raise ProblemError(f"guess.{name} must be a finite {ndim}-D array, one row per joint.")
+            object.__setattr__(self, name, value)
+        if self.cos.shape != self.sin.shape or len(self.cos) != len(self.mean):
+            raise ProblemError(
+                f"guess.mean, cos and sin disagree in shape: {self.mean.shape}, {self.cos.shape}, {self.sin.shape}."
+            )
+
+    @property
+    def n_joint(self) -> int:
+        return len(self.mean)
+
+    @property
+    def delta_unit(self) -> float:
+        """Delta of harmonic gaits is in body lengths per period as it is."""
+        return 1.0
+
+    @property
+    def n_harmonic(self) -> int:
+        return self.cos.shape[1]
+
+    def _waves(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        k = 2 * np.pi * np.arange(1, self.n_harmonic + 1)[:, None]
+        return k, np.cos(k * t), np.sin(k * t)
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
+        _, cos, sin = self._waves(np.asarray(t, dtype=float))
+        return self.mean[:, None] + self.cos @ cos + self.sin @ sin
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """Joint rates ``(n_joint, n_time)`` per period at phases t."""
+        k, cos, sin = self._waves(np.asarray(t, dtype=float))
+        return -self.cos @ (k * sin) + self.sin @ (k * cos)
+
+    def resized(self, n_harmonic: int) -> Fourier:
+        """The same gait with harmonics added (zero) or cut."""
+        keep = min(n_harmonic, self.n_harmonic)
+        cos, sin = np.zeros((2, self.n_joint, n_harmonic))
+        cos[:, :keep], sin[:, :keep] = self.cos[:, :keep], self.sin[:, :keep]
+        return Fourier(self.mean, cos, sin)
+
+
+def ellipse(A0: float, A1: float, B1: float) -> Fourier:
+    """The paper's one-harmonic gait of a three-link body (section V), symmetric about angle 1 = -angle 2."""
+    return Fourier(np.array([A0, -A0]), np.array([[A1], [-A1]]), np.array([[B1], [B1]]))
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """The class of gaits with `harmonics` harmonics and a given symmetry.
+
+    A member is a parameter vector p; angles are linear in it. Without a symmetry that fixes it, the start phase is
+    fixed by taking the first joint's first sine coefficient out.
+
+    Parameters
+    ----------
+    harmonics : int
+    symmetry : {"none", "bilateral", "antipodal"}
+    """
+
+    harmonics: int = 1
+    symmetry: str = "none"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.harmonics, (int, np.integer)) or not 1 <= self.harmonics <= 64:
+            raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
+        if self.symmetry not in SYMMETRIES:
+            raise ProblemError(f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}.")
+
+    @property
+    def fraction(self) -> float:
+        """The part of the period that has to be solved; symmetry gives the rest."""
+        return fraction(self.symmetry)
+
+    def describe(self) -> str:
+        """The class in words, for reports."""
+        return f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}, symmetry {self.symmetry}"
+
+    def _basis(self, n_joint: int) -> np.ndarray:
+        """``(n_joint * (2 K + 1), n_parameter)``: parameters to (mean, cos_1, sin_1, cos_2, ...) of every joint."""
+        columns = []
+        for kind in range(2 * self.harmonics + 1):
+            odd_harmonic = (kind + 1) // 2 % 2 == 1
+            if self.symmetry == "antipodal" and not odd_harmonic:
+                continue
+            sine = kind > 0 and kind % 2 == 0
+            for joint in range(n_joint):
+                column = np.zeros((n_joint, 2 * self.harmonics + 1))
+                column[joint, kind] = 1.0
+                if self.symmetry == "bilateral":
+                    partner = n_joint - 1 - joint
+                    if partner < joint or (partner == joint and not sine):
+                        continue
+                    column[partner, kind] = 1.0 if sine else -1.0
+                elif joint == 0 and kind == 2:
+                    continue  # the start phase
+                columns.append(column.ravel())
+        return np.array(columns).T
+
+    def size(self, n_joint: int) -> int:
+        """Number of parameters."""
+        return self._basis(n_joint).shape[1]
+
+    def fourier(self, parameters: np.ndarray, n_joint: int) -> Fourier:
+        """The gait of a parameter vector."""
+        table = (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
+        return Fourier(table[:, 0], table[:, 1::2], table[:, 2::2])
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Fourier:
+        """The gait of a parameter vector; the mesh does not matter."""
+        return self.fourier(parameters, n_joint)
+
+    def parameters(self, gait: Fourier) -> np.ndarray:
+        """The parameter vector of the class member nearest to `gait`, after shifting its start phase if that is free."""
+        gait = gait.resized(self.harmonics)
+        if self.symmetry != "bilateral":
+            gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
+        table = np.zeros((gait.n_joint, 2 * self.harmonics + 1))
+        table[:, 0], table[:, 1::2], table[:, 2::2] = gait.mean, gait.cos, gait.sin
+        return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
+
+    def angle_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
+        """``(n_time, n_joint, n_parameter)``: joint angles at phases t per parameter."""
+        return self._sampled(t, n_joint, Fourier.angles)
+
+    def rate_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
+        """``(n_time, n_joint, n_parameter)``: joint rates per period at phases t per parameter."""
+        return self._sampled(t, n_joint, Fourier.rates)
+
+    def mean_square_rate(self, n_joint: int) -> np.ndarray:
+        """``(n_parameter, n_parameter)``: the mean square shape speed per period as a quadratic form of the parameters."""
+        n_time = 4 * self.harmonics + 4
+        rates = self.rate_matrix(np.arange(n_time) / n_time, n_joint)
+        return np.einsum("tjp,tjq->pq", rates, rates) / n_time
+
+    def _sampled(self, t: np.ndarray, n_joint: int, method) -> np.ndarray:
+        size = self.size(n_joint)
+        return np.stack([method(self.fourier(row, n_joint), t).T for row in np.eye(size)], axis=-1)
+
+
+def shifted(gait: Fourier, phase: float) -> Fourier:
+    """The gait started `phase` later: angles(t) becomes angles(t + phase)."""
+    k = 2 * np.pi * np.arange(1, gait.n_harmonic + 1) * phase
+    cos, sin = np.cos(k), np.sin(k)
+    return Fourier(gait.mean, gait.cos * cos + gait.sin * sin, gait.sin * cos - gait.cos * sin)

@@ -1,0 +1,163 @@
+"""Classes of gaits that bound the path itself: paths of bounded curvature, and polygons. (`gaits.harmonic` holds harmonics.)
+
+Without a bound on curvature, corners or bandwidth the efficiency has no maximum among nice paths: it keeps growing as
+paths get finer (docs/gait_classes.md). So the class is part of the problem. Members are vectors of parameters on a mesh:
+
+- `FreePath`: the mean shape speed, that is the length of the whole path over 2 pi (so that it moves about as far as the
+  angles do), then the tangents at all edges, then the joint angles there;
+- `Polygon`: the joint angles at the ends of all straight pieces of the solved part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, SYMMETRIES, fraction
+from colloc.system.errors import ProblemError
+
+
+def _check_symmetry(symmetry: object) -> None:
+    if symmetry not in SYMMETRIES:
+        raise ProblemError(f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {symmetry!r}.")
+
+
+@dataclass(frozen=True)
+class FreePath:
+    """Closed paths of bounded curvature at unit shape speed: |q''| <= curvature in arc length.
+
+    Parameters
+    ----------
+    curvature : float
+        Largest curvature [1/rad]; for three and more joints the largest acceleration at unit shape speed, the same thing.
+    symmetry : {"none", "bilateral", "antipodal"}
+    winding : int, optional
+        How often the tangent turns over a period, counter-clockwise in the plane of (joint 1, joint 2): 1 or -1 for simple
+        loops, 0 for an eight; odd if antipodal. Two joints only. By default that of the guess.
+    """
+
+    curvature: float = 8.0
+    symmetry: str = NONE
+    winding: int | None = None
+
+    def __post_init__(self) -> None:
+        value = self.curvature
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
+            raise ProblemError(f"gait.curvature must be a positive finite number, not {value!r}.")
+        _check_symmetry(self.symmetry)
+        if self.winding is not None:
+            if isinstance(self.winding, bool) or not isinstance(self.winding, (int, np.integer)):
+                raise ProblemError(f"gait.winding must be a whole number, not {self.winding!r}.")
+            if self.symmetry == ANTIPODAL and self.winding % 2 == 0:
+                raise ProblemError(f"gait.winding must be odd for an antipodal path, not {self.winding}.")
+
+    @property
+    def fraction(self) -> float:
+        """The part of the period that has to be solved; symmetry gives the rest."""
+        return fraction(self.symmetry)
+
+    def describe(self) -> str:
+        """The class in words, for reports."""
+        turns = "" if self.winding is None else f", winding {self.winding}"
+        return f"paths of curvature <= {self.curvature:g} per rad, symmetry {self.symmetry}{turns}"
+
+    def size(self, n_joint: int, n_interval: int) -> int:
+        """Number of parameters."""
+        return 1 + (n_interval + 1) * (n_joint + (1 if n_joint == 2 else n_joint))
+
+    def split(self, parameters: np.ndarray, n_joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Mean shape speed ``(1, 1)``, tangents ``(1 or n_joint, n + 1)``, angles ``(n_joint, n + 1)`` of a parameter vector.
+
+        Works on the parameters' index array as well.
+        """
+        rows = 1 if n_joint == 2 else n_joint
+        n_edge = (parameters.size - 1) // (rows + n_joint)
+        tangents = parameters[1 : 1 + rows * n_edge].reshape(n_edge, rows).T
+        return parameters[:1].reshape(1, 1), tangents, parameters[1 + rows * n_edge :].reshape(n_edge, n_joint).T
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> ArcPath:
+        """The gait of a parameter vector on the mesh `edges` (phases)."""
+        speed, tangents, shapes = self.split(parameters, n_joint)
+        return ArcPath(edges, shapes, tangents, 2 * np.pi * speed[0, 0], self.symmetry)
+
+    def parameters(self, path: ArcPath) -> np.ndarray:
+        """The parameter vector of a member."""
+        return np.concatenate([[path.length / (2 * np.pi)], path.tangents.ravel(order="F"), path.shapes.ravel(order="F")])
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """Closed polygons with a given number of corners, which are free.
+
+    Parameters
+    ----------
+    corners : int
+        At least 2 (a retraced segment), over the whole period. Even if antipodal.
+    symmetry : {"none", "bilateral", "antipodal"}
+    axis : {"corner", "side"}
+        Of a bilateral polygon: whether its axis (angle 1 = -angle 2 for two joints) first meets a corner or the middle of
+        a side. With an odd number of corners it meets one of each, and this does not matter.
+    shortest_side : float
+        Lower bound on the length of a side [rad].
+    """
+
+    corners: int = 3
+    symmetry: str = NONE
+    axis: str = "corner"
+    shortest_side: float = 0.02
+
+    def __post_init__(self) -> None:
+        if isinstance(self.corners, bool) or not isinstance(self.corners, (int, np.integer)) or not 2 <= self.corners <= 64:
+            raise ProblemError(f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}.")
+        _check_symmetry(self.symmetry)
+        if self.axis not in ("corner", "side"):
+            raise ProblemError(f"gait.axis must be 'corner' or 'side', not {self.axis!r}.")
+        if self.symmetry == ANTIPODAL and self.corners % 2:
+            raise ProblemError(f"an antipodal polygon has an even number of corners, not {self.corners}.")
+        if not isinstance(self.shortest_side, (int, float, np.number)) or not 0 < self.shortest_side < np.pi:
+            raise ProblemError(f"gait.shortest_side must lie in (0, pi), not {self.shortest_side!r}.")
+
+    @property
+    def fraction(self) -> float:
+        """The part of the period that has to be solved; symmetry gives the rest."""
+        return fraction(self.symmetry)
+
+    def describe(self) -> str:
+        """The class in words, for reports."""
+        axis = f" through a {self.axis}" if self.symmetry == BILATERAL and self.corners % 2 == 0 else ""
+        return f"polygons of {self.corners} corners, symmetry {self.symmetry}{axis}"
+
+    @property
+    def half_ends(self) -> tuple[bool, bool]:
+        """Whether the solved part starts, and ends, in the middle of a side."""
+        if self.symmetry != BILATERAL:
+            return False, False
+        if self.corners % 2:
+            return False, True
+        return self.axis == "side", self.axis == "side"
+
+    @property
+    def pieces(self) -> int:
+        """Straight pieces of the solved part, halves of sides included."""
+        if self.symmetry == NONE:
+            return self.corners
+        return (self.corners + sum(self.half_ends)) // 2
+
+    def size(self, n_joint: int) -> int:
+        """Number of parameters."""
+        return n_joint * (self.pieces + 1)
+
+    def split(self, parameters: np.ndarray, n_joint: int) -> np.ndarray:
+        """Angles at the ends of the pieces, ``(n_joint, n_piece + 1)``; works on the parameters' index array as well."""
+        return parameters.reshape(-1, n_joint).T
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Corners:
+        """The gait of a parameter vector; the mesh does not matter."""
+        vertices = self.split(parameters, n_joint)
+        return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
+
+    def parameters(self, gait: Corners) -> np.ndarray:
+        """The parameter vector of a member."""
+        return gait.vertices.ravel(order="F")

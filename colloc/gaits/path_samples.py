@@ -1,0 +1,180 @@
+"""Any gait as points along its path: the start of a search over another class of paths.
+
+A gait of one class seeds the next through these points: its symmetric part is sampled by arc length on the part of the
+period that is solved, and arcs or straight pieces are laid through the samples.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, fraction
+
+_DENSE = 2000
+_BEND = 1.5
+"""Angle [rad] over whose sharpest allowed bend a corner's intervals are spread."""
+_POLYGON_POINTS = 241
+
+
+class Gait(Protocol):
+    """Joint angles and rates of a closed path as functions of the phase."""
+
+    @property
+    def n_joint(self) -> int: ...
+
+    @property
+    def delta_unit(self) -> float:
+        """What the delta of the gait's class is multiplied by to get delta per period."""
+
+    def angles(self, t: np.ndarray) -> np.ndarray: ...
+
+    def rates(self, t: np.ndarray) -> np.ndarray: ...
+
+
+def path_length(gait: Gait, count: int = _DENSE) -> float:
+    """Length of the closed path of a gait [rad], which is its mean shape speed per period."""
+    points = gait.angles(np.linspace(0.0, 1.0, count + 1))
+    return float(np.linalg.norm(np.diff(points), axis=0).sum())
+
+
+def symmetric_samples(gait: Gait, symmetry: str, count: int = _DENSE) -> np.ndarray:
+    """Points ``(n_joint, count + 1)`` along the solved part of the symmetric gait nearest to `gait`, evenly in phase.
+
+    Phase 0 is kept if the gait has the symmetry about it, else moved to where it comes closest to having it.
+    """
+    if symmetry == NONE:
+        return gait.angles(np.linspace(0.0, 1.0, count + 1))
+    n = 2 * count
+    t = np.arange(n) / n
+    angles = gait.angles(t)
+    if symmetry == ANTIPODAL:
+        angles = 0.5 * (angles - np.roll(angles, count, axis=1))
+        return np.concatenate([angles[:, :count], -angles[:, :1]], axis=1)
+    exchanged = -angles[::-1]
+    # asymmetry about phase k/(2n): sum over i of |q(i) - S q(k - i)|^2, up to a constant minus twice a circular convolution
+    spectrum = np.fft.rfft(angles, axis=1) * np.fft.rfft(exchanged, axis=1)
+    match = np.fft.irfft(spectrum, n, axis=1).sum(axis=0)
+    shift = 0 if match[0] > match.max() - 1e-9 * n else int(np.argmax(match))
+    shift += shift % 2 * (1 if match[(shift + 1) % n] > match[shift - 1] else -1)
+    angles = np.roll(angles, -(shift // 2), axis=1)
+    angles = 0.5 * (angles - np.roll(angles[::-1, ::-1], 1, axis=1))
+    return angles[:, : count + 1]
+
+
+def _by_arc_length(points: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, float]:
+    """Points at fractions `at` of the length of a polyline, and its length."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points), axis=0))])
+    return np.stack([np.interp(at * along[-1], along, row) for row in points]), float(along[-1])
+
+
+def graded_edges(gait: Gait, target: FreePath, n: int) -> np.ndarray:
+    """Phases of `n` intervals along the path of a gait, half of them spread by length and half by how much it turns.
+
+    A turn counts as spread over the length that the sharpest allowed bend needs, so that a corner gets several intervals.
+    """
+    points = symmetric_samples(gait, target.symmetry)
+    points, length = _by_arc_length(points, np.linspace(0.0, 1.0, _DENSE + 1))
+    step = np.diff(_extended(points, target.symmetry))
+    cosine = np.sum(step[:, 1:] * step[:, :-1], axis=0)
+    area = np.sqrt(np.maximum(np.sum(step[:, 1:] ** 2, axis=0) * np.sum(step[:, :-1] ** 2, axis=0) - cosine**2, 0.0))
+    turn = np.arctan2(area, cosine)
+    width = min(_DENSE, max(1, round(_BEND / target.curvature / length * _DENSE)))
+    spread = np.convolve(turn, np.ones(width) / width, mode="same")[_DENSE - 1 : 2 * _DENSE]
+    density = np.full(_DENSE + 1, 1.0 / _DENSE) + spread / max(spread.sum(), 1e-300)
+    along = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    at = np.interp(np.linspace(0.0, along[-1], n + 1), along, np.linspace(0.0, 1.0, _DENSE + 1))
+    return fraction(target.symmetry) * at
+
+
+def arcs_through(gait: Gait, target: FreePath, edges: np.ndarray) -> ArcPath:
+    """Arcs near `gait` on the mesh `edges`; they need not join, nor keep the bound on curvature."""
+    if isinstance(gait, ArcPath) and gait.symmetry == target.symmetry:
+        return gait.resampled(edges)
+    points = symmetric_samples(gait, target.symmetry)
+    at = edges / edges[-1]
+    shapes, length = _by_arc_length(points, at)
+    step = 0.25 * float(np.diff(at).min())
+    before, after = at - step, at + step
+    extended = _extended(points, target.symmetry)
+    tangent = _by_arc_length(extended, (1 + after) / 3)[0] - _by_arc_length(extended, (1 + before) / 3)[0]
+    tangents = tangent / np.linalg.norm(tangent, axis=0)
+    if gait.n_joint == 2:
+        tangents = np.unwrap(np.arctan2(tangents[1], tangents[0]))[None]
+        tangents = tangents + _end_correction(tangents, target, at)
+    return ArcPath(edges, shapes, tangents, length / fraction(target.symmetry), target.symmetry)
+
+
+def _extended(points: np.ndarray, symmetry: str) -> np.ndarray:
+    """The part of a path before and after the solved one added, each as long as that."""
+    if symmetry == BILATERAL:
+        image = -points[::-1, ::-1]
+        return np.concatenate([image[:, :-1], points, image[:, 1:]], axis=1)
+    sign = -1 if symmetry == ANTIPODAL else 1
+    return np.concatenate([sign * points[:, :-1], points, sign * points[:, 1:]], axis=1)
+
+
+def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> np.ndarray:
+    """What makes headings turn by the whole windings asked for, spread evenly (a rough guess for another winding)."""
+    share = fraction(target.symmetry)
+    turned = float(headings[0, -1] - headings[0, 0])
+    unit = 2 * np.pi * share
+    winding = round(turned / unit) if target.winding is None else target.winding
+    if target.symmetry == ANTIPODAL and winding % 2 == 0:
+        winding += 1
+    first = 0.0
+    if target.symmetry == BILATERAL:
+        first = np.pi * np.round((headings[0, 0] - np.pi / 4) / np.pi) + np.pi / 4 - headings[0, 0]
+    return first + at * (winding * unit - turned)
+
+
+def fourier_through(gait: Gait, target: Harmonic) -> Fourier:
+    """The Fourier series of a gait, paced by its own phase, with the symmetry and harmonics of a class."""
+    if isinstance(gait, Fourier):
+        return gait
+    half = symmetric_samples(gait, target.symmetry)
+    if target.symmetry == NONE:
+        whole = half[:, :-1]
+    else:
+        image = -half[::-1, ::-1] if target.symmetry == BILATERAL else -half
+        whole = np.concatenate([half[:, :-1], image[:, :-1]], axis=1)
+    spectrum = np.fft.rfft(whole, axis=1)[:, : target.harmonics + 1] * (2 / whole.shape[1])
+    return Fourier(0.5 * spectrum[:, 0].real, spectrum[:, 1:].real, -spectrum[:, 1:].imag)
+
+
+def corners_through(gait: Gait, target: Polygon) -> Corners:
+    """The polygon of the class nearest to the path of `gait`, its corners on the path (least squares, exact search)."""
+    points = symmetric_samples(gait, target.symmetry)
+    points, _ = _by_arc_length(points, np.linspace(0.0, 1.0, _POLYGON_POINTS))
+    chosen = _best_corners(points, target.pieces)
+    vertices = points[:, chosen]
+    for half, end, inner in zip(target.half_ends, (0, -1), (1, -2), strict=True):
+        if half:
+            # the middle of a side between the last corner and its image
+            vertices[:, end] = 0.5 * (vertices[:, inner] - vertices[::-1, inner])
+    return Corners(vertices[:, :-1] if target.symmetry == NONE else vertices, target.symmetry)
+
+
+def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
+    """Indices of the ``pieces + 1`` points, ends included, whose chords are nearest to all points (dynamic programming)."""
+    n = points.shape[1]
+    cost = np.full((n, n), np.inf)
+    for i in range(n - 1):
+        # points beyond i, seen from it: the chord to each of them, and all that lie before that one
+        seen = points[:, i + 1 :] - points[:, i : i + 1]
+        dots, squares = seen.T @ seen, np.sum(seen**2, axis=0)
+        along = np.clip(dots / np.maximum(squares, 1e-300), 0.0, 1.0)
+        cost[i, i + 1 :] = np.triu(squares[:, None] - 2 * along * dots + along**2 * squares).sum(axis=0)
+    best, back = cost[0].copy(), []
+    for _ in range(pieces - 1):
+        total = best[:, None] + cost
+        back.append(np.argmin(total, axis=0))
+        best = np.min(total, axis=0)
+    chosen = [n - 1]
+    for step in reversed(back):
+        chosen.append(int(step[chosen[-1]]))
+    return np.array([0, *chosen[::-1]])

@@ -1,0 +1,190 @@
+"""Gaits given by their path in joint space: chains of circular arcs, and polygons. Both run at constant shape speed.
+
+Only the part of the period that symmetry leaves is stored; `colloc.gaits.symmetry` gives the rest. The phase is the arc length
+from the start over the length of the whole closed path, ``|q'(t)| = length``. Power and distance do not depend on the pace
+once delta scales with it: delta of such gaits is measured at unit shape speed, ``delta_unit`` times that per period.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.arcs import advance, direction
+from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced
+from colloc.system.errors import ProblemError
+
+
+def _finite(name: str, value: object, ndim: int) -> np.ndarray:
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ProblemError(f"{name} must be numbers, not {value!r}.") from None
+    if array.ndim != ndim or not np.isfinite(array).all():
+        raise ProblemError(f"{name} must be a finite {ndim}-D array.")
+    return array
+
+
+def _checked_symmetry(symmetry: str) -> None:
+    if symmetry not in SYMMETRIES:
+        raise ProblemError(f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not {symmetry!r}.")
+
+
+@dataclass(frozen=True, eq=False)
+class ArcPath:
+    """A closed path of circular arcs that join smoothly.
+
+    Parameters
+    ----------
+    edges : (n + 1,)
+        Phases where arcs meet, from 0 to the part of the period that symmetry leaves.
+    shapes : (n_joint, n + 1)
+        Joint angles there [rad].
+    tangents : (1, n + 1) or (n_joint, n + 1)
+        Headings [rad] for two joints, unit vectors for more.
+    length : float
+        Of the whole closed path [rad].
+    symmetry : {"none", "bilateral", "antipodal"}
+    """
+
+    edges: np.ndarray
+    shapes: np.ndarray
+    tangents: np.ndarray
+    length: float
+    symmetry: str = "none"
+
+    def __post_init__(self) -> None:
+        _checked_symmetry(self.symmetry)
+        for name, ndim in (("edges", 1), ("shapes", 2), ("tangents", 2), ("length", 0)):
+            object.__setattr__(self, name, _finite(f"path.{name}", getattr(self, name), ndim))
+        object.__setattr__(self, "length", float(self.length))
+        n_joint, n_edge = self.shapes.shape
+        rows = 1 if n_joint == 2 else n_joint
+        if n_joint < 2 or self.edges.size != n_edge or self.tangents.shape != (rows, n_edge):
+            raise ProblemError(
+                f"path.edges, shapes and tangents disagree: {self.edges.shape}, {self.shapes.shape}, {self.tangents.shape}."
+            )
+        last = fraction(self.symmetry)
+        if n_edge < 2 or (np.diff(self.edges) <= 0).any() or abs(self.edges[0]) + abs(self.edges[-1] - last) > 1e-12:
+            raise ProblemError(f"path.edges must ascend from 0 to {last:g}.")
+        if not self.length > 0:
+            raise ProblemError(f"path.length must be positive, not {self.length:g}.")
+
+    @property
+    def n_joint(self) -> int:
+        return self.shapes.shape[0]
+
+    @property
+    def delta_unit(self) -> float:
+        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
+        return self.length
+
+    def _at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
+        h = np.diff(self.edges)[k]
+        return k, h, ((t - self.edges[k]) / h)[None]
+
+    def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        phase, image = reduced(self.symmetry, t)
+        k, h, tau = self._at(phase)
+        t0, t1 = self.tangents[:, k], self.tangents[:, k + 1]
+        angles = self.shapes[:, k] + self.length * h * advance(t0, t1, tau)
+        return imaged(self.symmetry, angles, self.length * direction(t0, t1, tau), image)
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
+        return self._both(t)[0]
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """Joint rates ``(n_joint, n_time)`` per period at phases t."""
+        return self._both(t)[1]
+
+    def curvatures(self) -> np.ndarray:
+        """Curvature of each arc [1/rad], ``(n,)``; signed, positive to the left, for two joints."""
+        turn = np.diff(self.tangents)
+        size = turn[0] if self.n_joint == 2 else 2 * np.arcsin(np.clip(0.5 * np.linalg.norm(turn, axis=0), 0, 1))
+        return size / (self.length * np.diff(self.edges))
+
+    @property
+    def winding(self) -> int | None:
+        """How often the tangent of a path of two joints turns over a period; None for more joints."""
+        if self.n_joint != 2:
+            return None
+        return round(float(self.tangents[0, -1] - self.tangents[0, 0]) / (2 * np.pi * fraction(self.symmetry)))
+
+    def resampled(self, edges: np.ndarray) -> ArcPath:
+        """The same path with other edges; exact if every old edge is a new one."""
+        k, h, tau = self._at(edges)
+        t0, t1 = self.tangents[:, k], self.tangents[:, k + 1]
+        shapes = self.shapes[:, k] + self.length * h * advance(t0, t1, tau)
+        tangents = t0 + tau * (t1 - t0) if self.n_joint == 2 else direction(t0, t1, tau)
+        return ArcPath(edges, shapes, tangents, self.length, self.symmetry)
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """A closed polygon.
+
+    Parameters
+    ----------
+    corners : (n_joint, n)
+        Joint angles [rad] at the corners, in order. Without a symmetry the last is joined to the first. With one these are
+        the vertices of half the path, ends included; an end that lies within an edge is no corner of the polygon.
+    symmetry : {"none", "bilateral", "antipodal"}
+    """
+
+    corners: np.ndarray
+    symmetry: str = "none"
+
+    def __post_init__(self) -> None:
+        _checked_symmetry(self.symmetry)
+        object.__setattr__(self, "corners", _finite("polygon.corners", self.corners, 2))
+        if self.corners.shape[0] < 1 or self.corners.shape[1] < 2:
+            raise ProblemError("polygon.corners needs a row per joint and at least two columns.")
+        if (self._lengths() == 0).any():
+            raise ProblemError("polygon.corners has two equal neighbours.")
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Ends of the straight pieces of the stored part, ``(n_joint, n_piece + 1)``."""
+        closed = self.symmetry == "none"
+        return np.concatenate([self.corners, self.corners[:, :1]], axis=1) if closed else self.corners
+
+    def _lengths(self) -> np.ndarray:
+        return np.linalg.norm(np.diff(self.vertices), axis=0)
+
+    @property
+    def n_joint(self) -> int:
+        return self.corners.shape[0]
+
+    @property
+    def length(self) -> float:
+        """Of the whole closed path [rad]."""
+        return float(self._lengths().sum()) / fraction(self.symmetry)
+
+    @property
+    def delta_unit(self) -> float:
+        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
+        return self.length
+
+    @property
+    def phases(self) -> np.ndarray:
+        """Phases of `vertices`, from 0 to the part of the period that symmetry leaves."""
+        along = np.concatenate([[0.0], np.cumsum(self._lengths())])
+        return fraction(self.symmetry) * along / along[-1]
+
+    def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        phase, image = reduced(self.symmetry, t)
+        phases, vertices = self.phases, self.vertices
+        k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
+        slope = np.diff(vertices) / np.diff(phases)
+        return imaged(self.symmetry, vertices[:, k] + slope[:, k] * (phase - phases[k]), slope[:, k], image)
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
+        return self._both(t)[0]
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
+        return self._both(t)[1]

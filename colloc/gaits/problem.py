@@ -1,0 +1,258 @@
+"""A problem: body, friction, class of gaits, guess and discretisation; frozen and validated when it is made."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.gait_fields import CLASSES, GAITS, AnyClass, AnyGait, class_from, fields, gait_from
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.path_samples import fourier_through, symmetric_samples
+from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import crossing_depth
+from colloc.mechanics.friction import Friction
+from colloc.numerics.schemes import scheme
+from colloc.system.errors import ProblemError
+
+DELTA_START, PATH_DELTA_START = 0.1, 0.01
+CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
+FORMULATIONS = (CONDENSED, MAP, LIFTED)
+SMALLEST_DELTA = 1e-14
+"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
+LONGEST_NAME = 200
+"""File systems allow 255 bytes, and results of a problem add endings to its name."""
+_CHECKED_PHASES = 2000
+_SLACK = 1e-6
+"""Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
+_AT_THE_BOUND = 1e-2
+"""An optimum that lies on the lower bound of the shape speed is a good guess for a richer class, although sampling cuts its
+corners and makes it a little shorter."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A value to hold the result against.
+
+    Parameters
+    ----------
+    efficiency : float
+    tolerance : float
+        Largest difference that counts as agreement.
+    source : str
+        Where the value comes from.
+    """
+
+    efficiency: float
+    tolerance: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Maximise d/W over a class of gaits.
+
+    Parameters
+    ----------
+    name : str
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200.
+    guess : Fourier, ArcPath or Corners
+        An admissible gait to start from, of any class; it is projected onto the class `gait`.
+    body : Chain
+    friction : Friction
+    gait : Harmonic, FreePath or Polygon
+        The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md).
+    delta : float
+        Regularisation speed of friction at which the problem is finally solved, in body lengths per period; for free paths
+        and polygons at unit shape speed, in body lengths per radian of path.
+    delta_start : float
+        Where the continuation in delta begins; by default 0.1, and 0.01 where delta is measured at unit shape speed.
+    joint_limit : float
+        Largest |joint angle| [rad], at most pi.
+    smallest_shape_speed : float
+        Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
+        2 pi. It keeps the search away from gaits
+        whose speeds sink to delta, where regularised friction is viscous and efficiency meaningless.
+    intervals : int
+        Mesh intervals on the part of the period that is solved.
+    scheme : str
+        Collocation scheme, see `colloc.numerics.schemes.scheme`.
+    formulation : {"condensed", "map", "lifted"}
+        How the balance becomes constraints, see `collocation.point_equations`; "condensed" eliminates them, see `collocation.reduced_space`.
+    mesh_tolerance : float
+        Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
+    """
+
+    name: str
+    guess: AnyGait
+    body: Chain = Chain()
+    friction: Friction = Friction()
+    gait: AnyClass = Harmonic()
+    delta: float = 1e-4
+    delta_start: float = None  # type: ignore[assignment]
+    joint_limit: float = float(np.pi)
+    smallest_shape_speed: float = 0.1
+    intervals: int = 30
+    scheme: str = "gauss-3"
+    formulation: str = CONDENSED
+    mesh_tolerance: float = 3e-5
+
+    def __post_init__(self) -> None:
+        self._check_types()
+        self._check_numbers()
+        self._check_symmetry()
+        self._check_guess()
+
+    def _check_types(self) -> None:
+        if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
+            raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        if len(self.name) > LONGEST_NAME:
+            raise ProblemError(
+                f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
+            )
+        for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
+            if not isinstance(getattr(self, field), kinds):
+                names = " or ".join(kind.__name__ for kind in kinds)
+                raise ProblemError(f"{field} must be a {names}, not {type(getattr(self, field)).__name__}.")
+
+    @property
+    def has_path(self) -> bool:
+        """Whether the class bounds the path itself (free paths, polygons) rather than its harmonics."""
+        return isinstance(self.gait, (FreePath, Polygon))
+
+    def _check_numbers(self) -> None:
+        if self.delta_start is None:
+            object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
+        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+                raise ProblemError(f"{field} must be a finite number, not {value!r}.")
+        if self.delta <= 0:
+            raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
+        if self.delta < SMALLEST_DELTA:
+            raise ProblemError(
+                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that order are lost in rounding. "
+                "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
+            )
+        if self.delta_start < self.delta:
+            object.__setattr__(self, "delta_start", self.delta)
+        if not 0 < self.joint_limit <= np.pi + 1e-12:
+            raise ProblemError(f"joint_limit must lie in (0, pi], not {self.joint_limit:g}.")
+        if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
+            raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
+        if self.smallest_shape_speed <= 0:
+            raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
+        if self.formulation not in FORMULATIONS:
+            raise ProblemError(f"formulation must be one of {', '.join(FORMULATIONS)}, not {self.formulation!r}.")
+        if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
+            raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
+        self._check_resolution()
+        if self.intervals > 100_000:
+            raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
+
+    def _check_resolution(self) -> None:
+        collocation, kind = scheme(self.scheme), type(self.gait).__name__
+        if isinstance(self.gait, Harmonic):
+            per_interval = collocation.s - collocation.left
+            fewest, what = max(2, -(-4 * self.gait.harmonics // per_interval)), f"{self.gait.harmonics} harmonics"
+        else:
+            if self.formulation == LIFTED:
+                raise ProblemError(f"the class {kind} has no formulation {LIFTED!r}: its balance is always eliminated.")
+            if collocation.left:
+                raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
+            fewest, what = (2 * self.gait.pieces, "the sides") if isinstance(self.gait, Polygon) else (4, "a path")
+        if self.intervals < fewest:
+            raise ProblemError(
+                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot resolve {what}; "
+                f"use at least {fewest}."
+            )
+
+    def _check_symmetry(self) -> None:
+        if self.gait.symmetry == "bilateral" and not self.body.symmetric:
+            raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
+        if self.has_path and self.body.n_joint < 2:
+            raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links.")
+        if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
+            raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
+
+        if self.body.n_joint == 1 and self.friction.mu_f == self.friction.mu_b:
+            raise ProblemError(
+                "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
+                "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
+            )
+
+    def _check_guess(self) -> None:
+        if self.guess.n_joint != self.body.n_joint:
+            raise ProblemError(
+                f"guess has {self.guess.n_joint} joints but a body of {self.body.n_link} links has {self.body.n_joint}."
+            )
+        if isinstance(self.gait, Harmonic):
+            near = fourier_through(self.guess, self.gait)
+            guess: AnyGait = self.gait.fourier(self.gait.parameters(near), self.body.n_joint)
+            rms = np.sqrt(0.5 * np.sum(np.arange(1, guess.n_harmonic + 1) ** 2 * (guess.cos**2 + guess.sin**2)))
+        else:
+            guess = self.guess
+            points = symmetric_samples(guess, self.gait.symmetry)
+            rms = np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.gait.fraction)
+        if rms < self.smallest_shape_speed * (1 - _AT_THE_BOUND):
+            raise ProblemError(
+                f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
+                f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
+            )
+        angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
+        largest = np.abs(angles).max(axis=1)
+        if (largest > self.joint_limit + _SLACK).any():
+            joint = int(np.argmax(largest))
+            raise ProblemError(
+                f"guess is inadmissible: joint {joint + 1} reaches {largest[joint]:.4g} rad, "
+                f"beyond the limit {self.joint_limit:.4g}; make its amplitude smaller."
+            )
+        depth = crossing_depth(self.body, angles)
+        if depth.max() > _SLACK:
+            when = np.argmax(depth) / _CHECKED_PHASES
+            raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
+
+    def with_(self, **changes: object) -> Problem:
+        """A copy with some fields changed, validated anew."""
+        return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
+
+    def to_dict(self) -> dict:
+        """All fields as plain numbers, strings and lists (JSON)."""
+        stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        for name in ("guess", "gait"):
+            stated[name] = fields(stated[name])
+        for name in ("body", "friction"):
+            stated[name] = dataclasses.asdict(stated[name])
+        return stated
+
+    @classmethod
+    def from_dict(cls, stated: dict) -> Problem:
+        """The problem that `to_dict` wrote.
+
+        Raises
+        ------
+        ProblemError
+            If a field is missing, unknown or has an unusable value.
+        """
+        try:
+            stated = dict(stated)
+            stated["guess"] = gait_from(stated["guess"])
+            stated["body"] = Chain(tuple(stated["body"]["lengths"]))
+            stated["friction"] = Friction(**stated["friction"])
+            stated["gait"] = class_from(stated["gait"])
+            return cls(**stated)
+        except (KeyError, TypeError) as error:
+            raise ProblemError(f"not the description of a problem: {error}.") from None
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the fields: equal problems have equal hashes."""
+        text = json.dumps(self.to_dict(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+_NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

@@ -1,0 +1,88 @@
+"""Problem files: plain Python that states ``PROBLEM`` (and usually ``REFERENCE``). They are code, and are executed."""
+
+from __future__ import annotations
+
+import os
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+
+from colloc.gaits.problem import Problem, Reference
+from colloc.system.errors import ProblemError
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class ProblemFile:
+    """What a problem file states.
+
+    Attributes
+    ----------
+    problem : Problem
+    reference : Reference or None
+    source : str
+        Its text.
+    """
+
+    problem: Problem
+    reference: Reference | None
+    source: str
+
+
+def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
+    """Execute a problem file.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such file, it cannot be read, it fails (with the line), or states no ``PROBLEM``.
+    """
+    path, names, source = stated_names(path, "problem")
+    problem, reference = names.get("PROBLEM"), names.get("REFERENCE")
+    if problem is None:
+        raise ProblemError(f"{path} states no PROBLEM; end it with PROBLEM = Problem(...).")
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}.")
+    if reference is not None and not isinstance(reference, Reference):
+        raise ProblemError(f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}.")
+    return ProblemFile(problem, reference, source)
+
+
+def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
+    """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is for the messages.
+
+    Raises
+    ------
+    ProblemError
+        As for `read_problem_file`.
+    """
+    path = Path(path)
+    if not os.path.isfile(path):  # Path.is_file raises for a name that is too long
+        raise ProblemError(f"there is no {kind} file {path}.")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ProblemError(f"cannot read {path}: {error.strerror or error}.") from None
+    if content.startswith(_HDF5):
+        raise ProblemError(
+            f"{path} is a results file (HDF5), not a {kind} file in Python; colloc report or verify reads it, and colloc solve "
+            f"MINE.py --start {path} begins with its gait."
+        )
+    try:
+        source = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ProblemError(f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file.") from None
+    names: dict[str, object] = {"__name__": f"colloc_{kind}", "__file__": str(path)}
+    try:
+        exec(compile(source, str(path), "exec"), names)
+    except SyntaxError as error:
+        raise ProblemError(f"{path}, line {error.lineno}: {error.msg}.") from None
+    except (Exception, SystemExit) as error:
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+        where = f", line {lines[-1]}" if lines else ""
+        what = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
+        if isinstance(error, SystemExit):
+            what = f"the file ends the program ({what}); it should only state {kind.upper()}."
+        raise ProblemError(f"{path}{where}: {what}") from None
+    return path, names, source

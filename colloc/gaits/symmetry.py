@@ -1,0 +1,59 @@
+"""Symmetries of gaits: the part of a period that has to be solved, and the other part from it.
+
+Symmetries of a gait q(t), joints counted from the tail (their meaning is in `gaits.harmonic`), with the exchange of tail and
+head ``(S q)_j = -q_(n+1-j)``:
+
+- ``bilateral``: q(-t) = S q(t); the path starts and ends its half on shapes with S q = q, with tangents that S reverses.
+- ``antipodal``: q(t + 1/2) = -q(t).
+- ``none``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")
+
+
+def fraction(symmetry: str) -> float:
+    """The part of the period that has to be solved."""
+    return 1.0 if symmetry == NONE else 0.5
+
+
+def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Phases ``(n_time,)`` of the solved part that real phases t are images of, and whether they are (not identical)."""
+    t = np.asarray(t, dtype=float)
+    # whole periods are ends, not starts, so that a path that fails to close shows it
+    phase = np.where((t > 0) & (t % 1.0 == 0), 1.0, t % 1.0)
+    image = phase > fraction(symmetry)
+    other = {NONE: phase, BILATERAL: 1.0 - phase, ANTIPODAL: phase - 0.5}[symmetry]
+    return np.where(image, other, phase), image
+
+
+def imaged(symmetry: str, angles: np.ndarray, rates: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angles and rates ``(n_joint, n_time)``, those of the columns `image` turned into their images."""
+    if symmetry == BILATERAL:
+        return np.where(image, -angles[::-1], angles), np.where(image, rates[::-1], rates)
+    if symmetry == ANTIPODAL:
+        return np.where(image, -angles, angles), np.where(image, -rates, rates)
+    return angles, rates
+
+
+def end_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
+    """Matrices (A, B), independent rows, of the equations ``A q(first) + B q(last) = 0`` that close a path of angles."""
+    unit = np.eye(n_joint)
+    if symmetry == BILATERAL:
+        pairs = [unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j] for j in range((n_joint + 1) // 2)]
+        rows, zero = np.array(pairs), np.zeros((len(pairs), n_joint))
+        return np.vstack([rows, zero]), np.vstack([zero, rows])
+    return (unit if symmetry == ANTIPODAL else -unit), unit
+
+
+def tangent_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same for the tangents of a smooth path."""
+    unit = np.eye(n_joint)
+    if symmetry == BILATERAL:
+        rows = np.array([unit[j] - unit[n_joint - 1 - j] for j in range(n_joint // 2)])
+        zero = np.zeros_like(rows)
+        return np.vstack([rows, zero]), np.vstack([zero, rows])
+    return (unit if symmetry == ANTIPODAL else -unit), unit

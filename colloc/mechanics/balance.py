@@ -1,0 +1,85 @@
+"""The force and torque balance of a body in quasi-static sliding, and the power it dissipates.
+
+Everything is in body-frame axes; the torque is taken about the body's chosen reference (see `colloc.mechanics.body`). The same
+functions run on NumPy arrays and on CasADi matrices.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
+from colloc.mechanics.friction import Friction, LinkForce, link_force, link_force_jacobian, link_moments, power
+from colloc.numerics.arrays import Array, namespace
+
+
+class Instant(NamedTuple):
+    """A body at given instants: its posture, how its links move, and the friction on them."""
+
+    posture: Posture
+    velocity: LinkVelocity
+    force: LinkForce
+
+
+def instant(
+    body: Chain,
+    friction: Friction,
+    angles: Array,
+    rates: Array,
+    z: Array,
+    delta: Array,
+    reference: int | None = TAIL,
+) -> Instant:
+    """Posture, link velocities and friction for joint angles, joint rates ``(n_joint, n_time)`` and z ``(3, n_time)``."""
+    posture = body.posture(angles, reference)
+    velocity = body.velocity(posture, rates, z, reference)
+    return Instant(posture, velocity, link_force(*velocity, body.length_column(), delta, friction))
+
+
+def net_force(posture: Posture, force: LinkForce) -> Array:
+    """Sum of the link forces and their torque about the reference, ``(3, n_time)`` (paper, eq. ftb; zero in balance)."""
+    xp = namespace(posture.cos, force.normal)
+    fx = force.tangential * posture.cos - force.normal * posture.sin
+    fy = force.tangential * posture.sin + force.normal * posture.cos
+    torque = posture.x * fy - posture.y * fx + force.couple
+    return xp.stack([xp.sum_rows(fx), xp.sum_rows(fy), xp.sum_rows(torque)])
+
+
+def total_power(velocity: LinkVelocity, force: LinkForce) -> Array:
+    """Power dissipated by friction, ``(1, n_time)`` (integrand of the paper's eq. W)."""
+    return namespace(velocity.vs, force.normal).sum_rows(power(*velocity, force))
+
+
+def _pulled_back(posture: Posture, blocks: tuple[tuple[Array, Array, Array], ...]) -> np.ndarray:
+    """``sum over links of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn, w)/dz and K the given 3 x 3 of link arrays."""
+    c, s, x, y = posture
+    arm_s, arm_n = x * s - y * c, x * c + y * s
+    columns = [[row[0] * c - row[1] * s, row[0] * s + row[1] * c, row[0] * arm_s + row[1] * arm_n + row[2]] for row in blocks]
+    result = np.empty((c.shape[1], 3, 3))
+    for j in range(3):
+        k0, k1, k2 = columns[0][j], columns[1][j], columns[2][j]
+        result[:, 0, j] = (c * k0 - s * k1).sum(axis=0)
+        result[:, 1, j] = (s * k0 + c * k1).sum(axis=0)
+        result[:, 2, j] = (arm_s * k0 + arm_n * k1 + k2).sum(axis=0)
+    return result
+
+
+def balance_jacobian(body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
+    """Minus the derivative of `net_force` with respect to z, ``(n_time, 3, 3)``.
+
+    Symmetric positive definite for isotropic friction: the Hessian of the dissipation potential.
+    """
+    return _pulled_back(posture, link_force_jacobian(*velocity, body.length_column(), delta, friction))
+
+
+def secant_matrix(body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
+    """Matrix A(z) with ``net_force(z') ~ net_force(z) - A(z) (z' - z)`` when link speeds are frozen, ``(n_time, 3, 3)``.
+
+    One step of the paper's fixed point (eqs. ftbtilde to deltatilde) is ``z + A(z)^-1 net_force(z)``.
+    """
+    I0, I1, I2 = link_moments(*velocity, body.length_column(), delta)
+    mu_s, mu_t = friction.tangential(velocity.vs), friction.mu_t
+    zero = np.zeros_like(I0)
+    return _pulled_back(posture, ((mu_s * I0, zero, zero), (zero, mu_t * I0, mu_t * I1), (zero, mu_t * I1, mu_t * I2)))

@@ -1,0 +1,186 @@
+"""Which shapes are admissible: joint limits, and links that must not cross.
+
+Neighbours can only fold onto each other (|angle| <= pi). Links i and i + 2 with a joint at both ends of link i + 1 cross
+iff, with a and b the two joint angles, ``min(b + chi(a; l_i), a + chi(b; l_i+2)) > pi`` or the mirror image, where
+``chi(a; l) = atan2(l sin a, m + l cos a)`` and m is the length between; for equal lengths chi = a/2 and the condition is
+``min(2 a + b, a + 2 b) > 2 pi``. (Base m, base angles pi - a and pi - b: the tip of one link lies beyond the line of the
+other on both sides.)
+
+Links farther apart cross iff each has its ends on both sides of the other's line (`clearance`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from colloc.mechanics.body import Chain
+from colloc.numerics.arrays import Array, namespace
+
+Pairs = tuple[tuple[int, int], ...]
+"""Pairs of links."""
+
+SMOOTHING = 1e-3
+"""Width [rad] of the smoothed minimum; it errs to the safe side, by at most half of this."""
+CLEARANCE_SMOOTHING = 2e-4
+"""Width [body lengths] of smoothed absolute values and minima; they err to the safe side, by at most twice this."""
+
+
+def _subtended(angle: Array, link: float, middle: float) -> Array:
+    if link == middle:
+        return 0.5 * angle
+    xp = namespace(angle)
+    return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
+
+
+def crossing_sums(body: Chain, angles: Array) -> list[tuple[Array, Array]]:
+    """For links i and i + 2, the two sums that both exceed pi, or both fall below -pi, where they cross; ``(1, n_time)`` each.
+
+    Joint angles ``(n_joint, n_time)``.
+    """
+    sums = []
+    for i in range(body.n_link - 2):
+        before, middle, after = body.lengths[i : i + 3]
+        a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
+        sums.append((b + _subtended(a, before, middle), a + _subtended(b, after, middle)))
+    return sums
+
+
+def smooth_minimum(first: Array, second: Array, width: float = SMOOTHING) -> Array:
+    """The smaller of two values, or up to half of `width` more where they are equal."""
+    gap = first - second
+    spread = namespace(gap).sqrt(gap * gap + width * width) - width
+    return 0.5 * (first + second) - 0.5 * spread
+
+
+def share_of_first(first: Array, second: Array, width: float = SMOOTHING) -> Array:
+    """Derivative of `smooth_minimum` in its first argument; that in the second makes up 1."""
+    gap = first - second
+    return 0.5 - 0.5 * gap / namespace(gap).sqrt(gap * gap + width * width)
+
+
+def tangent_of_minimum(first: Array, second: Array, share: Array, width: float = SMOOTHING) -> Array:
+    """The tangent plane of `smooth_minimum` that has the slope `share` in the first argument; never below the minimum.
+
+    Where a path rounds the corner at which both sums are pi, the smaller sum has a peak with a kink, and the instant of the
+    peak moves with the path. By the envelope theorem the peak's height changes like the tangent plane at the peak, its
+    slope held; the minimum itself, at a fixed instant, falls whichever way the peak moves along the path.
+    """
+    share_of_second = 1.0 - share
+    bulge = 0.5 - namespace(share).sqrt(share * share_of_second)
+    return share * first + share_of_second * second + width * bulge
+
+
+def crossing_bounds(body: Chain, angles: Array) -> Array | None:
+    """Smooth functions that are <= pi only at shapes where no links i and i + 2 cross, ``(2 (n_link - 2), n_time)``.
+
+    None for a body of two links. Joint angles ``(n_joint, n_time)``.
+    """
+    if body.n_link < 3:
+        return None
+    rows = []
+    for first, second in crossing_sums(body, angles):
+        rows += [smooth_minimum(first, second), smooth_minimum(-first, -second)]
+    return namespace(angles).stack(rows)
+
+
+def far_pairs(body: Chain) -> list[tuple[int, int]]:
+    """All pairs of links that are more than two apart; `crossing_bounds` has those that are two apart."""
+    return [(i, j) for i in range(body.n_link) for j in range(i + 3, body.n_link)]
+
+
+def intrusions(body: Chain, angles: Array, first: int, second: int) -> tuple[Array, Array]:
+    """Two smooth functions that are both > 0 where links `first` < `second` cross [body lengths]; ``(1, n_time)`` each.
+
+    With m and d the mean and half the difference of the distances of one link's ends from the other's line, that link
+    lies on one side iff ``|d| - |m| <= 0``; this for one link, and for the other.
+    """
+    return -_side(body, angles, first, second), -_side(body, angles, second, first)
+
+
+def clearance(body: Chain, angles: Array, first: int, second: int) -> Array:
+    """A smooth function that is >= 0 only where links `first` < `second` do not cross [body lengths], ``(1, n_time)``.
+
+    Two segments cross iff neither lies on one side of the other: the smaller of the two `intrusions` decides. Smoothing also
+    closes the gap through which parallel links would slip through each other at one instant, when both ends pass at once.
+    """
+    return -smooth_minimum(*intrusions(body, angles, first, second), CLEARANCE_SMOOTHING)
+
+
+def _smooth_abs(xp, value: Array) -> Array:
+    """Never above the absolute value, and below it by at most 0.3 `CLEARANCE_SMOOTHING`."""
+    square = value * value
+    return square / xp.sqrt(square + CLEARANCE_SMOOTHING**2)
+
+
+def _side(body: Chain, angles: Array, line: int, link: int) -> Array:
+    """How far `link` stays on one side of the line through the link `line`; negative if its ends are on both sides."""
+    xp = namespace(angles)
+    step = 1 if link > line else -1
+    height, turn = 0.0, 0.0
+    # walk along the chain, in the frame of `line`, to the near end of `link`
+    for k in range(line + step, link + step, step):
+        joint = k - 1 if step > 0 else k
+        turn = turn + angles[joint : joint + 1, :]
+        rise = body.lengths[k] * xp.sin(turn)
+        near, height = height, height + rise
+    mean, spread = 0.5 * (near + height), 0.5 * (height - near)
+    return _smooth_abs(xp, mean) - xp.sqrt(spread * spread + CLEARANCE_SMOOTHING**2)
+
+
+def separate_pairs(body: Chain) -> list[tuple[int, int]]:
+    """All pairs of links that are not neighbours."""
+    return [(i, j) for i in range(body.n_link) for j in range(i + 2, body.n_link)]
+
+
+def crossing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
+    """How far links penetrate each other, ``(n_time,)``; 0 where no two of them cross.
+
+    Plain segment intersection of the given pairs, by default of all that are not neighbours, independent of
+    `crossing_bounds` and `clearance`: the depth is the smallest distance from an end of one of two crossing segments to the
+    other segment.
+    """
+    ends = np.stack(body.joints(angles))
+    depth = np.zeros(angles.shape[1])
+    for i, j in separate_pairs(body) if pairs is None else pairs:
+        (d1, d2), (d3, d4), _ = _end_distances(ends, i, j)
+        crossing = (d1 * d2 < 0) & (d3 * d4 < 0)
+        distance = np.min(np.abs([d1, d2, d3, d4]), axis=0)
+        depth = np.maximum(depth, np.where(crossing, distance, 0.0))
+    return depth
+
+
+def passing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
+    """How far links pass through each other between successive instants of a path [body lengths]; 0 if none does.
+
+    A link cannot cross another without an end of one passing through the other. That shows even where no sample holds a
+    crossing (parallel links that slip through each other): an end that is beside the other link changes its side. The
+    value is the smaller of the end's distances before and after.
+    """
+    ends = np.stack(body.joints(angles))
+    deepest = 0.0
+    for i, j in separate_pairs(body) if pairs is None else pairs:
+        first, second, beside = _end_distances(ends, i, j)
+        for distance, along in zip((*first, *second), beside, strict=True):
+            through = (distance[1:] * distance[:-1] < 0) & along[1:] & along[:-1]
+            passed = np.minimum(np.abs(distance[1:]), np.abs(distance[:-1]))[through]
+            deepest = max(deepest, float(passed.max(initial=0.0)))
+    return deepest
+
+
+def _end_distances(ends: np.ndarray, i: int, j: int) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    """Signed distances of the ends of link j from the line of link i, the other way round, and which ends lie beside."""
+    result: list[list[np.ndarray]] = []
+    beside = []
+    for line, link in ((i, j), (j, i)):
+        along = ends[:, line + 1] - ends[:, line]
+        length = np.hypot(*along)
+        seen = [ends[:, link] - ends[:, line], ends[:, link + 1] - ends[:, line]]
+        result.append([_cross(along, p) / length for p in seen])
+        beside += [np.abs((along * p).sum(axis=0) / length - 0.5 * length) < 0.5 * length for p in seen]
+    return result[0], result[1], beside
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,212 @@
+"""NumPy solver of the balance, batched over instants: tail velocities from shape and shape rates. No CasADi.
+
+Isotropic friction is the gradient of a strictly convex, coercive dissipation potential, so Armijo-damped Newton on that
+potential converges from any start. Unequal coefficients have no potential; there Newton steps are taken while they
+reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
+reweighted least squares) is the safeguard when a Newton step fails.
+
+Velocities are solved for at the midpoint of the slowest link, the *anchor*: a link at stick moves at speeds of order
+delta, which the tail velocity could only represent to 1e-16 in absolute terms. So forces stay accurate down to
+delta = 1e-14.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
+from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
+from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
+from colloc.mechanics.friction import Friction, link_dissipation
+from colloc.system.errors import NotConvergedError, ProblemError
+
+
+@dataclass(frozen=True)
+class BalanceSolution:
+    """Tail velocities that balance the body, instant by instant.
+
+    Attributes
+    ----------
+    z : (3, n_time)
+        Tail velocity (u, v, omega) in the body frame.
+    residual : (n_time,)
+        Largest of |net force| and |torque about the anchor| / body length, in units of the friction on a body that moves at
+        the largest rate: the largest coefficient, or less where delta exceeds that rate.
+    iterations : (n_time,)
+        Newton and fixed-point steps taken.
+    converged : (n_time,)
+        Whether the residual reached the tolerance.
+    anchor : (n_time,)
+        The slowest link, in whose velocity the instant was solved.
+    anchor_velocity : (3, n_time)
+        Velocity of the midpoint of the anchor, and its rotation rate, in body-frame axes.
+    """
+
+    z: np.ndarray
+    residual: np.ndarray
+    iterations: np.ndarray
+    converged: np.ndarray
+    anchor: np.ndarray
+    anchor_velocity: np.ndarray
+
+    def require(self) -> BalanceSolution:
+        """This solution, or a `NotConvergedError` naming the instants that failed."""
+        if not self.converged.all():
+            bad = np.flatnonzero(~self.converged)
+            raise NotConvergedError(
+                f"the balance did not converge at {bad.size} of {self.converged.size} instants "
+                f"(first: {bad[:5].tolist()}, worst residual {self.residual[bad].max():.1e})."
+            )
+        return self
+
+
+class _Batch:
+    """Instants that share a reference link: what an iteration evaluates on subsets of them."""
+
+    def __init__(self, body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, reference: int | None) -> None:
+        self.body, self.friction, self.reference = body, friction, reference
+        self.angles, self.rates = angles, rates
+
+    def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
+        return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
+
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Links ``(7, n_link, n)`` (posture, then velocity), net force ``(3, n)`` and merit ``(n,)`` at z.
+
+        The merit is what a step has to reduce: the potential where there is one, else half the squared residual.
+        """
+        now = self.at(select, z, delta)
+        force = net_force(now.posture, now.force)
+        if self.friction.isotropic:
+            potential = link_dissipation(*now.velocity, self.body.length_column(), delta)
+            merit = self.friction.mu_t * potential.sum(axis=0)
+        else:
+            merit = 0.5 * np.sum(force * force, axis=0)
+        return np.stack([*now.posture, *now.velocity]), force, merit
+
+    def step(self, links: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
+        """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``."""
+        step = np.empty_like(force)
+        for matrix, chosen in ((balance_jacobian, newton), (secant_matrix, ~newton)):
+            if chosen.any():
+                posture, velocity = Posture(*links[:4, :, chosen]), LinkVelocity(*links[4:, :, chosen])
+                left = matrix(self.body, self.friction, posture, velocity, delta[:, chosen])
+                step[:, chosen] = solve3(left, force[:, chosen])
+        return step
+
+    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
+        velocity = self.at(np.arange(z.shape[1]), z, delta).velocity
+        half = 0.5 * self.body.length_column()
+        anchor = np.argmin(np.abs(velocity.vs) + np.abs(velocity.vn) + half * np.abs(velocity.w), axis=0)
+        return anchor, self.rereferenced(z, delta, anchor)
+
+    def rereferenced(self, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
+        """Velocity ``(3, n)`` of the midpoints of the links `anchor`, for z in the batch's own reference."""
+        now = self.at(np.arange(z.shape[1]), z, delta)
+        vs, vn, w = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.velocity)
+        c, s = (np.take_along_axis(a, anchor[None], 0)[0] for a in now.posture[:2])
+        return np.stack([vs * c - vn * s, vs * s + vn * c, w])
+
+
+def _real(name: str, values: np.ndarray) -> np.ndarray:
+    """A two-dimensional array of floats, or a `ProblemError`."""
+    try:
+        array = np.atleast_2d(np.asarray(values))
+    except ValueError:  # rows of different lengths
+        array = np.array([[None]])
+    if array.dtype.kind not in "iuf":
+        raise ProblemError(f"{name} must be an array of real numbers, not {values!r:.80}.")
+    return array.astype(float)
+
+
+def solve_balance(
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    *,
+    start: np.ndarray | None = None,
+    tolerance: float = 1e-11,
+    max_iterations: int = 2000,
+    method: str = "auto",
+) -> BalanceSolution:
+    """Tail velocities that put the body in force and torque balance, for a batch of instants.
+
+    Parameters
+    ----------
+    body : Chain
+    friction : Friction
+    angles, rates : (n_joint, n_time)
+        Joint angles [rad] and their rates [rad/time].
+    delta : float
+        Regularisation speed, > 0.
+    start : (3, n_time), optional
+        Tail velocities to start from; by default the links' mean rotation is taken out of a body at rest.
+    tolerance : float
+        Largest `BalanceSolution.residual` at which an instant counts as converged.
+    max_iterations : int
+        Steps allowed to an instant in each of at most four attempts.
+    method : {"auto", "newton", "fixed_point"}
+        "auto" damps Newton and falls back on the paper's fixed point; the others are for comparison.
+
+    Returns
+    -------
+    BalanceSolution
+        With ``converged`` per instant; nothing is raised for an instant that fails (see `BalanceSolution.require`).
+
+    Raises
+    ------
+    ProblemError
+        For arrays of wrong shape or kind, non-finite numbers, or delta or tolerance that are not positive.
+    """
+    angles, rates = _real("angles", angles), _real("rates", rates)
+    n_time = angles.shape[1]
+    if angles.shape != (body.n_joint, n_time) or rates.shape != angles.shape:
+        raise ProblemError(
+            f"angles and rates must both have shape (n_joint, n_time) = ({body.n_joint}, n), "
+            f"not {angles.shape} and {rates.shape}."
+        )
+    for name, value in (("delta", delta), ("tolerance", tolerance)):
+        if not (isinstance(value, (int, float, np.number)) and np.isfinite(value) and value > 0):
+            raise ProblemError(f"{name} must be a positive finite number, not {value!r}.")
+    if method not in METHODS:
+        raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
+    if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
+        raise ProblemError("angles and rates must be finite.")
+    z = np.zeros((3, n_time))
+    if start is not None:
+        z = _real("start", start)
+        if z.shape != (3, n_time) or not np.isfinite(z).all():
+            raise ProblemError(f"start must be finite with shape (3, {n_time}).")
+
+    # work in units of the largest rate: the law is homogeneous once delta scales along
+    speed = np.abs(rates).max(axis=0)
+    speed[speed == 0] = 1.0
+    scaled_rates, scaled_delta = rates / speed, relative_delta(delta, speed)
+    tail = _Batch(body, friction, angles, scaled_rates, TAIL)
+    anchor = np.full(n_time, body.n_link // 2)
+    velocity = np.zeros((3, n_time)) if start is None else tail.rereferenced(z / speed, scaled_delta, anchor)
+    state = starting_state(anchor, velocity)
+
+    def batch(members: np.ndarray, link: int) -> _Batch:
+        return _Batch(body, friction, angles[:, members], scaled_rates[:, members], link)
+
+    solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
+
+    tail_z = np.empty((3, n_time))
+    for link in np.unique(state.anchor):
+        chosen = np.flatnonzero(state.anchor == link)
+        posture = body.posture(angles[:, chosen], int(link))
+        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], int(link))
+    return BalanceSolution(
+        tail_z * speed,
+        state.residual,
+        state.iterations,
+        state.residual <= tolerance,
+        state.anchor,
+        state.velocity * speed,
+    )

@@ -1,0 +1,73 @@
+"""Constraint rows of a transcription, kind by kind: bounds, a linear part, and what each block contributes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import sparse
+
+from colloc.numerics.mesh import Mesh
+
+
+@dataclass(eq=False)
+class Group:
+    """Constraint rows of one kind: bounds, linear part, and what the outputs of each named block contribute."""
+
+    name: str
+    lower: np.ndarray
+    upper: np.ndarray
+    linear: sparse.csr_matrix
+    parts: dict[str, sparse.csr_matrix] = field(default_factory=dict)
+
+    @property
+    def m(self) -> int:
+        return self.lower.size
+
+
+def selector(columns: np.ndarray, n: int) -> sparse.csr_matrix:
+    """``(len(columns), n)`` matrix that picks entries of a vector."""
+    rows = np.arange(columns.size)
+    return sparse.csr_matrix((np.ones(columns.size), (rows, columns)), shape=(columns.size, n))
+
+
+def stacked(groups: list[Group], block: str, n_source: int) -> sparse.csr_matrix:
+    """The scatter matrix of a block with `n_source` outputs into all rows."""
+    return sparse.vstack([g.parts.get(block, sparse.csr_matrix((g.m, n_source))) for g in groups]).tocsr()
+
+
+def equalities(name: str, linear: sparse.spmatrix, parts: dict[str, sparse.csr_matrix] | None = None) -> Group:
+    """Rows that vanish."""
+    zero = np.zeros(linear.shape[0])
+    return Group(name, zero, zero, sparse.csr_matrix(linear), parts or {})
+
+
+def gait_group(name: str, variables: np.ndarray, parameters: np.ndarray, matrix: np.ndarray, n: int) -> Group:
+    """``variables - matrix p = 0`` at every point, for variables ``(n_shape, n_point)`` that are linear in a gait's p.
+
+    `variables` and `parameters` are index arrays; the matrix is ``(n_point, n_shape, n_parameter)``.
+    """
+    rows = sparse.csr_matrix(matrix.reshape(-1, matrix.shape[-1]))
+    return equalities(name, selector(variables.ravel(order="F"), n) - rows @ selector(parameters[:, 0], n))
+
+
+def output_group(name: str, outputs: range, n_out: int, n_point: int, n: int) -> Group:
+    """Outputs of the block "point" that have to vanish at every point."""
+    columns = (np.arange(n_point)[:, None] * n_out + np.array(outputs)).ravel()
+    return equalities(name, sparse.csr_matrix((columns.size, n)), {"point": selector(columns, n_out * n_point)})
+
+
+def quadrature_group(name: str, variable: np.ndarray, output: int, n_out: int, mesh: Mesh, n: int, unit: float) -> Group:
+    """A state kept at the edges grows by the integral of an output of the block "point", which is per `unit` of time."""
+    state, rate = mesh.quadrature()
+    pick = selector(np.arange(mesh.n_point) * n_out + output, n_out * mesh.n_point)
+    return equalities(name, state @ selector(variable[0], n), {"point": (-unit * rate @ pick).tocsr()})
+
+
+def rotation_groups(symmetry: str, theta: np.ndarray, n: int) -> list[Group]:
+    """How the orientation, variables `theta` in order, closes where no symmetry does it."""
+    sign = {"none": -1.0, "antipodal": 1.0, "bilateral": None}[symmetry]
+    if sign is None:
+        return []
+    row = sparse.csr_matrix(([1.0, sign], ([0, 0], [theta[-1], theta[0]])), shape=(1, n))
+    return [equalities("rotation", row)]

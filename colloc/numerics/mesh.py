@@ -1,0 +1,103 @@
+"""The periodic time grid of a collocation scheme: where its nodes, stage points and states sit.
+
+An interval k runs from edges[k] to edges[k+1]. *Points* are the stages, where the equations hold; schemes whose first
+stage is the left end share it with the neighbour. *Sites* carry a state: every edge and every interior stage.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from colloc.numerics.schemes import Scheme
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A scheme on the intervals between `edges` (n + 1 ascending phases)."""
+
+    scheme: Scheme
+    edges: np.ndarray
+
+    @property
+    def n(self) -> int:
+        return len(self.edges) - 1
+
+    @property
+    def h(self) -> np.ndarray:
+        """Interval lengths, ``(n,)``."""
+        return np.diff(self.edges)
+
+    @property
+    def points(self) -> np.ndarray:
+        """``(n, s)``: index of each interval's stages among the points."""
+        stride = self.scheme.s - self.scheme.left
+        return np.arange(self.n)[:, None] * stride + np.arange(self.scheme.s)
+
+    @property
+    def n_point(self) -> int:
+        return int(self.points[-1, -1]) + 1
+
+    @property
+    def times(self) -> np.ndarray:
+        """Phases of the points, ``(n_point,)``."""
+        times = np.empty(self.n_point)
+        times[self.points] = self.edges[:-1, None] + self.h[:, None] * self.scheme.c
+        return times
+
+    @property
+    def _stride(self) -> int:
+        return 1 + self.scheme.s - self.scheme.left - self.scheme.right
+
+    @property
+    def sites(self) -> np.ndarray:
+        """``(n, s)``: index of each interval's stages among the sites."""
+        return np.arange(self.n)[:, None] * self._stride + np.arange(self.scheme.s) + (0 if self.scheme.left else 1)
+
+    @property
+    def edge_sites(self) -> np.ndarray:
+        """``(n + 1,)``: index of the edges among the sites."""
+        return np.arange(self.n + 1) * self._stride
+
+    @property
+    def n_site(self) -> int:
+        return self.n * self._stride + 1
+
+    def integration(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """Matrices (L, Q) of the equations ``L X - Q X' = 0`` of a state at the sites, from its rate at the points.
+
+        One row per stage that is not a left end, and one per right edge that is not a stage.
+        """
+        s = self.scheme
+        targets = [(self.sites[:, i], s.A[i]) for i in range(s.s) if not (s.left and i == 0)]
+        if not s.right:
+            targets.append((self.edge_sites[1:], s.b))
+        return self._defects(targets, self.edge_sites, self.n_site)
+
+    def quadrature(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """The same for a state that is kept at the edges only: ``X_(k+1) - X_k - h sum_j b_j X'_j``."""
+        edges = np.arange(self.n + 1)
+        return self._defects([(edges[1:], self.scheme.b)], edges, self.n + 1)
+
+    def _defects(self, targets, left: np.ndarray, n_state: int) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        n, s = self.n, self.scheme.s
+        state_row, state_col, state_value, rate_row, rate_col, rate_value = [], [], [], [], [], []
+        for order, (target, weights) in enumerate(targets):
+            row = np.arange(n) * len(targets) + order
+            state_row += [row, row]
+            state_col += [target, left[:n]]
+            state_value += [np.ones(n), -np.ones(n)]
+            rate_row.append(np.repeat(row, s))
+            rate_col.append(self.points.ravel())
+            rate_value.append((self.h[:, None] * weights).ravel())
+        m = n * len(targets)
+        state = (np.concatenate(state_value), (np.concatenate(state_row), np.concatenate(state_col)))
+        rate = (np.concatenate(rate_value), (np.concatenate(rate_row), np.concatenate(rate_col)))
+        return sparse.csr_matrix(state, shape=(m, n_state)), sparse.csr_matrix(rate, shape=(m, self.n_point))
+
+
+def uniform_mesh(scheme: Scheme, n: int, length: float) -> Mesh:
+    """`n` equal intervals on [0, length]."""
+    return Mesh(scheme, np.linspace(0.0, length, n + 1))

@@ -1,0 +1,110 @@
+"""Time-collocation schemes as data: tableaux of Lobatto IIIA, Gauss-Legendre and Radau IIA type.
+
+A scheme is its nodes ``c`` in [0, 1]; on an interval the derivative is the polynomial through its values at the nodes,
+so ``A[i, j] = integral of L_j from 0 to c_i``, ``b[j] = integral of L_j from 0 to 1`` with Lagrange polynomials L_j
+(Hairer, Norsett and Wanner, Solving ODEs I, section II.7). The same integrals up to any tau are the interpolant.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from colloc.system.errors import ProblemError
+
+_LARGEST = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Scheme:
+    """A collocation scheme.
+
+    Attributes
+    ----------
+    name : str
+    c : (s,)
+        Nodes in [0, 1], ascending.
+    A : (s, s)
+    b : (s,)
+    order : int
+        Order of the end-point values for a smooth problem.
+    """
+
+    name: str
+    c: np.ndarray
+    order: int
+    A: np.ndarray = field(init=False)
+    b: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "A", self.integrals(self.c))
+        object.__setattr__(self, "b", self.integrals(np.ones(1))[0])
+
+    @property
+    def s(self) -> int:
+        """Number of nodes."""
+        return len(self.c)
+
+    @property
+    def left(self) -> bool:
+        """The first node is the left end of the interval (then neighbours share their end nodes)."""
+        return bool(self.c[0] == 0.0)
+
+    @property
+    def right(self) -> bool:
+        """The last node is the right end of the interval."""
+        return bool(self.c[-1] == 1.0)
+
+    def lagrange(self, tau: np.ndarray) -> np.ndarray:
+        """Lagrange polynomials of the nodes at tau ``(k,)``, as ``(k, s)``."""
+        tau = np.asarray(tau, dtype=float)
+        values = np.ones((tau.size, self.s))
+        for j in range(self.s):
+            for m in range(self.s):
+                if m != j:
+                    values[:, j] *= (tau - self.c[m]) / (self.c[j] - self.c[m])
+        return values
+
+    def integrals(self, tau: np.ndarray) -> np.ndarray:
+        """Integrals of the Lagrange polynomials from 0 to tau ``(k,)``, as ``(k, s)``."""
+        tau = np.asarray(tau, dtype=float)
+        nodes, weights = np.polynomial.legendre.leggauss(self.s)
+        points = 0.5 * tau[:, None] * (nodes + 1.0)
+        values = self.lagrange(points.ravel()).reshape(tau.size, self.s, self.s)
+        return 0.5 * tau[:, None] * np.einsum("q,kqj->kj", weights, values)
+
+
+def _gauss_nodes(s: int) -> np.ndarray:
+    return 0.5 * (np.polynomial.legendre.leggauss(s)[0] + 1.0)
+
+
+def _radau_nodes(s: int) -> np.ndarray:
+    # zeros of P_s - P_(s-1), the largest of which is the right end
+    coefficients = np.zeros(s + 1)
+    coefficients[s], coefficients[s - 1] = 1.0, -1.0
+    roots = np.sort(np.polynomial.legendre.Legendre(coefficients).roots().real)
+    roots[-1] = 1.0
+    return 0.5 * (roots + 1.0)
+
+
+def scheme(name: str) -> Scheme:
+    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes.
+
+    Raises
+    ------
+    ProblemError
+        For any other name.
+    """
+    if name == "trapezoid":
+        return Scheme(name, np.array([0.0, 1.0]), 2)
+    if name == "hermite-simpson":
+        return Scheme(name, np.array([0.0, 0.5, 1.0]), 4)
+    match = re.fullmatch(r"(gauss|radau)-(\d{1,3})", name) if isinstance(name, str) else None
+    if match and 1 <= int(match[2]) <= _LARGEST:
+        s = int(match[2])
+        return Scheme(name, _gauss_nodes(s), 2 * s) if match[1] == "gauss" else Scheme(name, _radau_nodes(s), 2 * s - 1)
+    raise ProblemError(
+        f"unknown scheme {name!r}; choose trapezoid, hermite-simpson, gauss-N or radau-N with N from 1 to {_LARGEST}."
+    )

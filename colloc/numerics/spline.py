@@ -1,0 +1,126 @@
+"""Tensor-product cubic B-splines over the joint angles, with the symmetries of a body built in.
+
+Uniform knots on [-A, A] in every joint angle; N = intervals + 3 functions a joint. A function of the angles is a vector of
+N^n_joint coefficients, last joint fastest. Symmetries of the body permute the coefficients, so a function with a given
+parity has fewer free ones: ``full = E @ free`` with the sparse matrix of `symmetric_basis`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from colloc.system.errors import ProblemError
+
+# rows: the four cubic pieces that live on one interval, as polynomials 1, x, x^2, x^3 of the local coordinate
+_CUBIC = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6.0
+
+
+@dataclass(frozen=True)
+class TensorSpline:
+    """The space of tensor-product cubic splines on the cube |angle| <= limit.
+
+    Parameters
+    ----------
+    n_joint : int
+    limit : float
+        Half-width of the cube [rad].
+    intervals : int
+        Knot intervals a joint.
+    """
+
+    n_joint: int
+    limit: float
+    intervals: int
+
+    def __post_init__(self) -> None:
+        if self.intervals < 1 or self.n_joint < 1 or not self.limit > 0:
+            raise ProblemError("a spline needs at least one joint and one interval, and a positive limit.")
+
+    @property
+    def per_joint(self) -> int:
+        return self.intervals + 3
+
+    @property
+    def size(self) -> int:
+        return self.per_joint**self.n_joint
+
+    @property
+    def spacing(self) -> float:
+        return 2.0 * self.limit / self.intervals
+
+    def _pieces(self, angle: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+        """First index ``(n,)`` and the four values ``(4, n)`` of the functions of one joint, or of a derivative of them."""
+        position = (angle + self.limit) / self.spacing
+        cell = np.clip(np.floor(position).astype(int), 0, self.intervals - 1)
+        x = position - cell
+        powers = np.zeros((4, angle.size))
+        for k in range(order, 4):
+            powers[k] = np.prod(np.arange(k - order + 1, k + 1)) * x ** (k - order)
+        return cell, _CUBIC @ powers / self.spacing**order
+
+    def matrix(self, angles: np.ndarray, orders: tuple[int, ...] | None = None) -> sparse.csr_matrix:
+        """Values of all functions, or of their partial derivatives of the given orders, ``(n, size)``.
+
+        Parameters
+        ----------
+        angles : (n_joint, n)
+        orders : tuple of int, optional
+            Order of the derivative with respect to each joint angle; zero by default.
+        """
+        n = angles.shape[1]
+        column = np.zeros((1, n), dtype=int)
+        value = np.ones((1, n))
+        for joint, order in enumerate(orders or (0,) * self.n_joint):
+            first, pieces = self._pieces(angles[joint], order)
+            local = first + np.arange(4)[:, None]
+            column = (column[:, None] * self.per_joint + local).reshape(-1, n)
+            value = (value[:, None] * pieces).reshape(-1, n)
+        width = column.shape[0]
+        return sparse.csr_matrix((value.T.ravel(), column.T.ravel(), np.arange(n + 1) * width), shape=(n, self.size))
+
+    def slope(self, angles: np.ndarray, rates: np.ndarray) -> sparse.csr_matrix:
+        """Rates of change of all functions for joint rates ``(n_joint, n)``, ``(n, size)``."""
+        total = sparse.csr_matrix((angles.shape[1], self.size))
+        for joint in range(self.n_joint):
+            total = total + sparse.diags(rates[joint]) @ self.matrix(angles, _unit(joint, self.n_joint))
+        return total.tocsr()
+
+    @cached_property
+    def roughness(self) -> sparse.csr_matrix:
+        """Gram matrix ``(size, size)`` of the second derivatives: ``c.roughness.c`` is about the integral of |D^2 f|^2."""
+        points = 2 * self.intervals
+        axis = -self.limit + (np.arange(points) + 0.5) * 0.5 * self.spacing
+        angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.n_joint, indexing="ij")])
+        total = sparse.csr_matrix((self.size, self.size))
+        for i in range(self.n_joint):
+            for j in range(self.n_joint):
+                orders = tuple(int(k == i) + int(k == j) for k in range(self.n_joint))
+                second = self.matrix(angles, orders)
+                total = total + second.T @ second
+        return (total * (0.5 * self.spacing) ** self.n_joint).tocsr()
+
+    def symmetric_basis(self, mirror: int, swap: int | None) -> sparse.csr_matrix:
+        """``(size, n_free)``: functions with f(-q) = mirror f(q), and f(-reversed q) = swap f(q) unless swap is None."""
+        index = np.arange(self.size).reshape((self.per_joint,) * self.n_joint)
+        flipped = index[(slice(None, None, -1),) * self.n_joint]
+        group = [(index.ravel(), 1), (flipped.ravel(), mirror)]
+        if swap is not None:
+            turned = flipped.transpose(tuple(range(self.n_joint))[::-1]).ravel()
+            group += [(turned, swap), (flipped.ravel()[turned], mirror * swap)]
+        average = sparse.csr_matrix((self.size, self.size))
+        everything = np.arange(self.size)
+        for image, sign in group:
+            average = average + sparse.csr_matrix((np.full(self.size, float(sign)), (everything, image)))
+        # orbits: one free coefficient for each, unless the signs cancel
+        representative = np.min([image for image, _ in group], axis=0)
+        columns = np.flatnonzero((representative == everything) & (abs(average.diagonal()) > 0))
+        basis = average.tocsc()[:, columns]
+        return (basis @ sparse.diags(1.0 / abs(basis).max(axis=0).toarray().ravel())).tocsr()
+
+
+def _unit(joint: int, n_joint: int) -> tuple[int, ...]:
+    return tuple(int(j == joint) for j in range(n_joint))

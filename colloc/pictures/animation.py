@@ -1,0 +1,129 @@
+"""Pictures of an animation: the body on the plane with the friction on its links, and the path in shape space beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from colloc.pictures.figure import GREY, ORANGE, RED, SKY, STYLE, draw_shape_path
+from colloc.pictures.motion_frames import Frames, frames
+from colloc.results.solution import Solution
+
+_ARROW = 0.12
+"""Length [body lengths] of the arrow of the largest friction."""
+
+
+def pictures(solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900) -> Iterator[np.ndarray]:
+    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes.
+
+    Parameters
+    ----------
+    solution : Solution
+        With at least one level.
+    count : int
+        Pictures a period.
+    periods : int
+        Fewer are shown where the body turns, since then its path is no straight line.
+    arrows : bool
+        Draw friction.
+    width : int
+        Pixels, even.
+    """
+    shown = frames(solution, count + 1, periods=periods)
+    with matplotlib.rc_context(STYLE):
+        scene = _Scene(solution, shown, arrows, width)
+        for k in range(shown.periods * count):
+            yield scene.picture(*divmod(k, count))
+
+
+class _Scene:
+    """A figure whose artists move."""
+
+    def __init__(self, solution: Solution, shown: Frames, arrows: bool, width: int) -> None:
+        self.shown = shown
+        low, high = _window(shown)
+        planar = solution.problem.body.n_joint >= 2
+        share = 0.68 if planar else 0.97
+        span = high - low
+        tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
+        height = 2 * round((tall + 0.13 * width) / 2)
+        figure = Figure(figsize=(width / 100, height / 100), dpi=100)
+        self.canvas = FigureCanvasAgg(figure)
+        self.size = (height, width)
+        axes = figure.add_axes((0.015, 0.03, share, tall / height))
+        # the whole window, at equal scales
+        scale = max(span[0] / (share * width), span[1] / tall)
+        half, middle = 0.5 * scale * np.array([share * width, tall]), 0.5 * (low + high)
+        low, high = middle - half, middle + half
+        axes.set(xticks=_grid(low[0], high[0]), yticks=_grid(low[1], high[1]))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.grid(color="#e8ecef", lw=0.8)
+        axes.tick_params(length=0, labelbottom=False, labelleft=False)
+        axes.spines[:].set_visible(False)
+        verdict = "" if solution.status == "solved" else f"  ({solution.status})"
+        title = f"{solution.problem.name}   efficiency {solution.measured.efficiency:.4f}{verdict}"
+        figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
+        self.phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
+        self.trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, RED)]
+        (self.body,) = axes.plot([], [], "-", color="#1d2329", lw=4, solid_capstyle="round", solid_joinstyle="round")
+        (self.joints,) = axes.plot([], [], "o", color="white", mec="#1d2329", ms=5)
+        (self.head,) = axes.plot([], [], "o", color="#1d2329", ms=9)
+        (self.centre,) = axes.plot([], [], "o", color=RED, ms=5)
+        self.quiver: Any = None
+        if arrows:
+            base = shown.arrow_base[:, :, 0]
+            # of lengths below a head's size the head shrinks too, so that weak friction looks weak
+            self.quiver = axes.quiver(
+                *base,
+                *base,
+                color=RED,
+                angles="xy",
+                scale_units="xy",
+                scale=1,
+                width=0.0024,
+                headwidth=4,
+                headlength=5,
+                zorder=4,
+            )
+            self.scale = _ARROW / max(float(np.hypot(*shown.arrow).max()), 1e-300)
+        self.dot = None
+        if planar:
+            plane = figure.add_axes((0.755, 0.2, 0.235, 0.62))
+            draw_shape_path(plane, solution.problem, shown.angles, legend=False)
+            (self.dot,) = plane.plot([], [], "o", color=RED, mec="white", ms=8, zorder=5)
+
+    def picture(self, period: int, k: int) -> np.ndarray:
+        """The image at column k of a period."""
+        shown, shift = self.shown, period * self.shown.step
+        ends = shown.ends[:, :, k] + shift[:, None]
+        self.body.set_data(*ends)
+        self.joints.set_data(*ends[:, 1:-1])
+        self.head.set_data(*ends[:, -1:])
+        self.centre.set_data(*(shown.centre[:, [k]] + shift[:, None]))
+        for line, path in zip(self.trails, (shown.ends[:, 0], shown.ends[:, -1], shown.centre), strict=True):
+            whole = [path + p * shown.step[:, None] for p in range(period)]
+            line.set_data(*np.concatenate([*whole, path[:, : k + 1] + shift[:, None]], axis=1))
+        if self.quiver is not None:
+            self.quiver.set_offsets((shown.arrow_base[:, :, k] + shift[:, None]).T)
+            self.quiver.set_UVC(*(self.scale * shown.arrow[:, :, k]))
+        if self.dot is not None:
+            self.dot.set_data(shown.angles[:1, k], shown.angles[1:2, k])
+        self.phase.set_text(f"t = {period + shown.t[k]:.2f}")
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba())[: self.size[0], : self.size[1], :3].copy()
+
+
+def _window(shown: Frames) -> tuple[np.ndarray, np.ndarray]:
+    last = (shown.periods - 1) * shown.step[:, None]
+    reach = np.concatenate([shown.ends.reshape(2, -1), shown.ends.reshape(2, -1) + last], axis=1)
+    return reach.min(axis=1) - _ARROW, reach.max(axis=1) + _ARROW
+
+
+def _grid(low: float, high: float) -> np.ndarray:
+    """Multiples of a fifth of the body's length."""
+    return np.arange(np.ceil(low / 0.2), np.floor(high / 0.2) + 1) * 0.2

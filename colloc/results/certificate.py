@@ -1,0 +1,151 @@
+"""The certificate: every solve is judged by an independent replay and by its own first-order conditions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.paths import ArcPath, Corners
+from colloc.mechanics.balance import net_force
+from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.results.solution import Certificate, Check, Solution
+from colloc.verification.mesh_error import mesh_error
+from colloc.verification.replay import Path, Replay, replay
+
+KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK, DELTA = 1e-6, 1e-8, 1e-6, 1e-9, 1e-3, 1e-6, 1e-4, 1e-7, 1e-2
+CURVATURE = 1e-6
+"""Largest values that pass. ROTATION: turning by r a period shortens the straight-line distance by r^2/24 only. DELTA is
+the paper's own claim (less than 1 % below delta = 1e-4)."""
+
+_FINE_PHASES = 20000
+
+
+def gait_path(solution: Solution) -> Path:
+    """Joint angles and rates of the solution's gait as a function of phase."""
+    gait = solution.gait
+    return lambda t: (gait.angles(t), gait.rates(t))
+
+
+def corner_phases(gait: AnyGait) -> np.ndarray:
+    """Phases in (0, 1) where the rates of a gait jump."""
+    if not isinstance(gait, Corners):
+        return np.empty(0)
+    phases = gait.phases
+    images = {"none": phases, "bilateral": 1 - phases, "antipodal": 0.5 + phases}[gait.symmetry]
+    both = np.concatenate([phases, images])
+    return np.unique(both[(both > 0) & (both < 1)])
+
+
+def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
+    """Replay the last level's gait on a much finer grid and measure everything a claim of success rests on.
+
+    Parameters
+    ----------
+    solution : Solution
+    tolerance : float
+        Relative error of the replayed efficiency.
+    instants : int, optional
+        Instants of the first replay grid; by default at least ten times the collocation points of a period.
+
+    Raises
+    ------
+    NotConvergedError
+        If the balance cannot be solved at some instant of the replay.
+    """
+    problem = solution.problem
+    path = gait_path(solution)
+    if instants is None:
+        instants = max(1600, 2 * int(np.ceil(5 * solution.mesh.n_point / problem.gait.fraction)))
+    delta, breaks = solution.delta_per_period, corner_phases(solution.gait)
+    fine = replay(problem.body, problem.friction, path, delta, instants=instants, tolerance=tolerance, breaks=breaks)
+    at_tenth = replay(
+        problem.body, problem.friction, path, 0.1 * delta, instants=fine.instants, tolerance=tolerance, breaks=breaks
+    )
+    # the influence of delta is linear to leading order: the rest is a ninth of the last step
+    at_zero = at_tenth.efficiency + (at_tenth.efficiency - fine.efficiency) / 9
+    checks = (
+        *_optimality(solution),
+        *_motion(solution, fine, path),
+        *_class(solution),
+        *_mesh(solution),
+        *_delta(solution, fine, at_zero),
+    )
+    return Certificate(checks, fine.efficiency, fine.distance, fine.work, fine.error * fine.efficiency, at_zero, fine.instants)
+
+
+def _optimality(solution: Solution) -> list[Check]:
+    level = solution.last
+    _, now = solution.at_points()
+    residual = np.abs(net_force(now.posture, now.force)).max() / solution.problem.friction.largest
+    return [
+        Check("KKT error", max(level.kkt_error, level.complementarity), KKT, "gradient of the Lagrangian, complementarity"),
+        Check("constraint violation", level.violation, VIOLATION, "largest violated equation or bound"),
+        Check("balance at nodes", float(residual), RESIDUAL, "net force and torque by the closed-form law"),
+    ]
+
+
+def _motion(solution: Solution, fine: Replay, path: Path) -> list[Check]:
+    problem, level = solution.problem, solution.last
+    ends, _ = path(np.array([0.0, 1.0]))
+    angles, _ = path(np.linspace(0.0, 1.0, _FINE_PHASES + 1))
+    beyond = max(float(np.abs(angles).max()) - problem.joint_limit, 0.0)
+    depth = max(float(crossing_depth(problem.body, angles).max()), passing_depth(problem.body, angles))
+    return [
+        Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
+        Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),
+        Check("net rotation", abs(fine.rotation), ROTATION, "of the replayed body over one period [rad]"),
+        Check("joint limits", beyond, ADMISSIBLE, "excess between nodes [rad]"),
+        Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
+        Check("replay gap", level.efficiency / fine.efficiency - 1, GAP, "collocated over replayed efficiency, less 1"),
+        Check("replay error", fine.error, GAP, "relative, estimated from half the replay grid"),
+        Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
+    ]
+
+
+_BESIDE = 1e-10
+
+
+def _largest_jump(gait: ArcPath) -> float:
+    """Largest jump of the angles of a free path where its arcs meet and where a symmetry continues it."""
+    seams = np.concatenate([gait.edges, 1 - gait.edges, 0.5 + gait.edges])
+    seams = seams[(seams > _BESIDE) & (seams < 1 - _BESIDE)]
+    jump = np.linalg.norm(gait.angles(seams + _BESIDE) - gait.angles(seams - _BESIDE), axis=0).max()
+    return float(max(jump - 2 * _BESIDE * gait.length, 0.0))
+
+
+def _class(solution: Solution) -> list[Check]:
+    """How far a free path bends more than its class allows, from the directions of its rates alone."""
+    gait = solution.gait
+    if not isinstance(gait, ArcPath):
+        return []
+    t = np.linspace(0.0, 1.0, _FINE_PHASES + 1)
+    tangent = gait.rates(t) / gait.length
+    turn = 2 * np.arcsin(0.5 * np.linalg.norm(np.diff(tangent), axis=0))
+    curvature = float(turn.max()) * _FINE_PHASES / gait.length
+    excess = max(curvature / solution.problem.gait.curvature - 1, 0.0)
+    return [
+        Check("joins", _largest_jump(gait), VIOLATION, "jump of the joint angles where arcs or symmetric halves meet [rad]"),
+        Check("curvature", excess, CURVATURE, "of the path between nodes, relative excess over its bound"),
+    ]
+
+
+def _mesh(solution: Solution) -> list[Check]:
+    """The error estimate from the scheme's own defect; it has to pass only if the problem requests an accuracy."""
+    problem = solution.problem
+    tolerance = problem.mesh_tolerance
+    if tolerance == 0:
+        return []
+    error = mesh_error(problem, solution.mesh, solution.gait, solution.delta_per_period, tolerance)
+    return [Check("mesh error", error.estimate, tolerance, "of the efficiency, relative, from defects between nodes")]
+
+
+def _delta(solution: Solution, fine: Replay, at_zero: float) -> list[Check]:
+    checks = [
+        Check("delta influence", at_zero / fine.efficiency - 1, DELTA, "same gait at delta -> 0, relative change"),
+    ]
+    before = [level for level in solution.levels[:-1] if level.optimal and level.delta > solution.last.delta]
+    if before:
+        change = solution.last.efficiency / before[-1].efficiency - 1
+        allowed = DELTA * max(1.0, before[-1].delta / solution.last.delta)
+        checks.append(Check("delta step", change, allowed, f"change since level delta = {before[-1].delta:.0e}, relative"))
+    return checks

@@ -1,0 +1,103 @@
+"""What a search over many starts found: outcomes, and the distinct optima among them with their frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.equivalence import distance
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.problem import Problem
+from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
+
+TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
+STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, TIME_LIMIT, ERROR, CRASHED)
+SAME_EFFICIENCY, SAME_GAIT = 1e-3, 0.05
+"""Two certified optima are the same if their efficiencies differ by less than this relative amount and their paths by less
+than this root-mean-square distance [rad], modulo symmetries. Efficiency is flat at its maximum, so the path is the laxer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of one start.
+
+    Attributes
+    ----------
+    start : int
+        Its number.
+    status : str
+        One of `STATUSES`; only "solved" (certified by replay) is a success.
+    message : str
+        What went wrong, if something did.
+    guess, gait : Fourier
+        Where the search began and ended.
+    efficiency, efficiency_error, distance, work : float
+        Replayed and, failing that, collocated; NaN if there is none.
+    delta : float
+        The smallest at which an optimum was found; NaN if none.
+    iterations : int
+    seconds : float
+        Wall time, certificate included.
+    cpu_seconds : float
+        Processor time of the same, which other work on the machine does not lengthen as much.
+    """
+
+    start: int
+    status: str
+    message: str
+    guess: Fourier
+    gait: Fourier
+    efficiency: float = np.nan
+    efficiency_error: float = np.nan
+    distance: float = np.nan
+    work: float = np.nan
+    delta: float = np.nan
+    iterations: int = 0
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Basin:
+    """A distinct certified optimum and the starts that ended there.
+
+    Attributes
+    ----------
+    best : Outcome
+        Its most efficient member.
+    starts : tuple of int
+    frequency : float
+        Share of all starts tried.
+    """
+
+    best: Outcome
+    starts: tuple[int, ...]
+    frequency: float
+
+
+def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
+    """The distinct certified optima, best first.
+
+    Outcomes join the first, more efficient, optimum they agree with in efficiency and in gait modulo start phase and the
+    symmetries of body and friction (see `colloc.gaits.equivalence.images`).
+    """
+    solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.efficiency)
+    found: list[list[Outcome]] = []
+    for outcome in solved:
+        for members in found:
+            best = members[0]
+            if best.efficiency - outcome.efficiency > SAME_EFFICIENCY * best.efficiency:
+                continue
+            if distance(best.gait, outcome.gait, problem.body, problem.friction) < SAME_GAIT:
+                members.append(outcome)
+                break
+        else:
+            found.append([outcome])
+    return [Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m in found]
+
+
+def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
+    """How many starts ended in each status; only those that occur."""
+    return {s: n for s in STATUSES if (n := sum(o.status == s for o in outcomes))}

@@ -1,0 +1,332 @@
+"""The result of a solve: levels of the continuation, and the motion at any instant by the scheme's own interpolant."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from importlib import metadata
+
+import numpy as np
+
+from colloc.collocation.layout import RADIANS, Layout, problem_layout
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.level import Level
+from colloc.mechanics.balance import Instant, instant, total_power
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
+from colloc.results.solution_card import solution_card
+from colloc.system.errors import ProblemError
+
+SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of a certificate: what was measured, the largest value allowed, and what it means."""
+
+    name: str
+    value: float
+    threshold: float
+    meaning: str
+
+    @property
+    def passed(self) -> bool:
+        return bool(np.isfinite(self.value) and abs(self.value) <= self.threshold)
+
+    def line(self) -> str:
+        """For a terminal."""
+        return (
+            f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= {self.threshold:.0e})  {self.meaning}"
+        )
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The verdict of an independent replay.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    efficiency, distance, work : float
+        Of the replay, over one period, at the solution's delta.
+    efficiency_error : float
+        Estimated error of that efficiency from refining the replay.
+    efficiency_at_zero_delta : float
+        Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed.
+    instants : int
+        Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
+    """
+
+    checks: tuple[Check, ...]
+    efficiency: float
+    distance: float
+    work: float
+    efficiency_error: float
+    efficiency_at_zero_delta: float
+    instants: int
+
+    @property
+    def replayed(self) -> bool:
+        """Whether there was a replay at all; if not, all numbers are NaN."""
+        return self.instants > 0
+
+    @property
+    def passed(self) -> bool:
+        return all(check.passed for check in self.checks)
+
+    @property
+    def failures(self) -> list[Check]:
+        return [check for check in self.checks if not check.passed]
+
+
+UNCERTIFIED = Certificate(
+    (Check("replay", np.inf, 0.0, "not made, since the solve did not converge: nothing was checked"),),
+    instants=0,
+    **{each.name: np.nan for each in fields(Certificate) if each.name not in ("checks", "instants")},
+)
+"""Of a solve that did not converge: it fails, and says that nothing was checked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The body at given instants, ``n_time`` columns each.
+
+    Attributes
+    ----------
+    t : (n_time,)
+        Phase.
+    angles, rates : (n_joint, n_time)
+    z : (3, n_time)
+        Tail velocity (u, v, omega) in the body frame, per period.
+    theta : (n_time,)
+        Lab angle of the tail link.
+    centre, tail : (2, n_time)
+        Lab positions of the centre of mass and of the tail.
+    """
+
+    t: np.ndarray
+    angles: np.ndarray
+    rates: np.ndarray
+    z: np.ndarray
+    theta: np.ndarray
+    centre: np.ndarray
+    tail: np.ndarray
+
+
+@dataclass(eq=False)
+class Solution:
+    """What a solve found.
+
+    Attributes
+    ----------
+    problem : Problem
+    levels : list of Level
+        In the order they were solved; the last one is the result.
+    certificate : Certificate
+        `UNCERTIFIED` if the solve did not converge.
+    seconds : float
+        Wall time of the whole solve.
+    source : str
+        Text of the problem file, if there was one.
+    message : str
+        What went wrong and what to try, if something did.
+    versions : dict
+    changed : bool
+        Whether another program changed the file that the result was loaded from; `colloc verify` decides what it is worth.
+    """
+
+    problem: Problem
+    levels: Sequence[Level]
+    certificate: Certificate = UNCERTIFIED
+    seconds: float = 0.0
+    source: str = ""
+    message: str = ""
+    versions: dict[str, str] = field(default_factory=lambda: versions())
+    changed: bool = False
+
+    def __repr__(self) -> str:
+        facts = [self.problem.name, self.status]
+        if self.levels:
+            replayed = "" if self.certificate.replayed else " (not replayed)"
+            error = f" +- {self.certificate.efficiency_error:.0e}" if self.certificate.replayed else ""
+            facts.append(f"d/W = {self.measured.efficiency:.6g}{error}{replayed} at delta = {self.last.delta:.1e}")
+        return f"<Solution {', '.join(facts)}>"
+
+    @property
+    def status(self) -> str:
+        """One of "solved", "not converged", "certificate failed"."""
+        reached = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta <= self.problem.delta * (1 + 1e-9)
+        if not reached or not self.certificate.replayed:
+            return NOT_CONVERGED
+        return SOLVED if self.certificate.passed else CERTIFICATE_FAILED
+
+    @property
+    def last(self) -> Level:
+        """The result.
+
+        Raises
+        ------
+        ProblemError
+            If the solve failed before its first level ended.
+        """
+        if not self.levels:
+            raise ProblemError(f"{self.problem.name} holds no gait: its solve failed before the first level.")
+        return self.levels[-1]
+
+    @property
+    def measured(self) -> Certificate | Level:
+        """What says efficiency, distance and work best: the replay if there was one, else the last level."""
+        return self.certificate if self.certificate.replayed else self.last
+
+    @property
+    def efficiency(self) -> float:
+        """d/W of the last level; the certificate says whether to believe it."""
+        return self.last.efficiency
+
+    @property
+    def distance(self) -> float:
+        return self.last.distance
+
+    @property
+    def work(self) -> float:
+        return self.last.work
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh of the last level."""
+        return Mesh(scheme(self.last.scheme or self.problem.scheme), self.last.edges)
+
+    @property
+    def layout(self) -> Layout:
+        return problem_layout(self.problem, self.mesh)
+
+    @property
+    def gait(self) -> AnyGait:
+        """The gait of the last level."""
+        parameters = self.last.x[self.layout.parameters[:, 0]]
+        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.last.edges)
+
+    @property
+    def delta_per_period(self) -> float:
+        """Regularisation speed of the last level in body lengths per period, whatever the class measures it in."""
+        return self.last.delta * self.gait.delta_unit
+
+    def at_points(self) -> tuple[np.ndarray, Instant]:
+        """Phases of the collocation points and the body there, from the variables of the last level (per period)."""
+        problem = self.problem
+        return self.mesh.times, instant(problem.body, problem.friction, *self._point_motion(), self.delta_per_period)
+
+    def _point_motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, rates and tail velocities per period at the collocation points."""
+        x, layout, problem = self.last.x, self.layout, self.problem
+        if layout.z.size:
+            return x[layout.angles], RADIANS * x[layout.rates], RADIANS * x[layout.z]
+        gait, times = self.gait, self.mesh.times
+        angles, rates = gait.angles(times), gait.rates(times)
+        return angles, rates, solve_balance(problem.body, problem.friction, angles, rates, self.delta_per_period).z
+
+    def sample(self, t: np.ndarray | float) -> Motion:
+        """The motion at phases t, any real numbers; whole periods add up.
+
+        Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's, so that the error
+        between nodes is visible. The lab frame has the centre of mass at the origin and the motion along +x at t = 0.
+        """
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        if t.ndim != 1 or not np.isfinite(t).all():
+            raise ValueError("t must be finite phases, a number or a one-dimensional array.")
+        period, phase = np.divmod(t, 1.0)
+        symmetry, body = self.problem.gait.symmetry, self.problem.body
+        second = phase > self.problem.gait.fraction
+        reduced = {"none": phase, "bilateral": np.where(second, 1.0 - phase, phase), "antipodal": phase - 0.5 * second}[
+            symmetry
+        ]
+        z, theta, centre, end = self._interpolated(reduced)
+        angles, rates = self.gait.angles(phase), self.gait.rates(phase)
+        if symmetry == "bilateral":
+            # seen from the head the body repeats itself with reversed rates
+            here = instant(
+                body, self.problem.friction, self.gait.angles(reduced), self.gait.rates(reduced), z, self.delta_per_period
+            ).velocity
+            head = np.stack([here.vs[-1], here.vn[-1] + 0.5 * body.lengths[-1] * here.w[-1], -here.w[-1]])
+            z = np.where(second, head, z)
+            theta = np.where(second, theta + self.gait.angles(reduced).sum(axis=0), theta)
+            centre = np.where(second, 2 * end[:, None] - centre, centre)
+            end = 2 * end
+        elif symmetry == "antipodal":
+            mirror = np.array([[1.0], [-1.0], [-1.0]])
+            z = np.where(second, mirror * z, z)
+            theta = np.where(second, -theta, theta)
+            centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
+            end = np.array([2 * end[0], 0.0])
+        centre = centre + period * end[:, None]
+        cx, cy = body.centre(body.posture(angles))
+        c, s = np.cos(theta), np.sin(theta)
+        tail = centre - np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
+        return Motion(t, angles, rates, z, theta, centre, tail)
+
+    def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """z, theta and centre of mass at phases t of the solved part, and the centre's displacement at its end."""
+        mesh, layout, x, scheme = self.mesh, self.layout, self.last.x, self.mesh.scheme
+        k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
+        tau = (t - mesh.edges[k]) / mesh.h[k]
+        value, integral = scheme.lagrange(tau), scheme.integrals(tau)
+        z_points = self._point_motion()[2]
+        _, now = self.at_points()
+        site_theta = np.empty(mesh.n_point)
+        site_theta[mesh.points] = x[layout.theta[0]][mesh.sites]
+        cx, cy = self.problem.body.centre_velocity(now.posture, now.velocity)
+        c, s = np.cos(site_theta), np.sin(site_theta)
+        lab = np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
+        steps = np.einsum("ks,cks,k->ck", np.broadcast_to(scheme.b, (mesh.n, scheme.s)), lab[:, mesh.points], mesh.h)
+        edges = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
+        points = mesh.points[k]
+        z = np.einsum("ts,cts->ct", value, z_points[:, points])
+        theta = x[layout.theta[0, mesh.edge_sites[k]]] + mesh.h[k] * np.einsum("ts,ts->t", integral, z_points[2, points])
+        centre = edges[:, k] + mesh.h[k] * np.einsum("ts,cts->ct", integral, lab[:, points])
+        return z, theta, centre, edges[:, -1]
+
+    def power(self, motion: Motion) -> np.ndarray:
+        """Power against friction at the instants of a motion, ``(n_time,)``."""
+        problem = self.problem
+        now = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, self.delta_per_period)
+        return total_power(now.velocity, now.force)[0]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: verdict, numbers, checks and the path in shape space."""
+        return solution_card(self.problem.name, self.status, self.message, self._facts(), self._checks(), self._thumbnail())
+
+    def _facts(self) -> list[tuple[str, str]]:
+        if not self.levels:
+            return []
+        certificate = self.certificate
+        if not certificate.replayed:
+            return [("efficiency (not replayed)", f"{self.efficiency:.5f}"), ("δ", f"{self.last.delta:.0e}")]
+        return [
+            ("efficiency d/W", f"{certificate.efficiency:.5f} ± {certificate.efficiency_error:.0e}"),
+            ("for δ → 0", f"{certificate.efficiency_at_zero_delta:.5f}"),
+            ("distance d", f"{certificate.distance:.5f}"),
+            ("work W", f"{certificate.work:.5f}"),
+            ("δ", f"{self.last.delta:.0e}"),
+        ]
+
+    def _checks(self) -> list[tuple[str, bool, str]]:
+        checks = self.certificate.checks if self.certificate.replayed else ()
+        return [(check.name, check.passed, f"{check.value:.1e} (≤ {check.threshold:.0e})") for check in checks]
+
+    def _thumbnail(self) -> np.ndarray | None:
+        return self.sample(np.linspace(0.0, 1.0, 181)).angles if self.levels else None
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything a result depends on."""
+    names = ("colloc", "casadi", "numpy", "scipy", "h5py")
+    found = {"python": platform.python_version()}
+    for name in names:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "source tree"
+    return found

@@ -1,0 +1,166 @@
+"""Solutions as HDF5 files: self-describing, readable with plain h5py, replaced atomically, and nothing but data.
+
+Layout of a file (every dataset carries ``units`` and ``dims``)::
+
+    /problem            JSON text of all fields          /source     text of the problem file
+    /gait/{mean,cos,sin}                                 /versions   JSON text
+         or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
+    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
+    /levels/000/{edges,x,lam_x,lam_g}, attributes delta, efficiency, distance, work, kkt_error, iterations, ...
+    /certificate/{name,value,threshold,passed,meaning}, attributes efficiency, efficiency_error, ...
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import warnings
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from colloc.gaits.gait_fields import fields
+from colloc.gaits.problem import Problem
+from colloc.level import Level
+from colloc.results.solution import UNCERTIFIED, Certificate, Check, Solution
+from colloc.system.errors import ChangedFileWarning, StoreError
+from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text, was_changed
+
+FORMAT, FORMAT_VERSION = "colloc solution", 3
+_MOTION_SAMPLES = 401
+_LEVEL_ARRAYS = {
+    "edges": "period",
+    "x": "see colloc.collocation.layout",
+    "lam_x": "see colloc.collocation.layout",
+    "lam_g": "see colloc.collocation.layout",
+}
+
+_GAIT_ARRAYS = {
+    "mean": ("rad", "joint"),
+    "cos": ("rad", "joint, harmonic"),
+    "sin": ("rad", "joint, harmonic"),
+    "edges": ("period", "edge"),
+    "shapes": ("rad", "joint, edge"),
+    "tangents": ("heading in rad, or unit vector", "component, edge"),
+    "length": ("rad", ""),
+    "corners": ("rad", "joint, vertex"),
+}
+
+
+def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
+    """Write a solution; an existing file is replaced only once the new one is complete.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be made or written.
+    """
+    path = Path(path)
+    with new_file(path) as file:
+        _write(file, solution)
+    return path
+
+
+def load(path: str | os.PathLike[str]) -> Solution:
+    """The solution in a file that `save` wrote.
+
+    A file that another program has opened to write since then is read with a `ChangedFileWarning`, and the solution is marked
+    as ``changed``: `colloc verify` decides what it is worth.
+
+    Raises
+    ------
+    StoreError
+        If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
+    """
+    changed = was_changed(Path(path), FORMAT)
+    with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:
+        solution = _read(file)
+    if changed:
+        solution.changed = True
+        message = f"{path} was changed after colloc wrote it; colloc verify {path} says what it is worth."
+        warnings.warn(message, ChangedFileWarning, stacklevel=2)
+    return solution
+
+
+def _write(file: h5py.File, solution: Solution) -> None:
+    mark(file, FORMAT, FORMAT_VERSION)
+    put_attribute(file, "name", solution.problem.name)
+    put_attribute(file, "problem_hash", solution.problem.hash)
+    for name in ("status", "message", "seconds"):
+        put_attribute(file, name, getattr(solution, name))
+    put(file, "problem", json.dumps(solution.problem.to_dict()))
+    put(file, "source", solution.source)
+    put(file, "versions", json.dumps(solution.versions))
+    for index, level in enumerate(solution.levels):
+        group = file.create_group(f"levels/{index:03d}")
+        for name, units in _LEVEL_ARRAYS.items():
+            put(group, name, getattr(level, name), units=units, dims="vector")
+        for field in dataclasses.fields(level):
+            if field.name not in _LEVEL_ARRAYS:
+                put_attribute(group, field.name, getattr(level, field.name))
+    if solution.levels:
+        _write_motion(file, solution)
+    if solution.certificate.replayed:
+        _write_certificate(file.create_group("certificate"), solution.certificate)
+
+
+def _write_motion(file: h5py.File, solution: Solution) -> None:
+    gait = file.create_group("gait")
+    for name, value in fields(solution.gait).items():
+        if name in _GAIT_ARRAYS:
+            units, dims = _GAIT_ARRAYS[name]
+            put(gait, name, value, units=units, dims=dims)
+        else:
+            put_attribute(gait, name, value)
+    motion = solution.sample(np.linspace(0.0, 1.0, _MOTION_SAMPLES))
+    group = file.create_group("motion")
+    put(group, "t", motion.t, units="period", dims="time")
+    put(group, "joint_angles", motion.angles, units="rad", dims="joint, time")
+    put(group, "joint_rates", motion.rates, units="rad/period", dims="joint, time")
+    put(group, "tail_velocity", motion.z, units="length/period, length/period, rad/period", dims="(u, v, omega), time")
+    put(group, "theta", motion.theta, units="rad", dims="time")
+    put(group, "centre", motion.centre, units="length", dims="(x, y), time")
+    put(group, "tail", motion.tail, units="length", dims="(x, y), time")
+    put(group, "power", solution.power(motion), units="weight length/period", dims="time")
+
+
+def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
+    for field in dataclasses.fields(certificate):
+        if field.name != "checks":
+            put_attribute(group, field.name, getattr(certificate, field.name))
+    for name in ("name", "value", "threshold", "passed", "meaning"):
+        put(group, name, [getattr(check, name) for check in certificate.checks])
+
+
+def _read(file: h5py.File) -> Solution:
+    problem = Problem.from_dict(json.loads(text(file, "problem")))
+    if problem.hash != attribute(file, "problem_hash"):
+        raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
+    levels = []
+    found = child(file, "levels") if "levels" in file else ()
+    for name in sorted(found):
+        group = child(found, name)
+        arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
+        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Level) if f.name not in _LEVEL_ARRAYS}
+        levels.append(Level(**arrays, **rest))
+    certificate = UNCERTIFIED
+    if "certificate" in file:
+        group = child(file, "certificate")
+        columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
+        checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
+        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+        certificate = Certificate(checks, **rest)
+    solution = Solution(
+        problem,
+        levels,
+        certificate,
+        float(attribute(file, "seconds")),
+        text(file, "source"),
+        str(attribute(file, "message")),
+        json.loads(text(file, "versions")),
+    )
+    if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
+        raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
+    return solution

@@ -1,0 +1,130 @@
+"""Why a solve failed, in mechanical words: which equation, which link, which time window, and what to try."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from colloc.collocation.program import GaitProgram
+from colloc.numerics.multiplier_estimate import quasi_definite_factors
+from colloc.search.nlp import NlpResult, Solver
+
+_SATISFIED = 1e-8
+_COMPONENTS = ("force along the tail", "force across the tail", "torque about the tail")
+_LAWS = ("tangential force", "normal force", "couple")
+_PATH = {
+    "path": "the joining of arcs to a path",
+    "closure": "closure of the path",
+    "smooth closure": "closure of the path's direction",
+    "curvature": "the bound on curvature",
+    "curvature to the left": "the bound on curvature",
+    "curvature to the right": "the bound on curvature",
+    "turn": "the most that one arc may turn",
+    "winding": "the winding of the path",
+    "unit tangent": "the unit length of the path's direction",
+    "start": "the start of the path",
+    "sides": "the least length of sides and path",
+}
+_SMALLEST_EIGENVALUE = 1e-12
+"""Of the product of the equations, scaled to length 1, with their transpose: where it is less, they are redundant. What sums
+distance and work over n intervals has one of 1.2 / n^2; redundant rows have one of 1e-18."""
+_STEPS, _SHARE = 2, 0.1
+"""Steps of inverse iteration; share of the largest weight from which an equation counts as part of the combination."""
+
+
+def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
+    """What a constraint row states, and the phase at which it does.
+
+    Parameters
+    ----------
+    transcription : GaitProgram
+    row : int
+        Index among all constraint rows.
+    """
+    name, rows = next((n, s) for n, s in transcription.groups.items() if s.start <= row < s.stop)
+    index, body, mesh = row - rows.start, transcription.problem.body, transcription.mesh
+    if name in ("angles", "rates"):
+        point, joint = divmod(index, body.n_joint)
+        return f"the {name[:-1]} of joint {joint + 1} against its gait", float(mesh.times[point])
+    if name == "balance":
+        point, component = divmod(index, 3)
+        return f"the balance of {_COMPONENTS[component]}", float(mesh.times[point])
+    if name == "force law":
+        point, which = divmod(index, 3 * body.n_link)
+        kind, link = divmod(which, body.n_link)
+        return f"the friction law of the {_LAWS[kind]} on link {link + 1}", float(mesh.times[point])
+    if name == "orientation":
+        return "the rotation between nodes", float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
+    if name == "rotation":
+        return "closure of the net rotation", float(mesh.edges[-1])
+    if name in ("distance", "work"):
+        return f"the {name} gained over an interval", float(mesh.edges[index])
+    if name == "shape speed":
+        return "the lower bound on the shape speed", 0.0
+    phase = float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
+    if name.startswith(("joint", "links")):
+        return ("the limit of " if name.startswith("joint") else "contact of ") + name, phase
+    return _PATH.get(name, f"the {name}"), phase
+
+
+def time_window(transcription: GaitProgram, excess: np.ndarray, group: str) -> tuple[float, float]:
+    """First and last phase at which a group of rows is violated by at least a tenth of its worst."""
+    rows = transcription.groups[group]
+    bad = rows.start + np.flatnonzero(excess[rows] >= 0.1 * excess[rows].max())
+    phases = [row_meaning(transcription, int(row))[1] for row in bad]
+    return min(phases), max(phases)
+
+
+def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> str:
+    """One or two sentences: what failed where, and what to try next."""
+    worst = int(np.argmax(result.excess))
+    if result.excess[worst] > _SATISFIED:
+        what, when = row_meaning(transcription, worst)
+        group = next(n for n, s in transcription.groups.items() if s.start <= worst < s.stop)
+        first, last = time_window(transcription, result.excess, group)
+        window = f"at phase {when:.3f}" if first == last else f"between phases {first:.3f} and {last:.3f}, worst at {when:.3f}"
+        failed = f"{what} is off by {result.excess[worst]:.1e} {window}"
+        advice = _advice(group)
+    elif result.status == "still moving":
+        failed, advice = "the gait kept moving from trust region to trust region", "start from a better guess"
+    else:
+        failed = f"every equation holds, but the efficiency is not stationary (KKT error {result.kkt_error:.1e})"
+        advice = "use more intervals, since kinks at stick may be under-resolved, or start from another guess"
+    effort = f"not converged at delta = {delta:.1e} after {result.iterations} iterations"
+    return f"{effort}: {failed} ({result.status}). Try to {advice}."
+
+
+def _advice(group: str) -> str:
+    if group in ("balance", "force law"):
+        return "start the continuation at a larger delta_start, use more intervals, or another formulation"
+    if group == "rotation":
+        return "start from a guess with less net rotation, or impose a symmetry that closes it"
+    if group.startswith(("joint", "links")):
+        return "start from a guess of smaller amplitude"
+    return "use more intervals or another guess"
+
+
+def redundant_equations(solver: Solver[GaitProgram], x: np.ndarray, delta: float) -> list[str]:
+    """Kinds of equations that are (nearly) linear combinations of others at x; an optimiser fails on those.
+
+    Parameters
+    ----------
+    solver : Solver
+    x : (n,)
+    delta : float
+        Regularisation speed, per period.
+    """
+    transcription = solver.transcription
+    jacobian, equality = solver.equality_jacobian(x, delta)
+    scale = np.sqrt(np.asarray(jacobian.multiply(jacobian).sum(axis=1)).ravel())
+    rows = (sparse.diags(1.0 / np.maximum(scale, 1e-300)) @ jacobian).tocsr()
+    # inverse iteration on rows rows' + eps: the combination of the rows that nearly vanishes
+    factors, combination = quasi_definite_factors(rows), np.random.default_rng(0).normal(size=equality.size)
+    for _ in range(_STEPS):
+        combination = factors.solve(np.concatenate([np.zeros(rows.shape[1]), -combination]))[rows.shape[1] :]
+        combination /= np.linalg.norm(combination)
+    if np.linalg.norm(rows.T @ combination) ** 2 > _SMALLEST_EIGENVALUE:
+        return []
+    suspicious = equality[np.abs(combination) > _SHARE * np.abs(combination).max()]
+    names = {n for n, s in transcription.groups.items() for row in suspicious if s.start <= row < s.stop}
+    return sorted(names)

@@ -1,0 +1,235 @@
+"""NumPy solver of the balance of smooth bodies, batched over instants, on panels that adapt to the solution.
+
+The velocity of the body at stick changes over lengths ~ delta / (rotation rate), and shapes may be sharp. So after every
+solve each panel's integrals are compared with those over its two halves; panels that differ by more than the tolerance
+are halved and the instant is solved again. The iteration itself is that of `colloc.mechanics.damped_newton`; its references are
+the panel edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.point_friction import force_density
+from colloc.smooth.batch import PanelBatch, PanelFields
+from colloc.smooth.curve import Curve, Panels, node_velocity
+from colloc.smooth.motion import Motion
+from colloc.system.errors import NotConvergedError, ProblemError
+
+_MOST_PANELS = 600
+_ROUNDING = 1e-15
+
+
+@dataclass(frozen=True)
+class SmoothSolution:
+    """A smooth body in balance, instant by instant; arrays of length n_time unless stated.
+
+    Attributes
+    ----------
+    t : phases
+    z : (3, n_time)
+        Velocity of the tail in the axes of the frame in which Theta is measured, and the rotation rate of that frame.
+    power : rate of work against friction
+    power_inside : the part of it done on the arcs `regions`
+    slowest : smallest speed of a whole panel: how fast the part at stick creeps
+    residual : largest net force or torque, in units as in `colloc.mechanics.damped_newton.State`
+    quadrature_error : largest panel's difference from its halves, in force or power
+    panels : panels used
+    iterations : steps taken, over all refinements
+    """
+
+    t: np.ndarray
+    z: np.ndarray
+    power: np.ndarray
+    power_inside: np.ndarray
+    slowest: np.ndarray
+    residual: np.ndarray
+    quadrature_error: np.ndarray
+    panels: np.ndarray
+    iterations: np.ndarray
+    tolerance: float
+
+    def require(self) -> SmoothSolution:
+        """This solution, or a `NotConvergedError` naming the instants that failed."""
+        bad = np.flatnonzero(self.residual > self.tolerance)
+        if bad.size:
+            raise NotConvergedError(
+                f"the smooth body did not balance at {bad.size} of {self.t.size} instants (first: phase "
+                f"{self.t[bad[0]]:.4f}, worst residual {self.residual[bad].max():.1e}); use a larger delta."
+            )
+        return self
+
+
+def _motion_fields(
+    motion: Motion, t: np.ndarray, panels: Panels, speed: np.ndarray | None = None
+) -> tuple[PanelFields, np.ndarray]:
+    """Theta and its rate on the panels of some instants, rates in units of the returned `speed` ``(n_time,)``."""
+    nodes = panels.nodes
+    angle, rate = motion.angle(nodes, t), motion.rate(nodes, t)
+    if not (np.isfinite(rate).all() and np.isfinite(angle).all()):
+        raise ProblemError("the motion's tangent angle and rate must be finite.")
+    if speed is None:
+        speed = np.abs(rate).max(axis=0)
+        speed[speed == 0] = 1.0
+    return PanelFields(panels, angle, rate / speed, motion.rate(panels.edges, t) / speed), speed
+
+
+def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """The chosen panels ``(n_panel, n_time)`` cut in two; columns that need fewer edges end in panels of width zero."""
+    middle = np.where(chosen, 0.5 * (edges[1:] + edges[:-1]), 1.0)
+    fine = np.sort(np.concatenate([edges, middle]), axis=0)
+    keep = 1 + int(np.max(np.sum(fine < 1.0, axis=0)))
+    return fine[:keep]
+
+
+def _panel_integrals(body: Curve, z: np.ndarray, delta: np.ndarray, friction: Friction, panels: Panels) -> np.ndarray:
+    """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``."""
+    vs, vn = node_velocity(body, z)
+    fs, fn = force_density(vs, vn, delta, friction)
+    densities = (
+        fs * body.cos - fn * body.sin,
+        fs * body.sin + fn * body.cos,
+        fs * body.arm_s + fn * body.arm_n,
+        -(fs * vs + fn * vn),
+    )
+    return np.stack([panels.panel_sums(density) for density in densities])
+
+
+def solve_smooth(
+    motion: Motion,
+    friction: Friction,
+    t: np.ndarray,
+    delta: float,
+    *,
+    panels: int = 16,
+    order: int = 8,
+    quadrature_tolerance: float = 1e-10,
+    tolerance: float = 1e-11,
+    max_iterations: int = 2000,
+    refinements: int = 40,
+    regions: tuple[tuple[float, float], ...] = (),
+    method: str = "auto",
+) -> SmoothSolution:
+    """Velocities that put a smooth body in force and torque balance at phases t.
+
+    Parameters
+    ----------
+    motion : Motion
+    friction : Friction
+    t : (n_time,)
+    delta : float
+        Regularisation speed [body lengths per period], > 0.
+    panels, order : int
+        Equal panels to start from (besides the motion's breaks), and Gauss nodes a panel.
+    quadrature_tolerance : float
+        Largest difference in force, torque or power between a panel and its halves; 0 keeps the first panels.
+    tolerance : float
+        Largest net force or torque over the largest coefficient at which an instant counts as converged.
+    max_iterations : int
+        As in `colloc.mechanics.fixed_point.solve_balance`.
+    refinements : int
+        Most halvings of a panel.
+    regions : tuple of (float, float)
+        Arcs whose power is reported separately; their ends should be breaks of the motion.
+    method : {"auto", "newton", "fixed_point"}
+
+    Raises
+    ------
+    ProblemError
+        If delta is not positive or the tangent angle is not finite.
+    """
+    if not (np.isfinite(delta) and delta > 0):
+        raise ProblemError(f"delta must be a positive finite number, not {delta!r}.")
+    t = np.atleast_1d(np.asarray(t, dtype=float))
+    n = t.size
+    out = {name: np.zeros(n) for name in ("power", "power_inside", "slowest", "residual", "quadrature_error")}
+    z_tail, n_panel, iterations = np.zeros((3, n)), np.zeros(n, dtype=int), np.zeros(n, dtype=int)
+
+    active, edges = np.arange(n), motion.first_edges(t, panels)
+    anchor, velocity = np.full(n, len(edges) // 2), np.zeros((3, n))
+    for level in range(refinements + 1):
+        grid = Panels(edges, order)
+        # work in units of the largest rate: the law is homogeneous once delta scales along
+        fields, speed = _motion_fields(motion, t[active], grid)
+        d = relative_delta(delta, speed)
+
+        def make(members: np.ndarray, reference: int, fields: PanelFields = fields) -> PanelBatch:
+            return PanelBatch(fields, friction, members, reference)
+
+        if level == 0:
+            # one cheap pass finds what rests, so that the anchor is right before anything is judged
+            state = starting_state(anchor, velocity / speed)
+            solve(state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
+            for members, batch in _groups(state.anchor, make):
+                state.anchor[members], state.velocity[:, members] = batch.slowest(state.velocity[:, members], d[:, members])
+            state = starting_state(state.anchor, state.velocity)
+        else:
+            state = starting_state(anchor, velocity / speed)
+        solve(state, make, 5, d, tolerance, max_iterations, method)
+        iterations[active] += state.iterations
+        velocity = state.velocity * speed
+
+        split = np.zeros((grid.n, active.size), dtype=bool)
+        for members, batch in _groups(state.anchor, make):
+            chosen, z = active[members], state.velocity[:, members]
+            own = Panels(edges[:, members], order)
+            whole = _panel_integrals(Curve(*batch.curve), z, d[:, members], friction, own)
+            middle = 0.5 * (edges[1:, members] + edges[:-1, members])
+            inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
+            out["power"][chosen] = whole[3].sum(axis=0) * speed[members]
+            out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * speed[members]
+            out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]
+            tail = batch.edge_velocity(z)[:, 0]
+            tail[2] -= fields.edge_rate[0, members]
+            z_tail[:, chosen] = tail * speed[members]
+            error = _panel_error(motion, friction, t[chosen], batch, z, d[:, members], speed[members])
+            out["quadrature_error"][chosen] = error.max(axis=0)
+            # two stretches at rest know each other's velocity to rounding only: no refinement beats that
+            floor = _ROUNDING * batch.largest_speed(z) / (d[0, members] + batch.panel_speed(z).min(axis=0))
+            split[:, members] = error > quadrature_tolerance + floor
+        out["residual"][active] = state.residual
+        n_panel[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
+
+        more = split.any(axis=0) & (n_panel[active] < _MOST_PANELS) & (state.residual <= tolerance)
+        if quadrature_tolerance == 0 or level == refinements or not more.any():
+            break
+        anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
+        active, velocity, edges = active[more], velocity[:, more], _split(edges[:, more], split[:, more])
+        anchor = np.argmax(edges == anchor_at, axis=0)
+    return SmoothSolution(t, z_tail, **out, panels=n_panel, iterations=iterations, tolerance=tolerance)
+
+
+def _groups(anchor: np.ndarray, make):
+    """Instants by anchor, with their batch."""
+    for reference in np.unique(anchor):
+        members = np.flatnonzero(anchor == reference)
+        yield members, make(members, int(reference))
+
+
+def _panel_error(
+    motion: Motion, friction: Friction, t: np.ndarray, batch: PanelBatch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
+) -> np.ndarray:
+    """How far each panel is from its two halves, ``(n_panel, n_time)``.
+
+    Every panel is taken as a body of its own that moves with its left end, so that an error is charged to the panel that
+    makes it. Compared are force, torque and power, and the velocity handed on to the right end in units of the speed of
+    the slowest panel, because that is what decides the friction there.
+    """
+    edges = batch.fields.panels.edges[:, batch.members]
+    left, right = edges[:-1].ravel(), edges[1:].ravel()
+    n_panel = len(edges) - 1
+    many = (np.tile(a, n_panel) for a in (t, speed, delta[0], delta[0] + batch.panel_speed(z).min(axis=0)))
+    t_many, speed_many, delta_many, slow_many = many
+    start = batch.edge_velocity(z)[:, :-1].reshape(3, -1)
+    results = []
+    for cuts in ([left, right], [left, 0.5 * (left + right), right]):
+        fields, _ = _motion_fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
+        one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
+        integrals = _panel_integrals(Curve(*one.curve), start, delta_many, friction, fields.panels).sum(axis=1)
+        end = one.edge_velocity(start)[:2, -1] / slow_many
+        results.append(np.concatenate([integrals / friction.largest, end]))
+    return np.abs(results[1] - results[0]).max(axis=0).reshape(n_panel, t.size)

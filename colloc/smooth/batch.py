@@ -1,0 +1,78 @@
+"""A smooth body on fixed panels as `mechanics.damped_newton` sees it: what the iteration evaluates on a batch of instants."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.mechanics.damped_newton import solve3
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.point_friction import density_jacobian, force_density, regularised_speed, secant_density
+from colloc.smooth.curve import Curve, Panels, curve, node_velocity, pulled_back, resultant
+
+
+class PanelFields:
+    """Tangent angle and its rate at the nodes ``(n_node, n_time)``, and the rate at the edges ``(n_panel + 1, n_time)``."""
+
+    def __init__(self, panels: Panels, angle: np.ndarray, rate: np.ndarray, edge_rate: np.ndarray) -> None:
+        self.panels, self.angle, self.rate, self.edge_rate = panels, angle, rate, edge_rate
+
+
+class PanelBatch:
+    """Instants on given panels that share a reference edge."""
+
+    def __init__(self, fields: PanelFields, friction: Friction, members: np.ndarray, reference: int) -> None:
+        self.fields, self.friction, self.members, self.reference = fields, friction, members, reference
+        panels = Panels(fields.panels.edges[:, members], fields.panels.order)
+        self.edge_rate = fields.edge_rate[:, members]
+        anchor_rate = self.edge_rate[reference : reference + 1]
+        self.curve = np.stack(curve(panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))
+
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        body = Curve(*self.curve[:, :, select])
+        vs, vn = node_velocity(body, z)
+        force = resultant(body, *force_density(vs, vn, delta, self.friction))
+        if self.friction.isotropic:
+            merit = self.friction.mu_t * np.sum(body.weight * regularised_speed(vs, vn, delta), axis=0)
+        else:
+            merit = 0.5 * np.sum(force * force, axis=0)
+        return np.stack([*body, vs, vn]), force, merit
+
+    def step(self, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
+        step = np.empty_like(force)
+        for law, chosen in ((density_jacobian, newton), (secant_density, ~newton)):
+            if chosen.any():
+                vs, vn = state[7:, :, chosen]
+                blocks = law(vs, vn, delta[:, chosen], self.friction)
+                left = pulled_back(Curve(*state[:7, :, chosen]), blocks)
+                matrix = np.array([[entry[0] for entry in row] for row in left]).transpose(2, 0, 1)
+                step[:, chosen] = solve3(matrix, force[:, chosen])
+        return step
+
+    def edge_velocity(self, z: np.ndarray) -> np.ndarray:
+        """Velocity and rotation rate of every edge, ``(3, n_edge, n)``, in the axes of Theta."""
+        f, a = self.fields, self.reference
+        path = f.panels.edge_path(a)
+        width, angle = f.panels.widths[:, self.members], f.angle[:, self.members]
+        turning = width * (f.rate[:, self.members] - self.edge_rate[a] + z[2])
+        return np.stack(
+            [
+                z[0] - path @ (turning * np.sin(angle)),
+                z[1] + path @ (turning * np.cos(angle)),
+                z[2] + self.edge_rate - self.edge_rate[a],
+            ]
+        )
+
+    def panel_speed(self, z: np.ndarray) -> np.ndarray:
+        """Largest speed of a node in each panel, ``(n_panel, n)``; infinite for panels of width zero."""
+        vs, vn = node_velocity(Curve(*self.curve), z)
+        speed = np.hypot(vs, vn).reshape(self.fields.panels.n, -1, z.shape[1]).max(axis=1)
+        return np.where(np.diff(self.fields.panels.edges[:, self.members], axis=0) > 0, speed, np.inf)
+
+    def largest_speed(self, z: np.ndarray) -> np.ndarray:
+        """Largest speed of a node, ``(n,)``."""
+        vs, vn = node_velocity(Curve(*self.curve), z)
+        return np.hypot(vs, vn).max(axis=0)
+
+    def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        anchor = np.argmin(self.panel_speed(z), axis=0)
+        return anchor, np.take_along_axis(self.edge_velocity(z), anchor[None, None], 1)[:, 0]

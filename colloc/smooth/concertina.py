@@ -1,0 +1,250 @@
+r"""Concertina crawlers: a straight body with one or two travelling bumps of half-width epsilon (paper, section VI).
+
+Shape. On a bump of arc length ``w`` centred at ``c`` the tangent angle is, with ``x = 2 (s - c)/w`` in [-1, 1],
+
+    Theta = a odd(x) + b even(x),    odd = -k x (1 - x^2)^3,   k = 7^(7/2)/6^3 (so that max odd = 1),    even = (1 - x^2)^3
+
+and zero elsewhere: twice continuously differentiable, with the end tangents those of the straight body. The odd part
+shortens the body by ``w (1 - mean cos Theta)``, the even part shifts it sideways. A bump that travels without changing
+keeps its chord, so both straight parts can rest.
+
+One bump (figure 13A to D), in the region ``|s - 1/2| <= epsilon``, half a period:
+
+1. a grows from 0 to `amplitude`, bump at the rear end of the region: the front half rests, the rear is pulled along;
+2. the bump travels to the front end of the region: both straight parts rest;
+3. a falls to 0: the rear rests, the front is pushed on;
+
+then the mirror image, Theta(s, t + 1/2) = -Theta(s, t).
+
+Two bumps (figure 13E), in the regions around 1/4 and 3/4, antisymmetric about the middle, Theta(1 - s) = -Theta(s): the
+body lies across its path. ``(a, b) = A(phi) (sin phi, cos phi)`` with A(0) = `amplitude` and A(phi) such that the chord
+along the body stays constant. In a period
+
+1. phi goes from 0 to pi, bumps at the inner ends of their regions: the middle part slides on, the outer parts rest;
+2. the bumps travel to the outer ends of their regions: all straight parts rest;
+3. phi returns to 0: the outer parts slide on, the middle rests;
+4. the bumps travel back.
+
+In the limit epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b if it runs backwards), or 1/mu_t (two bumps).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from colloc.mechanics.friction import Friction
+from colloc.smooth.motion import Motion
+from colloc.smooth.period import Period, measured_period, period
+from colloc.system.errors import ProblemError
+
+_ODD_SCALE = 7**3.5 / 6**3
+_CHORD_NODES, _CHORD_WEIGHTS = np.polynomial.legendre.leggauss(48)
+
+
+def odd_profile(x: np.ndarray) -> np.ndarray:
+    """``-k x (1 - x^2)^3`` on [-1, 1], zero outside; its largest value is 1."""
+    return -_ODD_SCALE * x * np.clip(1 - x * x, 0.0, None) ** 3
+
+
+def odd_slope(x: np.ndarray) -> np.ndarray:
+    """Derivative of `odd_profile`."""
+    y = np.clip(1 - x * x, 0.0, None)
+    return -_ODD_SCALE * (y**3 - 6 * x * x * y**2)
+
+
+def even_profile(x: np.ndarray) -> np.ndarray:
+    """``(1 - x^2)^3`` on [-1, 1], zero outside."""
+    return np.clip(1 - x * x, 0.0, None) ** 3
+
+
+def even_slope(x: np.ndarray) -> np.ndarray:
+    """Derivative of `even_profile`."""
+    return -6 * x * np.clip(1 - x * x, 0.0, None) ** 2
+
+
+@dataclass(frozen=True)
+class Concertina:
+    """A concertina crawler and the friction it crawls on.
+
+    Parameters
+    ----------
+    name : str
+    epsilon : float
+        Half-width of each bump region [body lengths].
+    amplitude : float
+        Largest tangent angle of the bump [rad].
+    share : float
+        Arc length of a bump over that of its region, 2 epsilon; the paper's is 1/2. The rest is the margin by which the
+        resting part is longer than the sliding one.
+    bumps : {1, 2}
+    friction : Friction
+    delta : float
+        Regularisation speed [body lengths per period].
+    backwards : bool
+        One bump: run from head to tail, towards the tail (for mu_b < mu_f).
+    """
+
+    name: str = "concertina"
+    epsilon: float = 0.1
+    amplitude: float = 1.0
+    share: float = 0.5
+    bumps: int = 1
+    friction: Friction = Friction()
+    delta: float = 1e-6
+    backwards: bool = False
+
+    def __post_init__(self) -> None:
+        if self.bumps not in (1, 2):
+            raise ProblemError(f"bumps must be 1 or 2, not {self.bumps!r}.")
+        widest = 0.5 / self.bumps
+        if not 0 < self.epsilon < widest:
+            raise ProblemError(f"epsilon must lie between 0 and {widest:g} for {self.bumps} bump(s), not {self.epsilon!r}.")
+        if not 0 < self.share < 1:
+            raise ProblemError(f"share must lie between 0 and 1, not {self.share!r}.")
+        if not 0 < self.amplitude < np.pi / 2:
+            raise ProblemError(f"amplitude must lie between 0 and pi/2, not {self.amplitude!r}.")
+        if not (np.isfinite(self.delta) and self.delta > 0):
+            raise ProblemError(f"delta must be positive, not {self.delta!r}.")
+
+    def with_(self, **changes: Any) -> Concertina:
+        """A copy with some fields changed, validated anew."""
+        return dataclasses.replace(self, **changes)
+
+    @property
+    def width(self) -> float:
+        """Arc length of a bump."""
+        return 2 * self.epsilon * self.share
+
+    @property
+    def regions(self) -> tuple[tuple[float, float], ...]:
+        """The arcs within which bumps form and travel."""
+        centres = (0.5,) if self.bumps == 1 else (0.25, 0.75)
+        return tuple((c - self.epsilon, c + self.epsilon) for c in centres)
+
+    @property
+    def bound(self) -> float:
+        """No body is more efficient than this (paper, eq. lambdaupper)."""
+        return 1.0 / self.friction.smallest
+
+    @property
+    def stroke(self) -> float:
+        """Distance per period if nothing slips that should rest."""
+        x, weight = _CHORD_NODES, 0.5 * _CHORD_WEIGHTS
+        if self.bumps == 1:
+            return float(2 * self.width * np.sum(weight * (1 - np.cos(self.amplitude * odd_profile(x)))))
+        return float(2 * self.width * np.sum(weight * np.sin(self.amplitude * even_profile(x))))
+
+    def motion(self) -> Motion:
+        """The prescribed motion."""
+        return _one_bump(self) if self.bumps == 1 else _two_bumps(self)
+
+    def period(self, **settings: Any) -> Period:
+        """Distance and work of one period; settings as for `colloc.smooth.period.period`."""
+        return period(self.motion(), self.friction, self.delta, regions=self.regions, **settings)
+
+    def measured_period(self, **settings: Any) -> Period:
+        """The same with an error estimate, see `colloc.smooth.period.measured_period`."""
+        return measured_period(self.motion(), self.friction, self.delta, regions=self.regions, **settings)
+
+
+def _ramp(t: np.ndarray, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+    """Goes from 0 to 1 between start and stop; its value and rate."""
+    inside = (t >= start) & (t < stop)
+    return np.clip((t - start) / (stop - start), 0.0, 1.0), inside / (stop - start)
+
+
+def _one_bump(crawler: Concertina) -> Motion:
+    w, sign = crawler.width, -1.0 if crawler.backwards else 1.0
+    travel = 2 * crawler.epsilon - w
+
+    def state(t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Amplitude and centre of the bump, with their rates."""
+        mirror = np.where(t < 0.5, 1.0, -1.0)
+        t = np.where(t < 0.5, t, t - 0.5)
+        (up, up_rate), (on, on_rate), (down, down_rate) = (_ramp(t, k / 6, (k + 1) / 6) for k in range(3))
+        centre, centre_rate = 0.5 + sign * travel * (on - 0.5), sign * travel * on_rate
+        scale = mirror * crawler.amplitude
+        return scale * (up - down), scale * (up_rate - down_rate), centre, centre_rate
+
+    def angle(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+        a, _, centre, _ = state(t)
+        return a * odd_profile(2 * (s - centre) / w)
+
+    def rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+        a, a_rate, centre, centre_rate = state(t)
+        x = 2 * (s - centre) / w
+        return a_rate * odd_profile(x) - a * odd_slope(x) * 2 * centre_rate / w
+
+    def breaks(t: np.ndarray) -> np.ndarray:
+        centre = state(t)[2]
+        (low, high) = crawler.regions[0]
+        ends = [np.full_like(t, low), *_parts(centre - w / 2, centre + w / 2), np.full_like(t, high)]
+        return np.stack(ends)
+
+    return Motion(angle, rate, breaks, stages=(0.0, 1 / 6, 1 / 3, 0.5), antipodal=True)
+
+
+def _parts(a: np.ndarray, b: np.ndarray, n: int = 4) -> list[np.ndarray]:
+    return [a + (b - a) * k / n for k in range(n + 1)]
+
+
+def _constant_chord(amplitude: float, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A(phi) that keeps ``int cos(A (sin phi odd + cos phi even)) dx`` as at phi = 0, and dA/dphi."""
+    x, weight = _CHORD_NODES[:, None], _CHORD_WEIGHTS[:, None]
+    odd, even = odd_profile(x), even_profile(x)
+    goal = np.sum(weight * np.cos(amplitude * even))
+    shape, turned = np.sin(phi) * odd + np.cos(phi) * even, np.cos(phi) * odd - np.sin(phi) * even
+    A = amplitude * np.sqrt(np.sum(weight * even**2) / np.sum(weight * shape**2, axis=0))
+    for _ in range(20):
+        sine = np.sin(A * shape)
+        gradient = -np.sum(weight * sine * shape, axis=0)
+        A = A - (np.sum(weight * np.cos(A * shape), axis=0) - goal) / gradient
+    sine = np.sin(A * shape)
+    return A, -A * np.sum(weight * sine * turned, axis=0) / np.sum(weight * sine * shape, axis=0)
+
+
+def _two_bumps(crawler: Concertina) -> Motion:
+    w = crawler.width
+    travel = 2 * crawler.epsilon - w
+
+    def state(t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Coefficients a, b and centre of the rear bump, with their rates."""
+        legs = [_ramp(t % 1.0, k / 4, (k + 1) / 4) for k in range(4)]
+        phi, phi_rate = np.pi * (legs[0][0] - legs[2][0]), np.pi * (legs[0][1] - legs[2][1])
+        centre = 0.25 + travel * (0.5 - legs[1][0] + legs[3][0])
+        centre_rate = travel * (legs[3][1] - legs[1][1])
+        A, dA = _constant_chord(crawler.amplitude, phi)
+        a, b = A * np.sin(phi), A * np.cos(phi)
+        a_rate = (dA * np.sin(phi) + A * np.cos(phi)) * phi_rate
+        b_rate = (dA * np.cos(phi) - A * np.sin(phi)) * phi_rate
+        return a, b, centre, a_rate, b_rate, centre_rate
+
+    def half(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Arc length of the point or its mirror image in the rear half, and +1 there or -1 in the front half."""
+        front = s > 0.5
+        return np.where(front, 1 - s, s), np.where(front, -1.0, 1.0)
+
+    def angle(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+        a, b, centre, *_ = state(t)
+        s, sign = half(s)
+        x = 2 * (s - centre) / w
+        return sign * (a * odd_profile(x) + b * even_profile(x))
+
+    def rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+        a, b, centre, a_rate, b_rate, centre_rate = state(t)
+        s, sign = half(s)
+        x = 2 * (s - centre) / w
+        moving = (a * odd_slope(x) + b * even_slope(x)) * 2 * centre_rate / w
+        return sign * (a_rate * odd_profile(x) + b_rate * even_profile(x) - moving)
+
+    def breaks(t: np.ndarray) -> np.ndarray:
+        centre = state(t)[2]
+        low, high = crawler.regions[0]
+        ends = [np.full_like(t, low), *_parts(centre - w / 2, centre + w / 2), np.full_like(t, high)]
+        return np.stack([*ends, *(1 - end for end in ends)])
+
+    return Motion(angle, rate, breaks, stages=(0.0, 0.25, 0.5, 0.75, 1.0))

@@ -1,0 +1,165 @@
+"""Smooth bodies: a curve given by its tangent angle, integrated on composite Gauss panels.
+
+The tangent angle ``Theta(s, t)`` and its rate are prescribed at the panels' nodes; positions are integrals of its cosine
+and sine with the panels' own integration matrices (paper, eqs. x0, y0), so the body is inextensible to rounding.
+The rigid velocity ``z = (u, v, omega)`` is that of a *reference*, one of the panels' edges: velocity of the point and
+rotation rate of the tangent there. Path integrals start at the reference and rates are taken relative to it, so a stretch
+that keeps its shape moves with relative precision, however slow it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from colloc.numerics.arrays import Array, namespace
+from colloc.numerics.schemes import Scheme, scheme
+
+
+@cache
+def _gauss(order: int) -> Scheme:
+    return scheme(f"gauss-{order}")
+
+
+@lru_cache(maxsize=1024)
+def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, sparse.csc_matrix, sparse.csc_matrix]:
+    """Nodes to whole panels, panels to their nodes, and the integrals from a panel's left end to its nodes."""
+    each, unit = sparse.identity(n, format="csc"), _gauss(order)
+    return (
+        sparse.kron(each, unit.b, "csc"),
+        sparse.kron(each, np.ones((order, 1)), "csc"),
+        sparse.kron(each, unit.A, "csc"),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """Gauss panels on the arc length, one column per instant (or a single column for all).
+
+    Parameters
+    ----------
+    edges : (n_panel + 1, n_time)
+        Ascending from 0 to 1; panels of width zero are allowed (they fill up columns that need fewer).
+    order : int
+        Gauss nodes a panel.
+    """
+
+    edges: np.ndarray
+    order: int = 8
+
+    @property
+    def n(self) -> int:
+        return len(self.edges) - 1
+
+    @property
+    def gauss(self) -> Scheme:
+        return _gauss(self.order)
+
+    @property
+    def widths(self) -> np.ndarray:
+        """Width of the panel of each node, ``(n_panel * order, n_time)``."""
+        return np.repeat(np.diff(self.edges, axis=0), self.order, axis=0)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Arc length of the nodes, ``(n_panel * order, n_time)``."""
+        return np.repeat(self.edges[:-1], self.order, axis=0) + np.tile(self.gauss.c, self.n)[:, None] * self.widths
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Quadrature weights, ``(n_panel * order, n_time)``."""
+        return np.tile(self.gauss.b, self.n)[:, None] * self.widths
+
+    def integrate(self, integrand: Array, reference: int) -> Array:
+        """Integrals from edge `reference` to the nodes; the integrand ``(n_node, n_time)`` is times the panel widths."""
+        xp = namespace(integrand)
+        whole, spread, own = _panel_matrices(self.n, self.order)
+        ahead = np.arange(self.n) >= reference
+        panel_by_panel = np.tril(np.ones((self.n, self.n)), -1) * ahead - np.triu(np.ones((self.n, self.n))) * ~ahead
+        start = xp.matmul(panel_by_panel, xp.matmul(whole, integrand))
+        return xp.matmul(spread, start) + xp.matmul(own, integrand)
+
+    def edge_path(self, reference: int) -> np.ndarray:
+        """``(n_panel + 1, n_node)``: the same integrals up to the edges."""
+        edge, panel = np.arange(self.n + 1)[:, None], np.arange(self.n)[None, :]
+        sign = (panel >= reference).astype(float) * (panel < edge) - (panel < reference) * (panel >= edge)
+        return np.kron(sign, self.gauss.b)
+
+    def panel_sums(self, density: np.ndarray) -> np.ndarray:
+        """Integral of a density ``(n_node, n_time)`` over each panel, ``(n_panel, n_time)``."""
+        return (self.weights * density).reshape(self.n, self.order, -1).sum(axis=1)
+
+
+class Curve(NamedTuple):
+    """A body at given instants, seen from a reference; each ``(n_node, n_time)``.
+
+    Direction cosines of the tangent; how a rotation about the reference moves a node tangentially and normally; the
+    tangential and normal velocity of the nodes while the reference is held; quadrature weights.
+    """
+
+    cos: Array
+    sin: Array
+    arm_s: Array
+    arm_n: Array
+    shape_s: Array
+    shape_n: Array
+    weight: Array
+
+
+def curve(panels: Panels, angle: Array, rate: Array, reference: int, reference_rate: Array) -> Curve:
+    """The curve of tangent angles and rates at the nodes, ``(n_node, n_time)`` (paper, eqs. x0, y0 and dtz0).
+
+    Parameters
+    ----------
+    panels : Panels
+    angle, rate : (n_node, n_time)
+        Theta [rad] and its rate [rad/time].
+    reference : int
+        Index of the panel edge that serves as reference.
+    reference_rate : (1, n_time)
+        Rate of Theta there.
+    """
+    xp = namespace(angle, rate)
+    width = panels.widths
+    c, s = xp.cos(angle), xp.sin(angle)
+    x, y = panels.integrate(width * c, reference), panels.integrate(width * s, reference)
+    turning = width * (rate - reference_rate)
+    vx, vy = -panels.integrate(turning * s, reference), panels.integrate(turning * c, reference)
+    return Curve(c, s, x * s - y * c, x * c + y * s, vx * c + vy * s, vy * c - vx * s, panels.weights)
+
+
+def node_velocity(body: Curve, z: Array) -> tuple[Array, Array]:
+    """Tangential and normal velocity of the nodes when the reference moves with z ``(3, n_time)``."""
+    u, v, omega = z[0:1, :], z[1:2, :], z[2:3, :]
+    return (
+        body.cos * u + body.sin * v + body.arm_s * omega + body.shape_s,
+        body.cos * v - body.sin * u + body.arm_n * omega + body.shape_n,
+    )
+
+
+def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
+    """Net force and torque about the reference of a force per length, ``(3, n_time)`` (paper, eq. ftb)."""
+    xp = namespace(body.cos, tangential)
+    fs, fn = body.weight * tangential, body.weight * normal
+    return xp.stack(
+        [
+            xp.sum_rows(fs * body.cos - fn * body.sin),
+            xp.sum_rows(fs * body.sin + fn * body.cos),
+            xp.sum_rows(fs * body.arm_s + fn * body.arm_n),
+        ]
+    )
+
+
+def pulled_back(body: Curve, blocks: tuple[tuple[Array, Array], ...]) -> Array:
+    """``integral of G^T K G``, G = d(vs, vn)/dz and K the given 2 x 2 of densities: six entries of a 3 x 3 by columns.
+
+    Returned as a 3 x 3 tuple of ``(1, n_time)`` rows.
+    """
+    xp = namespace(body.cos, blocks[0][0])
+    row_s, row_n = (body.cos, body.sin, body.arm_s), (-body.sin, body.cos, body.arm_n)
+    right = [[body.weight * (blocks[i][0] * row_s[j] + blocks[i][1] * row_n[j]) for j in range(3)] for i in range(2)]
+    return tuple(tuple(xp.sum_rows(row_s[i] * right[0][j] + row_n[i] * right[1][j]) for j in range(3)) for i in range(3))

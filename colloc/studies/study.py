@@ -1,0 +1,199 @@
+"""A study: a grid of problems. Study files are plain Python that states ``STUDY``; they are code, and are executed.
+
+A cell of the grid is a point, one value of every axis. Starts travel between neighbours: along an axis of numbers from
+the value before, along an axis of texts (a class of gaits, say) from every value before.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import stated_names
+from colloc.system.errors import ProblemError
+
+Index = tuple[int, ...]
+MOST_CELLS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One direction of a grid.
+
+    Parameters
+    ----------
+    name : str
+        A Python name: the keyword the study's function is called with.
+    values : sequence of float or of str
+        In the order in which starts travel.
+    label, units : str
+        For figures and files; the name, and "1", by default.
+    logarithmic : bool
+        For figures.
+    travels : bool
+        Whether warm starts travel along this axis.
+    """
+
+    name: str
+    values: tuple
+    label: str = ""
+    units: str = "1"
+    logarithmic: bool = False
+    travels: bool = True
+
+    def __post_init__(self) -> None:
+        values = tuple(v if isinstance(v, str) else float(v) for v in self.values)
+        object.__setattr__(self, "values", values)
+        if not self.name.isidentifier():
+            raise ProblemError(f"the name of an axis must be a Python name, not {self.name!r}.")
+        if not values or len(set(values)) != len(values):
+            raise ProblemError(f"axis {self.name}: values must be distinct, and at least one.")
+        if len({isinstance(v, str) for v in values}) > 1 or not all(isinstance(v, str) or math.isfinite(v) for v in values):
+            raise ProblemError(f"axis {self.name}: values must be finite numbers, or texts, not a mixture.")
+
+    @property
+    def of_texts(self) -> bool:
+        return isinstance(self.values[0], str)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A grid of problems, and how hard to search each cell.
+
+    Parameters
+    ----------
+    name : str
+        Of the results; letters, digits, ``_``, ``-`` and ``.``, as for a problem.
+    axes : tuple of Axis
+    problem : callable
+        The `Problem` of a cell, called with a keyword for every axis. A cell for which it raises is recorded and skipped.
+    cold_starts : int
+        Seeded random starts besides the warm ones, in cells that have them, so that a poor basin does not spread.
+    cold_every : int
+        Cells whose indices add up to a multiple of this have cold starts; so have all cells without a warm one.
+    warm_starts : int
+        Of the warm starts that reach a cell so many are solved: those whose gaits do best there as they are.
+    chunk : int
+        Cells along the last axis that make one task, with warm starts travelling inside. More cells cost less scheduling.
+    passes : int
+        Rounds after the first, in which starts travel from all neighbours, each only where it improves a cell as it is.
+    warm_delta_start : float
+        Where the continuation in delta begins from a warm start.
+    time_limit : float
+        Seconds for one start.
+    seed : int
+    """
+
+    name: str
+    axes: tuple[Axis, ...]
+    problem: Callable[..., Problem]
+    cold_starts: int = 1
+    cold_every: int = 4
+    warm_starts: int = 2
+    chunk: int = 1
+    passes: int = 3
+    warm_delta_start: float = 1e-3
+    time_limit: float = 120.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axes", tuple(self.axes))
+        if not self.axes or not all(isinstance(axis, Axis) for axis in self.axes):
+            raise ProblemError("a study needs at least one Axis.")
+        if len({axis.name for axis in self.axes}) != len(self.axes):
+            raise ProblemError("two axes of a study have the same name.")
+        if not self.name or not self.name.replace("-", "_").replace(".", "_").replace("_", "a").isalnum():
+            raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        if not callable(self.problem):
+            raise ProblemError("problem must be a function from coordinates to a Problem.")
+        for field, least in (
+            ("cold_starts", 0),
+            ("cold_every", 1),
+            ("warm_starts", 1),
+            ("chunk", 1),
+            ("passes", 0),
+            ("seed", 0),
+        ):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, int) or value < least:
+                raise ProblemError(f"{field} must be a whole number, at least {least}, not {value!r}.")
+        if not (self.time_limit > 0 and self.warm_delta_start > 0):
+            raise ProblemError("time_limit and warm_delta_start must be positive.")
+        if math.prod(self.shape) > MOST_CELLS:
+            raise ProblemError(f"a study may have {MOST_CELLS} cells, not {math.prod(self.shape)}; split it.")
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(len(axis.values) for axis in self.axes)
+
+    def cells(self) -> Iterator[Index]:
+        """All cells, the last axis fastest."""
+        return itertools.product(*map(range, self.shape))
+
+    def coordinates(self, cell: Index) -> dict[str, float | str]:
+        """Values of the axes at a cell, by name."""
+        return {axis.name: axis.values[i] for axis, i in zip(self.axes, cell, strict=True)}
+
+    def problem_at(self, cell: Index) -> Problem:
+        """The problem of a cell.
+
+        Raises
+        ------
+        ProblemError
+            Whatever the study's function raises, with the coordinates.
+        """
+        where = ", ".join(f"{k} = {v}" for k, v in self.coordinates(cell).items())
+        try:
+            problem = self.problem(**self.coordinates(cell))
+        except Exception as error:
+            what = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
+            raise ProblemError(f"no problem at {where}: {what}") from None
+        if not isinstance(problem, Problem):
+            raise ProblemError(f"no problem at {where}: the study's function gave a {type(problem).__name__}.")
+        return problem
+
+    def before(self, cell: Index) -> list[Index]:
+        """Neighbours that warm starts come from in the first round."""
+        return self._neighbours(cell, (-1,))
+
+    def around(self, cell: Index) -> list[Index]:
+        """All neighbours."""
+        return self._neighbours(cell, (-1, 1))
+
+    def _neighbours(self, cell: Index, steps: tuple[int, ...]) -> list[Index]:
+        found = []
+        for a, axis in enumerate(self.axes):
+            if not axis.travels:
+                continue
+            near = (
+                [cell[a] + step for step in steps]
+                if not axis.of_texts
+                else list(range(self.shape[a] if 1 in steps else cell[a]))
+            )
+            found += [(*cell[:a], i, *cell[a + 1 :]) for i in near if 0 <= i < self.shape[a] and i != cell[a]]
+        return found
+
+    def has_cold_starts(self, cell: Index) -> bool:
+        """Whether a cell has cold starts though warm ones reach it."""
+        return self.cold_starts > 0 and sum(cell) % self.cold_every == 0
+
+
+def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:
+    """Execute a study file; its study and its text.
+
+    Raises
+    ------
+    ProblemError
+        If there is no such file, it fails (with the line), or states no ``STUDY``.
+    """
+    path, names, source = stated_names(path, "study")
+    study = names.get("STUDY")
+    if not isinstance(study, Study):
+        what = "states no STUDY" if study is None else f"STUDY must be a Study, not {type(study).__name__}"
+        raise ProblemError(f"{path}: {what}; end it with STUDY = Study(...).")
+    return study, source

@@ -1,0 +1,138 @@
+"""The cells of a study as labelled arrays: best certified gait of each, its class and its bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.gait_class import GaitClass, gait_class
+from colloc.gaits.problem import Problem
+from colloc.gaits.sampling import shape_speed
+from colloc.results.distinct_optima import Outcome
+from colloc.results.solution import SOLVED
+from colloc.studies.run import CellState, StudyRun
+from colloc.studies.study import Index, Study
+
+NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
+UNITS = {
+    "efficiency": "1/weight",
+    "efficiency_error": "1/weight",
+    "trivial_bound": "1/weight",
+    "upper_bound": "1/weight",
+    "distance": "length",
+    "work": "weight length",
+    "delta": "length/period",
+    "seconds": "s",
+    "mean": "rad",
+    "cos": "rad",
+    "sin": "rad",
+}
+_NUMBERS = ("efficiency", "efficiency_error", "distance", "work", "delta")
+_AT_SLOWEST = 1.01
+KnownBound = Callable[[Problem], float | None]
+
+
+@dataclass(frozen=True, eq=False)
+class StudyTable:
+    """Labelled arrays: coordinates and variables by name, with the dimensions of each variable."""
+
+    name: str
+    coordinates: Mapping[str, np.ndarray]
+    units: Mapping[str, str]
+    labels: Mapping[str, str]
+    variables: Mapping[str, np.ndarray]
+    dimensions: Mapping[str, tuple[str, ...]]
+
+
+def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:
+    """All cells of a run.
+
+    Parameters
+    ----------
+    run : StudyRun
+    known_bound : callable
+        An upper bound on the efficiency of every gait of a problem's body, if one is known.
+    """
+    study = run.study
+    axes = tuple(axis.name for axis in study.axes)
+    problems = [state.problem for state in run.cells.values() if state.problem is not None]
+    joints, harmonics = max(p.body.n_joint for p in problems), max(p.gait.harmonics for p in problems)
+    variables: dict[str, np.ndarray] = {}
+    dimensions: dict[str, tuple[str, ...]] = {}
+
+    def variable(name: str, kind: type, empty: object, extra: tuple[str, ...] = ()) -> None:
+        sizes = {"joint": joints, "harmonic": harmonics}
+        variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), empty, dtype=kind)
+        dimensions[name] = (*axes, *extra)
+
+    for name in (*_NUMBERS, "trivial_bound", "upper_bound", "seconds", "wave", "forward"):
+        variable(name, float, np.nan)
+    for name in ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "starts", "starts_certified"):
+        variable(name, int, 0)
+    for name in ("status", "message", "origin", "gait_class", "problem_hash"):
+        variable(name, object, "")
+    variable("mean", float, np.nan, ("joint",))
+    variable("cos", float, np.nan, ("joint", "harmonic"))
+    variable("sin", float, np.nan, ("joint", "harmonic"))
+    for cell, state in run.cells.items():
+        for name, value in _cell(state, known_bound).items():
+            here = variables[name][cell]
+            if isinstance(here, np.ndarray):
+                here[tuple(slice(0, n) for n in np.shape(value))] = value
+            else:
+                variables[name][cell] = value
+    coordinates = {axis.name: _coordinate(axis.values) for axis in study.axes}
+    coordinates |= {"joint": np.arange(1, joints + 1), "harmonic": np.arange(1, harmonics + 1)}
+    units, labels = {axis.name: axis.units for axis in study.axes}, {axis.name: axis.label or axis.name for axis in study.axes}
+    return StudyTable(study.name, coordinates, units, labels, variables, dimensions)
+
+
+def _coordinate(values: tuple) -> np.ndarray:
+    return np.array(values, dtype=object if isinstance(values[0], str) else float)
+
+
+def _cell(state: CellState, known_bound: KnownBound) -> dict[str, Any]:
+    problem = state.problem
+    if problem is None:
+        return {"status": NO_PROBLEM, "message": state.message}
+    outcomes = [a.outcome for a in state.attempts]
+    row: dict[str, Any] = {"problem_hash": problem.hash, "starts": len(outcomes), "status": NOT_TRIED}
+    row["starts_certified"] = sum(o.status == SOLVED for o in outcomes)
+    row["seconds"] = sum(o.seconds for o in outcomes)
+    row["trivial_bound"] = 1.0 / problem.friction.smallest
+    bound = known_bound(problem)
+    row["upper_bound"] = np.nan if bound is None else bound
+    best = state.best
+    if best is not None:
+        row |= {"status": SOLVED, "origin": best.origin} | _gait_row(problem, best.outcome)
+    elif outcomes:
+        row |= {"status": outcomes[-1].status, "message": outcomes[-1].message}
+    return row
+
+
+def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
+    gait = outcome.gait
+    row: dict[str, Any] = {name: getattr(outcome, name) for name in _NUMBERS}
+    row |= {"mean": gait.mean, "cos": gait.cos, "sin": gait.sin}
+    row["at_slowest"] = int(shape_speed(gait) < _AT_SLOWEST * problem.smallest_shape_speed)
+    if problem.body.n_joint > 1:
+        kind: GaitClass = gait_class(gait, problem.body, problem.friction)
+        row |= {name: getattr(kind, name) for name in ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")}
+        row["gait_class"] = kind.label
+    return row
+
+
+def best_over(table_values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """Largest value along an axis, NaN where there is none, and where it is (0 there)."""
+    filled = np.where(np.isnan(table_values), -np.inf, table_values)
+    where = filled.argmax(axis=axis)
+    best = filled.max(axis=axis)
+    return np.where(np.isfinite(best), best, np.nan), where
+
+
+def cell_text(study: Study, cell: Index) -> str:
+    """Coordinates of a cell for people."""
+    return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in study.coordinates(cell).items())

@@ -1,0 +1,183 @@
+"""A gait's motion by adaptive quadrature: orientation, displacement and work to a given accuracy, at any phase.
+
+Velocities are solved for at Gauss nodes of panels; a panel is halved until its two halves agree with it. Stick and slip
+give the velocities kinks whose width is of order delta, so the panels shrink towards them and show where they are.
+The panels know nothing of a collocation mesh; this is what a mesh is measured against.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.mechanics.balance import instant, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.numerics.schemes import Scheme, scheme
+from colloc.verification.replay import Path
+
+PANEL_RULE = scheme("gauss-5")
+_TO_MIDDLE = PANEL_RULE.integrals(np.array([0.5]))[0]
+_TO_HALVES = PANEL_RULE.lagrange(0.5 * np.concatenate([PANEL_RULE.c, 1.0 + PANEL_RULE.c]))
+_NARROWEST = 1e-9
+_MOST_PANELS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``, velocity of the centre of mass
+    in the body frame (complex), power."""
+
+    z: np.ndarray
+    centre: np.ndarray
+    power: np.ndarray
+
+
+def rates_at(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None) -> Rates:
+    """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
+    angles, rates = path(t.ravel())
+    start = None if near is None else near.reshape(3, -1)
+    z = solve_balance(body, friction, angles, rates, delta, start=start).require().z
+    now = instant(body, friction, angles, rates, z, delta)
+    cx, cy = body.centre_velocity(now.posture, now.velocity)
+    power = total_power(now.velocity, now.force)
+    return Rates(z.reshape(3, *t.shape), (cx[0] + 1j * cy[0]).reshape(t.shape), power[0].reshape(t.shape))
+
+
+Increments = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Rotation, displacement in the initial body frame (complex) and work of intervals, ``(n,)`` each."""
+
+
+def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None) -> Increments:
+    """Increments of intervals of length h ``(n,)``, from rates at the nodes of the rule ``(n, s)``.
+
+    `weights` are those of the rule, or of its integral over a part of the interval.
+    """
+    omega, b = rates.z[2], rule.b if weights is None else weights
+    turn = np.exp(1j * h[:, None] * (omega @ rule.A.T))
+    return h * (omega @ b), h * ((turn * rates.centre) @ b), h * (rates.power @ b)
+
+
+@dataclass(frozen=True, eq=False)
+class FineMotion:
+    """The motion of a gait over its solved part.
+
+    Attributes
+    ----------
+    edges : (n + 1,)
+        Panel edges.
+    rates : Rates
+        At the panel nodes, ``(n, s)``.
+    theta, path, work : (n + 1,)
+        Orientation, displacement in the lab (complex, starting with orientation 0) and work at the edges.
+    unresolved : (n,)
+        Relative efficiency error that a panel may still hold: what halving it last changed, at its end and half way.
+    """
+
+    edges: np.ndarray
+    rates: Rates
+    theta: np.ndarray
+    path: np.ndarray
+    work: np.ndarray
+    unresolved: np.ndarray
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Phases of the panel nodes, ``(n, s)``."""
+        return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
+
+    def velocity(self, t: np.ndarray) -> np.ndarray:
+        """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``: good to start a solve from."""
+        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
+        weights = PANEL_RULE.lagrange(((t - self.edges[k]) / np.diff(self.edges)[k]).ravel()).reshape(*t.shape, -1)
+        return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
+
+    def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Orientation, displacement and work at phases t ``(n_time,)``, by the panels' polynomials."""
+        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
+        h = np.diff(self.edges)
+        weights = PANEL_RULE.integrals((t - self.edges[k]) / h[k]) * h[k][:, None]
+        omega = self.rates.z[2]
+        turn = np.exp(1j * (self.theta[:-1, None] + h[:, None] * (omega @ PANEL_RULE.A.T)))
+        moved = turn * self.rates.centre
+        return (
+            self.theta[k] + (weights * omega[k]).sum(axis=1),
+            self.path[k] + (weights * moved[k]).sum(axis=1),
+            self.work[k] + (weights * self.rates.power[k]).sum(axis=1),
+        )
+
+
+def fine_motion(body: Chain, friction: Friction, path: Path, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
+    """Integrate a path between the first and the last of `edges` to a relative efficiency error.
+
+    Parameters
+    ----------
+    body, friction
+    path : callable
+        Joint angles and rates at phases.
+    delta : float
+        Regularisation speed, per period.
+    edges : (n + 1,)
+        First panels; the mesh to be measured is a good choice.
+    tolerance : float
+        Panels are halved until the sum of their disagreements is below this. The sum that remains is in the result.
+
+    Raises
+    ------
+    NotConvergedError
+        If the balance cannot be solved at some instant.
+    """
+
+    def solved(left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None) -> tuple[Rates, Increments]:
+        rates = rates_at(body, friction, path, delta, left[:, None] + width[:, None] * PANEL_RULE.c, near)
+        return rates, increments(PANEL_RULE, width, rates)
+
+    left, width = edges[:-1], np.diff(edges)
+    rates, parts = solved(left, width)
+    gap = np.full(left.size, np.inf)
+    distance, work = 1.0, 1.0
+    while True:
+        # halve the panels that hold the excess over the tolerance
+        order = np.argsort(gap)[::-1]
+        tail = np.cumsum(gap[order][::-1])[::-1]
+        chosen = np.sort(order[(tail > tolerance) & (width[order] > _NARROWEST)])
+        if chosen.size == 0 or left.size + chosen.size > _MOST_PANELS:
+            break
+        half = 0.5 * np.repeat(width[chosen], 2)
+        start = np.repeat(left[chosen], 2)
+        start[1::2] += half[1::2]
+        new_rates, new = solved(start, half, (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1))
+        before = Rates(rates.z[:, chosen], rates.centre[chosen], rates.power[chosen])
+        middle = increments(PANEL_RULE, width[chosen], before, _TO_MIDDLE)
+        # the whole panel, and its polynomials half way, against the two halves
+        turn, move = new[0][0::2] + new[0][1::2], new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2]
+        differences = (
+            (turn - parts[0][chosen], move - parts[1][chosen], new[2][0::2] + new[2][1::2] - parts[2][chosen]),
+            tuple(half - polynomial for half, polynomial in zip((a[0::2] for a in new), middle, strict=True)),
+        )
+        kept = np.ones(left.size, dtype=bool)
+        kept[chosen] = False
+        place = np.argsort(np.concatenate([left[kept], start]))
+        rates = Rates(
+            np.concatenate([rates.z[:, kept], new_rates.z], axis=1)[:, place],
+            np.concatenate([rates.centre[kept], new_rates.centre])[place],
+            np.concatenate([rates.power[kept], new_rates.power])[place],
+        )
+        parts = tuple(np.concatenate([a[kept], b])[place] for a, b in zip(parts, new, strict=True))  # type: ignore[assignment]
+        _, travelled, spent = _accumulated(parts)
+        distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)
+        reach = np.abs(travelled - travelled[-1]).max() / distance
+        change = sum(
+            np.abs(move) / distance + np.abs(turn) * reach + np.abs(energy) / work for turn, move, energy in differences
+        )
+        gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
+        left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]
+    return FineMotion(np.append(left, edges[-1]), rates, *_accumulated(parts), gap)
+
+
+def _accumulated(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Orientation, lab displacement and work at the edges, from every interval's own."""
+    theta, work = (np.concatenate([[0.0], np.cumsum(a)]) for a in (parts[0], parts[2]))
+    return theta, np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]), work

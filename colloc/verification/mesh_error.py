@@ -1,0 +1,185 @@
+"""How wrong a collocated gait is, interval by interval: states, efficiency and constraints between the nodes.
+
+On an interval the scheme takes the rate of a state to be the polynomial through its values at the nodes. The *defect* of
+a state between the nodes is that polynomial less the true rate, which the balance gives for the gait at any phase. Its
+integral over the interval is the error that the interval adds to the state. It is evaluated against adaptive panels
+(`colloc.verification.adaptive_motion`), which resolve the kinks of stick and slip between the nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.mechanics.contact import crossing_bounds, crossing_depth, far_pairs
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import Scheme
+from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, increments, rates_at
+
+FINER = 0.05
+"""The panels are refined until what they may still miss is this fraction of the error they measure or of the tolerance."""
+_SAMPLES = 32
+
+
+@dataclass(frozen=True, eq=False)
+class MeshError:
+    """Errors of collocating one gait on one mesh, ``(n_interval,)`` each.
+
+    Attributes
+    ----------
+    rotation : (n,)
+        Error of the rotation over the interval [rad].
+    displacement : (n,)
+        Magnitude of the error of the displacement over the interval [body lengths].
+    work : (n,)
+        Error of the work over the interval.
+    velocity : (n,)
+        Largest error between the nodes of the interpolated velocity of the tail or, times a body length, of its rotation
+        rate [body lengths per period].
+    efficiency : (n,)
+        Relative contribution to the efficiency error, signed, to first order.
+    violation : (n,)
+        Largest excess over a joint limit [rad] or penetration of links [rad or body lengths] inside the interval.
+    total : float
+        Relative error of the collocated efficiency as a whole: all contributions, not linearised.
+    unresolved : float
+        What the panels that measured all this may have missed, relative to the efficiency.
+    """
+
+    rotation: np.ndarray
+    displacement: np.ndarray
+    work: np.ndarray
+    velocity: np.ndarray
+    efficiency: np.ndarray
+    violation: np.ndarray
+    total: float
+    unresolved: float
+
+    @property
+    def estimate(self) -> float:
+        """Estimated relative efficiency error: the magnitudes of all intervals, so that errors of opposite sign do not
+        cancel, and what is unresolved. An optimiser exploits cancellation; so this also covers its search."""
+        return float(np.abs(self.efficiency).sum() + self.unresolved)
+
+
+def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
+    """The gait's motion on adaptive panels, see `fine_motion`."""
+    return fine_motion(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, edges, tolerance)
+
+
+def mesh_error(
+    problem: Problem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float = 1e-6, fine: FineMotion | None = None
+) -> MeshError:
+    """Errors of collocating `gait` on `mesh`.
+
+    Parameters
+    ----------
+    problem : Problem
+    mesh : Mesh
+    gait : AnyGait
+    delta : float
+        Regularisation speed, per period.
+    tolerance : float
+        Relative efficiency error of interest; smaller ones need not be exact.
+    fine : FineMotion, optional
+        The gait's motion, if known.
+
+    Raises
+    ------
+    NotConvergedError
+        If the balance cannot be solved at some instant.
+    """
+    if fine is None:
+        fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
+    own = _collocated_intervals(problem, mesh.scheme, mesh.edges[:-1], mesh.edges[1:], gait, delta, fine)
+    return MeshError(
+        own.rotation,
+        np.abs(own.displacement),
+        own.work,
+        _velocity_error(mesh, own.rates, fine),
+        own.efficiency,
+        constraint_violation(problem, mesh, gait),
+        _efficiency(problem, *own.increments) / _fine_efficiency(problem, fine) - 1,
+        float(fine.unresolved.sum()),
+    )
+
+
+def efficiency_shares(
+    problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
+) -> np.ndarray:
+    """Relative efficiency error that collocating on each of the intervals from left to right adds, signed, ``(n,)``."""
+    return _collocated_intervals(problem, rule, left, right, gait, delta, fine).efficiency
+
+
+class _Own(NamedTuple):
+    """What a scheme makes of intervals: errors as in `MeshError`, rates at its nodes, its own increments."""
+
+    rotation: np.ndarray
+    displacement: np.ndarray
+    work: np.ndarray
+    efficiency: np.ndarray
+    rates: Rates
+    increments: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def _collocated_intervals(
+    problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
+) -> _Own:
+    nodes = left[:, None] + (right - left)[:, None] * rule.c
+    rates = rates_at(
+        problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, nodes, fine.velocity(nodes)
+    )
+    turned, moved, spent = increments(rule, right - left, rates)
+    (theta, path, work), (theta_right, path_right, work_right) = fine.at(left), fine.at(right)
+    rotation, energy = turned - (theta_right - theta), spent - (work_right - work)
+    displacement = moved * np.exp(1j * theta) - (path_right - path)
+    # an error of rotation turns everything after it
+    pull = displacement + 1j * rotation * (fine.path[-1] - path_right)
+    direction = _direction(problem, fine.path[-1], fine.theta[-1])
+    distance = float((fine.path[-1] * np.conj(direction)).real)
+    efficiency = (pull * np.conj(direction)).real / distance - energy / fine.work[-1]
+    return _Own(rotation, displacement, energy, efficiency, rates, (turned, moved, spent))
+
+
+def _fine_efficiency(problem: Problem, fine: FineMotion) -> float:
+    direction = _direction(problem, fine.path[-1], fine.theta[-1])
+    return float((fine.path[-1] * np.conj(direction)).real / fine.work[-1])
+
+
+def _efficiency(problem: Problem, turned: np.ndarray, moved: np.ndarray, spent: np.ndarray) -> float:
+    """Efficiency as the scheme sees it."""
+    theta = np.concatenate([[0.0], np.cumsum(turned)])
+    end = (np.exp(1j * theta[:-1]) * moved).sum()
+    return float((end * np.conj(_direction(problem, end, theta[-1]))).real / spent.sum())
+
+
+def _direction(problem: Problem, end: complex, rotation: float) -> complex:
+    """Unit vector along which the solved part's displacement counts."""
+    if problem.gait.symmetry == "antipodal":
+        return np.exp(0.5j * rotation) * (1 if (end * np.exp(-0.5j * rotation)).real > 0 else -1)
+    return end / abs(end)
+
+
+def _velocity_error(mesh: Mesh, rates: Rates, fine: FineMotion) -> np.ndarray:
+    t = fine.nodes.ravel()
+    k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
+    interpolated = np.einsum("ts,cts->ct", mesh.scheme.lagrange((t - mesh.edges[k]) / mesh.h[k]), rates.z[:, k])
+    largest = np.zeros(mesh.n)
+    np.maximum.at(largest, k, np.abs(interpolated - fine.rates.z.reshape(3, -1)).max(axis=0))
+    return largest
+
+
+def constraint_violation(problem: Problem, mesh: Mesh, gait: AnyGait) -> np.ndarray:
+    """Largest excess over a joint limit or penetration of any two links inside each interval, ``(n_interval,)``; 0 if none."""
+    t = (mesh.edges[:-1, None] + mesh.h[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)).ravel()
+    angles, body = gait.angles(t), problem.body
+    rows = [np.abs(angles).max(axis=0) - problem.joint_limit]
+    bounds = crossing_bounds(body, angles)
+    if bounds is not None:
+        rows.append(bounds.max(axis=0) - np.pi)
+    rows.append(crossing_depth(body, angles, far_pairs(body)))
+    return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)

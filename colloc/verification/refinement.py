@@ -1,0 +1,244 @@
+"""Mesh refinement to a requested efficiency error: knots are moved, intervals split, the order of the scheme raised.
+
+The gait can be tried on any mesh without solving for it again (`verification.mesh_error`), so a mesh is planned as a whole:
+
+1. *Move.* The velocities have kinks where links begin to stick or slip. On an interval with a kink inside, any scheme is
+   of low order. The knots of a coarse uniform mesh nearest to the kinks are moved onto them (or new ones are put there).
+2. *Split.* Intervals with the largest errors are cut until the sum of all magnitudes is below the request.
+3. *Raise the order.* Both are done for schemes of the same family with more nodes too; the mesh with the fewest points
+   wins, with a handicap, since another order starts the optimiser anew.
+
+Intervals in which a joint limit or a distance between links is violated between the instants that constrain it are
+halved, which gives them more such instants.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import Scheme, scheme
+from colloc.verification.adaptive_motion import FineMotion
+from colloc.verification.kinks import kink_phases
+from colloc.verification.mesh_error import FINER, MeshError, efficiency_shares, gait_motion, mesh_error
+
+VIOLATION = 5e-7
+"""Largest violation of a joint limit or of self-contact between nodes that needs no refinement [rad, body lengths]."""
+MOST_POINTS = 12_000
+AIM = 0.4
+"""The planned error is this fraction of the request: the gait, and its kinks with it, will still move."""
+_MORE_NODES, _MOST_NODES = (0, 2, 4), 9
+_HANDICAP = 1.1
+_FIRST_INTERVALS = 16
+"""Intervals a period, at least, from which a mesh is grown; also two for every harmonic."""
+_SNAP = 0.3
+GRADE = 0.2
+"""Where an interval with a kink at one end is cut, as a fraction of its length from there. Beside a kink velocities go like
+x log|x|; cutting in the middle costs schemes of high order twice the points."""
+_ONE_KINK = 0.02
+"""Kinks nearer to each other than this part of the first mesh's spacing share a knot."""
+_LEFT = 0.2
+"""How far, in mean intervals, a kink can have moved from the knot that it left."""
+_NARROWEST = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPlan:
+    """A mesh on which a gait is collocated as accurately as requested, or as the budget allows.
+
+    Attributes
+    ----------
+    scheme : str
+    edges : (n + 1,)
+    estimate : float
+        Relative efficiency error of the gait on that mesh.
+    reached : bool
+        Whether that is below the request; if not, the budget of points was exhausted.
+    kept : array
+        Phases that have to stay knots: they split intervals in which a constraint was violated.
+    """
+
+    scheme: str
+    edges: np.ndarray
+    estimate: float
+    reached: bool
+    kept: np.ndarray
+
+
+def kink_knots(problem: Problem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
+    """Phases of the kinks of a gait's velocities, one for each group of very close ones."""
+    kinks = kink_phases(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, fine)
+    apart = _ONE_KINK * problem.gait.fraction / _FIRST_INTERVALS
+    knots: list[float] = []
+    for kink in kinks:
+        if not knots or kink - knots[-1] > apart:
+            knots.append(float(kink))
+    return np.array(knots)
+
+
+def moved_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np.ndarray:
+    """The mesh with its nearest inner knots moved onto the kinks.
+
+    A kink farther than `snap` (in typical spacings) from any knot gets a knot of its own.
+    """
+    free, fixed = edges[1:-1].copy(), []
+    spacing = np.median(np.diff(edges))
+    for kink in kinks:
+        fixed.append(kink)
+        if free.size:
+            nearest = int(np.argmin(np.abs(free - kink)))
+            if abs(free[nearest] - kink) < snap * spacing:
+                free = np.delete(free, nearest)
+    knots = np.unique(np.concatenate([edges[[0, -1]], free, fixed]))
+    keep = np.concatenate([[True], np.diff(knots) > _NARROWEST])
+    keep[-1] = True
+    return knots[keep]
+
+
+def planned_mesh(
+    problem: Problem,
+    mesh: Mesh,
+    gait: AnyGait,
+    delta: float,
+    tolerance: float,
+    *,
+    kept: np.ndarray | None = None,
+    aim: float = AIM,
+    most_points: int = MOST_POINTS,
+) -> MeshPlan | None:
+    """A mesh for `gait`, or None if `mesh` is good already.
+
+    Parameters
+    ----------
+    problem : Problem
+    mesh : Mesh
+        The mesh the gait was found on.
+    gait : AnyGait
+    delta : float
+        Regularisation speed, per period.
+    tolerance : float
+        Largest relative efficiency error.
+    kept : array, optional
+        Phases that have to be knots.
+    aim : float
+        The planned error is this fraction of the tolerance.
+    most_points : int
+        Budget of collocation points.
+
+    Raises
+    ------
+    NotConvergedError
+        If the balance cannot be solved at some instant.
+    """
+    fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
+    error = mesh_error(problem, mesh, gait, delta, tolerance, fine)
+    if error.estimate <= tolerance and error.violation.max() <= VIOLATION:
+        return None
+    knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
+    if error.estimate <= tolerance:
+        return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
+    given = scheme(problem.scheme)
+    kinks = kink_knots(problem, gait, delta, fine)
+    switches = problem.friction.mu_f != problem.friction.mu_b
+    best: MeshPlan | None = None
+    for rule in _family(given):
+        # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself kinked
+        on_knots = kinks[:0] if switches and (rule.left or rule.right) else kinks
+        # knots of a path are where its arcs and sides end: there they may be added, not moved
+        snap = 0.0 if problem.has_path else _SNAP
+        edges = moved_knots(np.union1d(_first_edges(problem, mesh), knots), np.union1d(on_knots, _beside(mesh, on_knots)), snap)
+        budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
+        plan = _split(problem, rule, edges, knots, on_knots, gait, delta, fine, tolerance, aim, budget)
+        if best is None or (plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best))):
+            best = plan
+    return best
+
+
+def _beside(mesh: Mesh, kinks: np.ndarray) -> np.ndarray:
+    """Knots of a mesh that the kinks have just left.
+
+    Where a kink leaves its knot, collocation errs in proportion to how far it went, and the optimiser takes what errs in its
+    favour: moving the knot after the kink only repeats the chase. Between the old knot and the new one it ends.
+    """
+    if kinks.size == 0:
+        return kinks
+    nearest = mesh.edges[np.abs(mesh.edges[:, None] - kinks).argmin(axis=0)]
+    return nearest[np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()]
+
+
+def violated_middles(mesh: Mesh, error: MeshError) -> np.ndarray:
+    """Midpoints of the intervals in which a shape constraint is violated between its instants."""
+    return (0.5 * (mesh.edges[1:] + mesh.edges[:-1]))[error.violation > VIOLATION]
+
+
+def _family(given: Scheme) -> list[Scheme]:
+    match = re.fullmatch(r"(gauss|radau)-(\d+)", given.name)
+    if not match:
+        return [given]
+    nodes = [given.s + more for more in _MORE_NODES if more == 0 or given.s + more <= _MOST_NODES]
+    return [scheme(f"{match[1]}-{s}") for s in nodes]
+
+
+def _first_edges(problem: Problem, mesh: Mesh) -> np.ndarray:
+    """The mesh from which one is grown; a path's own, because its arcs or sides are the intervals."""
+    if problem.has_path:
+        return mesh.edges
+    return np.linspace(mesh.edges[0], mesh.edges[-1], _first_intervals(problem) + 1)
+
+
+def _first_intervals(problem: Problem) -> int:
+    return max(int(_FIRST_INTERVALS * problem.gait.fraction), 2 * problem.gait.harmonics)
+
+
+def _points(plan: MeshPlan) -> float:
+    rule = scheme(plan.scheme)
+    return (plan.edges.size - 1) * (rule.s - rule.left)
+
+
+def _split(
+    problem: Problem,
+    rule: Scheme,
+    edges: np.ndarray,
+    kept: np.ndarray,
+    kinks: np.ndarray,
+    gait: AnyGait,
+    delta: float,
+    fine: FineMotion,
+    tolerance: float,
+    aim: float,
+    budget: float,
+) -> MeshPlan:
+    """Cut the intervals with the largest errors until all together are small enough, or the budget is exhausted."""
+    left, right = edges[:-1], edges[1:]
+    shares = np.abs(efficiency_shares(problem, rule, left, right, gait, delta, fine))
+    unresolved = float(fine.unresolved.sum())
+    wanted = max(aim * tolerance - unresolved, 0.25 * aim * tolerance)
+    while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
+        order = np.argsort(shares)[::-1]
+        # those that hold the excess, half of them at a time: what they leave behind is not known yet
+        excess = np.cumsum(shares[order]) < shares.sum() - 0.3 * wanted
+        chosen = order[: max(1, int(excess.sum()) // 2)]
+        chosen = chosen[right[chosen] - left[chosen] > 2 * _NARROWEST]
+        if chosen.size == 0:
+            break
+        middle = _cut(left[chosen], right[chosen], kinks)
+        new_left, new_right = np.concatenate([left[chosen], middle]), np.concatenate([middle, right[chosen]])
+        new = np.abs(efficiency_shares(problem, rule, new_left, new_right, gait, delta, fine))
+        left, right, shares = (
+            np.concatenate([np.delete(old, chosen), added])
+            for old, added in ((left, new_left), (right, new_right), (shares, new))
+        )
+    estimate = float(shares.sum() + unresolved)
+    return MeshPlan(rule.name, np.sort(np.append(left, right.max())), estimate, estimate <= tolerance, kept)
+
+
+def _cut(left: np.ndarray, right: np.ndarray, kinks: np.ndarray) -> np.ndarray:
+    """Where to cut intervals: in the middle, but near an end that is a kink, where meshes of high order want grading."""
+    at_left, at_right = np.isin(left, kinks), np.isin(right, kinks)
+    fraction = np.where(at_left & ~at_right, GRADE, np.where(at_right & ~at_left, 1 - GRADE, 0.5))
+    return left + fraction * (right - left)

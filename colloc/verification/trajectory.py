@@ -1,0 +1,117 @@
+"""A gait as joint angles over time for a machine: a period in seconds, and joint speeds it can follow.
+
+Dry friction does not know how fast a path is run through, so distance and work per period do not depend on pacing (up to
+the influence of delta). With phase t in [0, 1] and time tau in seconds, pacing is ``d tau/dt = p(t)``; joint j then moves
+at ``|dq_j/dt| / p``. Speed limits v_j ask for ``p >= s(t) = max_j |dq_j/dt| / v_j``, and the least change of an even pace
+that takes T seconds is
+
+    p(t) = max(level, s(t)),   level such that  int p dt = T;
+
+T = int s dt, with level = 0, is the fastest: some joint is at its limit all the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from colloc.system.errors import ProblemError
+from colloc.verification.replay import Path
+
+_PHASES = 20001
+_MOST_SAMPLES = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One period at a fixed rate of samples; the sample after the last is the first.
+
+    Attributes
+    ----------
+    time : (n,)
+        Seconds, 0, 1/rate, ..., period - 1/rate.
+    phase : (n,)
+        Of the gait, in [0, 1).
+    angles : (n_joint, n)
+        Joint angles [rad].
+    speeds : (n_joint, n)
+        Their time derivatives [rad/s].
+    period : float
+        Seconds; a whole number of samples.
+    """
+
+    time: np.ndarray
+    phase: np.ndarray
+    angles: np.ndarray
+    speeds: np.ndarray
+    period: float
+
+
+def timed(path: Path, rate: float, period: float | None = None, limits: np.ndarray | float | None = None) -> Trajectory:
+    """Sample a path at `rate`, with a period in seconds and joint speed limits.
+
+    Parameters
+    ----------
+    path : callable
+        Joint angles and rates at phases, see `colloc.verification.replay.Path`.
+    rate : float
+        Samples a second.
+    period : float, optional
+        Seconds, rounded up to a whole number of samples; by default the shortest that the limits allow.
+    limits : (n_joint,) or float, optional
+        Largest joint speeds [rad/s].
+
+    Raises
+    ------
+    ProblemError
+        If neither a period nor limits are given, a number is unusable, or the period is too short for the limits.
+    """
+    if not np.isfinite(rate) or rate <= 0:
+        raise ProblemError(f"the sample rate must be positive, not {rate:g}.")
+    t = np.linspace(0.0, 1.0, _PHASES)
+    vertices, _ = path(t)
+    # the path as a polygon (off by less than 1e-6 rad), so that limits hold exactly between the samples too
+    moved = np.abs(np.diff(vertices, axis=1)) * (t.size - 1)
+    most = np.full(len(moved), np.inf) if limits is None else _one_each(limits, len(moved))
+    slowest = (moved / most[:, None]).max(axis=0)
+    shortest = float(slowest.mean())
+    if period is None and limits is None:
+        raise ProblemError("a trajectory needs a period in seconds or joint speed limits.")
+    wanted = shortest if period is None else float(period)
+    if not np.isfinite(wanted) or wanted <= 0:
+        raise ProblemError(f"the period must be positive, not {wanted:g} s.")
+    if wanted < shortest * (1 - 1e-9):
+        raise ProblemError(f"a period of {wanted:g} s is too short for the joint speed limits; use at least {shortest:.6g} s.")
+    count = int(np.ceil(wanted * rate - 1e-9))
+    if not 4 <= count <= _MOST_SAMPLES:
+        raise ProblemError(f"{count} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period.")
+    period = count / rate
+    pace = np.maximum(_level(slowest, period), slowest)
+    clock = np.concatenate([[0.0], np.cumsum(pace) / pace.size])
+    clock *= period / clock[-1]
+    time = np.arange(count) / rate
+    phase = np.interp(time, clock, t)
+    angles = np.stack([np.interp(time, clock, joint) for joint in vertices])
+    index = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, pace.size - 1)
+    speeds = np.clip(path(phase)[1] / pace[index], -most[:, None], most[:, None])
+    return Trajectory(time, phase, angles, speeds, period)
+
+
+def _one_each(limits: np.ndarray | float, n_joint: int) -> np.ndarray:
+    given = np.asarray(limits, dtype=float).ravel()
+    if given.size not in (1, n_joint):
+        raise ProblemError(f"{given.size} joint speed limits for {n_joint} joints; give one for all, or one each.")
+    if not np.isfinite(given).all() or given.min() <= 0:
+        raise ProblemError(f"joint speed limits must be positive, not {given.tolist()}.")
+    return np.broadcast_to(given, n_joint)
+
+
+def _level(slowest: np.ndarray, period: float) -> float:
+    """The even pace that lower bounds are raised to so that the mean of the larger of both is `period`."""
+
+    def excess(level: float) -> float:
+        return float(np.maximum(level, slowest).mean()) - period
+
+    return 0.0 if excess(0.0) >= 0 else float(brentq(excess, 0.0, 2 * period, xtol=1e-14, rtol=1e-14))

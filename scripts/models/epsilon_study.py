@@ -1,0 +1,93 @@
+"""A concertina crawler followed to small bumps: distance, work and efficiency against epsilon, with fitted orders.
+
+The regularisation has to fall with epsilon, because the speeds of the bump do: ``delta = delta_0 (epsilon/epsilon_0)^2``
+keeps delta over the bump's speed falling too (paper, section VI).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from colloc.smooth.concertina import Concertina
+
+DELTA_0, EPSILON_0 = 1e-4, 0.2
+
+
+@dataclass(frozen=True)
+class EpsilonPoint:
+    """A crawler at one epsilon; `errors` are for d, W_inner, W_outer and efficiency, see `epsilon_point`."""
+
+    epsilon: float
+    delta: float
+    d: float
+    W_inner: float
+    W_outer: float
+    efficiency: float
+    errors: dict[str, float]
+    largest_creep: float
+
+    def to_dict(self) -> dict:
+        """Plain numbers (JSON)."""
+        return asdict(self)
+
+
+def delta_for(epsilon: float, delta_0: float = DELTA_0, epsilon_0: float = EPSILON_0) -> float:
+    """Regularisation speed that belongs to epsilon."""
+    return delta_0 * (epsilon / epsilon_0) ** 2
+
+
+def epsilon_point(crawler: Concertina, *, intervals: int = 2, **settings: Any) -> EpsilonPoint:
+    """The crawler's period with an error bar.
+
+    The error is the difference from half the intervals and a lower panel order, plus the difference from a computation
+    at four times delta, which bounds what a further decrease of delta would change as long as that is at most half of it.
+    """
+    fine = crawler.measured_period(intervals=intervals, **settings)
+    softer = crawler.with_(delta=4 * crawler.delta).period(intervals=max(1, intervals // 2), **settings)
+    coarse = crawler.period(intervals=max(1, intervals // 2), **settings)
+    errors = {
+        name: float(fine.errors[source] + abs(getattr(softer, name) - getattr(coarse, name)))
+        for name, source in (("d", "d"), ("W_inner", "W_inner"), ("W_outer", "W"), ("efficiency", "efficiency"))
+    }
+    return EpsilonPoint(
+        crawler.epsilon,
+        crawler.delta,
+        fine.d,
+        fine.W_inner,
+        fine.W_outer,
+        fine.efficiency,
+        errors,
+        float(fine.nodes.slowest.max()),
+    )
+
+
+def fitted_order(epsilon: Any, value: Any) -> float:
+    """Exponent p of the power law ``value ~ epsilon^p``, by least squares on logarithms."""
+    return float(np.polyfit(np.log(epsilon), np.log(value), 1)[0])
+
+
+def fitted_orders(points: list[EpsilonPoint], bound: float) -> dict[str, float]:
+    """Orders of d, W_inner, W_outer and of the efficiency's distance from its bound."""
+    epsilon = [p.epsilon for p in points]
+    return {
+        "d": fitted_order(epsilon, [p.d for p in points]),
+        "W_inner": fitted_order(epsilon, [p.W_inner for p in points]),
+        "W_outer": fitted_order(epsilon, [p.W_outer for p in points]),
+        "1 - efficiency/bound": fitted_order(epsilon, [1 - p.efficiency / bound for p in points]),
+    }
+
+
+def table(points: list[EpsilonPoint]) -> str:
+    """The points as text, one line each."""
+    head = (
+        f"{'epsilon':>9} {'delta':>8} {'d':>12} {'W_inner':>12} {'W_outer':>12} {'W_outer/d':>10} {'efficiency':>11} {'+-':>8}"
+    )
+    lines = [
+        f"{p.epsilon:9.4g} {p.delta:8.1e} {p.d:12.6e} {p.W_inner:12.6e} {p.W_outer:12.6e} {p.W_outer / p.d:10.6f} "
+        f"{p.efficiency:11.7f} {p.errors['efficiency']:8.1e}"
+        for p in points
+    ]
+    return "\n".join([head, *lines])

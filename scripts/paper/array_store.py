@@ -1,0 +1,87 @@
+"""Named arrays with units and provenance in an HDF5 file, replaced as a whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+import colloc
+from colloc.system.errors import StoreError
+from colloc.system.store_file import array, attribute, mark, new_file, put, put_attribute, sealed_file
+
+KIND, VERSION = "colloc arrays", 2
+_LARGEST = 2**31
+"""Bytes of a file, and of an array: velocity maps are large."""
+
+
+def write_arrays(
+    path: Path,
+    arrays: Mapping[str, Any],
+    *,
+    units: Mapping[str, str] | None = None,
+    attributes: Mapping[str, Any] | None = None,
+) -> None:
+    """Write arrays (numbers, strings or NumPy arrays by name; "a/b" makes a group) with what describes them.
+
+    Parameters
+    ----------
+    path : Path
+        Replaced atomically.
+    arrays : mapping
+    units : mapping, optional
+        Unit or dimensions of an array, by name.
+    attributes : mapping, optional
+        Of the file, as JSON where they are not plain numbers or strings. The command line and versions are added.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    described = {
+        "command": " ".join(sys.orig_argv[1:]),
+        "versions": {"python": sys.version.split()[0], "numpy": np.__version__, "h5py": h5py.__version__},
+        "conventions": (colloc.__doc__ or "").strip(),
+        **(attributes or {}),
+    }
+    with new_file(path) as file:
+        mark(file, KIND, VERSION)
+        for key, value in arrays.items():
+            put(file, key, value, units=(units or {}).get(key, "1"))
+        for key, value in described.items():
+            put_attribute(file, key, value if isinstance(value, (str, int, float)) else json.dumps(value))
+
+
+def read_arrays(path: Path) -> dict[str, Any]:
+    """All arrays of a file by name; strings decoded, scalars as NumPy scalars.
+
+    Raises
+    ------
+    StoreError
+        If the file is missing, damaged or not of this kind.
+    """
+    names: list[str] = []
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            names.append(name)
+
+    with sealed_file(path, KIND, VERSION, largest=_LARGEST) as file:
+        file.visititems(visit)
+        return {name: array(file, name, largest=_LARGEST) for name in names}
+
+
+def read_attribute(path: Path, name: str) -> Any:
+    """One attribute of the file, or None if the file or the attribute is missing, or the file is damaged."""
+    try:
+        with sealed_file(path, KIND, VERSION, largest=_LARGEST) as file:
+            return attribute(file, name)
+    except StoreError:
+        return None

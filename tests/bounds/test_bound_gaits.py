@@ -1,0 +1,126 @@
+"""No gait beats the bound: thousands of random harmonic gaits and polygons, for several frictions."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from colloc.bounds.coulomb_motion import Motion, balanced_motion
+from colloc.bounds.infinitesimal import small_gait
+from colloc.bounds.potential import Samples
+from colloc.bounds.sampled import Bound, Budget, efficiency_bound
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+
+ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
+DIRECTED = dataclasses.replace(ODD, harmonics=(0, 1))
+STEPS = 48
+
+
+@pytest.fixture(scope="module")
+def isotropic() -> Bound:
+    return efficiency_bound(Chain(), Friction(), budget=ODD)
+
+
+def antipodal_fourier(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Random gaits q(t + 1/2) = -q(t): the second half mirrors the first, so any friction closes the rotation."""
+    t = (np.arange(STEPS) + 0.5) / STEPS
+    k = 2 * np.pi * np.array([1, 3, 5])
+    a, b = rng.standard_normal((2, 2, count, 3)) * [1.0, 0.4, 0.2]
+    wave = lambda p, c: np.einsum("jnk,kt->jnt", p, c)  # noqa: E731
+    q = wave(a, np.cos(np.outer(k, t))) + wave(b, np.sin(np.outer(k, t)))
+    rate = wave(-a * k, np.sin(np.outer(k, t))) + wave(b * k, np.cos(np.outer(k, t)))
+    size = rng.uniform(0.1, 2.0, count) / np.abs(q).max(axis=(0, 2))
+    return q * size[:, None], rate * size[:, None]
+
+
+def antipodal_polygons(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Random polygons of three corners and their opposites, run through at constant speed on each side."""
+    corners = rng.uniform(-1.0, 1.0, (2, count, 3)) * rng.uniform(0.1, 2.05, count)[:, None]
+    corners = np.concatenate([corners, -corners], axis=2)
+    sides = np.roll(corners, -1, axis=2) - corners
+    part = (np.arange(STEPS // 6) + 0.5) / (STEPS // 6)
+    q = (corners[..., None] + sides[..., None] * part).reshape(2, count, -1)
+    return q, np.repeat(6 * sides, STEPS // 6, axis=2)
+
+
+def replayed(motion: Motion, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of the middle link and work per period of gaits stored one after the other, ``(count,)`` each."""
+    spin = motion.spin.reshape(count, STEPS) / STEPS
+    heading = np.cumsum(spin, axis=1) - 0.5 * spin
+    v = (motion.velocity[0] + 1j * motion.velocity[1]).reshape(count, STEPS)
+    return np.abs((np.exp(1j * heading) * v).mean(axis=1)), motion.power.reshape(count, STEPS).mean(axis=1)
+
+
+def ratios(friction: Friction, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, Motion]:
+    count = q.shape[1]
+    motion = balanced_motion(Chain(), friction, q.reshape(2, -1), rate.reshape(2, -1))
+    assert motion.size == count * STEPS
+    distance, work = replayed(motion, count)
+    return distance / work, motion
+
+
+@pytest.mark.parametrize(
+    "mu",
+    [
+        (1.0, 1.0, 1.0),
+        pytest.param((3.0, 1.0, 1.0), marks=pytest.mark.slow),
+        pytest.param((1.7, 1.0, 1.3), marks=pytest.mark.slow),
+        pytest.param((1.0, 1.0, 3.0), marks=pytest.mark.slow),
+    ],
+)
+def test_no_random_gait_beats_the_bound(mu):
+    friction = Friction(*mu)
+    bound = efficiency_bound(Chain(), friction, budget=ODD if friction.reversible else DIRECTED)
+    assert bound.sampled < 1 / friction.smallest
+    rng = np.random.default_rng(21)
+    best = 0.0
+    for make in (antipodal_fourier, antipodal_polygons):
+        efficiency, _ = ratios(friction, *make(rng, 350))
+        best = max(best, efficiency.max())
+        # the midpoint rule overrates a gait by about a percent at most
+        assert efficiency.max() < bound.sampled
+    assert best > 0.1
+
+
+def test_a_sampled_bound_holds_at_random_motions_within_a_percent():
+    """How far samples can be trusted: motions that were never sampled exceed the coarse bound by little."""
+    bound = efficiency_bound(Chain(), Friction(), 2.0, budget=ODD)
+    rng = np.random.default_rng(22)
+    turn = rng.uniform(0, 2 * np.pi, 8000)
+    motion = balanced_motion(Chain(), Friction(), rng.uniform(-2, 2, (2, 8000)), np.stack([np.cos(turn), np.sin(turn)]))
+    ratio = Samples(bound.potential_space(Chain()), motion).ratio(np.array(bound.coefficients))[0]
+    assert ratio.max() < 1.05 * bound.sampled
+
+
+def test_infinitesimal_triangle_reaches_two_fifths():
+    """Design value derived for shapes (c, -c) with c > 1.8: two joints one after the other, then undone together."""
+    gait = small_gait(Chain(), Friction(), np.array([2.2, -2.2]), directions=360)
+    assert abs(gait.efficiency - 0.4) < 1e-4
+    np.testing.assert_allclose(gait.rates @ gait.weights, 0.0, atol=1e-9)
+
+
+def test_small_gaits_at_the_fold_generate_their_directions():
+    """0.45606 at (pi, 0) from any first set of directions: the creases are found, where fixed sets stop at 0.452."""
+    values = [small_gait(Chain(), Friction(), np.array([np.pi, 0.0]), n, 4).efficiency for n in (60, 74)]
+    np.testing.assert_allclose(values, 0.45606, atol=2e-4)
+
+
+def test_small_gait_is_what_a_small_polygon_does():
+    """The linear program against a replay of the polygon it proposes; rotation of order size^2 is left open."""
+    shape = np.array([2.2, -2.2])
+    gait = small_gait(Chain(), Friction(), shape, directions=360)
+    for size in (0.04, 0.02):
+        corners = gait.path(shape, size)
+        sides = np.roll(corners, -1, axis=1) - corners
+        part = (np.arange(20) + 0.5) / 20
+        q = (corners[:, :, None] + sides[:, :, None] * part).reshape(2, -1)
+        motion = balanced_motion(Chain(), Friction(), q, np.repeat(sides, 20, axis=1) / 20)
+        heading = np.cumsum(motion.spin) - 0.5 * motion.spin
+        distance = abs(np.sum(np.exp(1j * heading) * (motion.velocity[0] + 1j * motion.velocity[1])))
+        assert abs(distance / motion.power.sum() - gait.efficiency) < 0.05 * size
+
+
+def test_small_gaits_stay_below_the_bound(isotropic):
+    for shape in ((np.pi, 0.0), (0.0, 0.0), (1.2, -0.3), (2.0, 1.0)):
+        assert small_gait(Chain(), Friction(), np.array(shape), 90, 8).efficiency < isotropic.sampled

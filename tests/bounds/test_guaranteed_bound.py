@@ -1,0 +1,114 @@
+"""The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities are what they claim."""
+
+import numpy as np
+import pytest
+
+from colloc.bounds.coulomb_motion import balanced_motion
+from colloc.bounds.guaranteed import _KAPPA, _cell_bounds, _Reference, certify, with_guarantee
+from colloc.bounds.loaded_balance import loaded_balance
+from colloc.bounds.potential import Samples
+from colloc.bounds.sampled import Bound, Budget, efficiency_bound
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.system.errors import ProblemError
+
+BODY = Chain()
+
+
+@pytest.fixture(scope="module")
+def bound() -> Bound:
+    return efficiency_bound(BODY, Friction(), budget=Budget(4, (1,), 8, 24, 3, 60))
+
+
+def test_loaded_balance_without_load_is_the_balance_of_the_body():
+    rng = np.random.default_rng(31)
+    q, s = rng.uniform(-3, 3, (2, 200)), rng.uniform(-1, 1, 200)
+    r = np.stack([np.ones(200), s])
+    free = loaded_balance(BODY, q, r, np.zeros((3, 200)), np.zeros((3, 200)), 1e-8)
+    motion = balanced_motion(BODY, Friction(), q, r, 1e-8)
+    np.testing.assert_allclose(free.velocity[:2], motion.velocity, atol=1e-6)
+    np.testing.assert_allclose(free.velocity[2], motion.spin, atol=1e-6)
+    np.testing.assert_allclose(free.power, motion.power, rtol=1e-7)
+    assert free.residual.max() < 1e-7
+
+
+def test_loaded_forces_bound_the_power_from_below():
+    """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z for every motion z."""
+    rng = np.random.default_rng(32)
+    n = 100
+    q, r = rng.uniform(-3, 3, (2, n)), np.stack([np.ones(n), rng.uniform(-1, 1, n)])
+    load = rng.uniform(-0.1, 0.1, (3, n)) * [[1.0], [1.0], [0.2]]
+    state = loaded_balance(BODY, q, r, load, np.zeros((3, n)), 1e-8)
+    beta_r = state.power - (load * state.velocity).sum(axis=0)
+    for _ in range(20):
+        other = loaded_balance(BODY, q, r, np.zeros((3, n)), rng.uniform(-1, 1, (3, n)) * 0.3, 1e-12, steps=0)
+        assert np.all(other.potential >= beta_r + (load * other.velocity).sum(axis=0) - 1e-7)
+
+
+def test_speed_of_a_link_end_is_bounded_by_its_dissipation():
+    rng = np.random.default_rng(33)
+    sigma = (np.arange(2000) + 0.5) / 2000
+    start, end = rng.standard_normal((2, 2, 500))
+    line = start[:, :, None] * (1 - sigma) + end[:, :, None] * sigma
+    mean = np.hypot(*line).mean(axis=1)
+    assert np.all(mean >= _KAPPA * np.hypot(*start) * (1 - 1e-5))
+    worst = np.abs(1 - np.sqrt(2) * sigma).mean()
+    assert worst == pytest.approx(_KAPPA, abs=1e-5)
+
+
+@pytest.mark.parametrize("n", [64, 256])
+def test_cell_bounds_hold_at_random_motions_inside(bound, n):
+    rng = np.random.default_rng(34)
+    size = np.array([2 * np.pi / n, 2 * np.pi / n, 4 / n])
+    count = 150
+    low = rng.integers([n // 2, 0, 0], [n, n, n // 2], (count, 3)).T * size[:, None] - np.array([np.pi, np.pi, 1.0])[:, None]
+    value, _ = _cell_bounds(BODY, _Reference(bound, BODY), low, size, 8.0, 1e-7)
+    inside = low[:, :, None] + size[:, None, None] * rng.uniform(0, 1, (3, count, 20))
+    q, r = inside[:2].reshape(2, -1), np.stack([np.ones(count * 20), inside[2].ravel()])
+    motion = balanced_motion(BODY, Friction(), q, r, 1e-10)
+    assert motion.size == count * 20
+    ratio = Samples(bound.potential_space(BODY), motion).ratio(np.array(bound.coefficients))[0].reshape(count, 20)
+    assert np.all(ratio.max(axis=1) <= value)
+    # and they are not vacuous; most of the excess is the roughness of this coarse reference point
+    assert np.median(value - ratio.max(axis=1)) < (0.3 if n == 64 else 0.15)
+
+
+@pytest.mark.slow
+def test_no_gait_of_the_isotropic_body_reaches_nine_tenths(bound):
+    certificate = certify(BODY, Friction(), bound, 0.95, seconds=100.0)
+    assert certificate.open_cells == 0
+    assert certificate.guaranteed == 0.95
+    assert 0 < certificate.distance_allowance(1.0, 1e-6) < 1e-3
+
+
+def test_out_of_time_says_what_is_proved_so_far(bound):
+    certificate = certify(BODY, Friction(), bound, 0.5, seconds=0.0)
+    assert certificate.open_cells > 0
+    assert certificate.guaranteed > 0.5
+    assert "left open" in with_guarantee(bound, certificate).missing
+
+
+def test_friction_without_a_potential_has_no_proof(bound):
+    with pytest.raises(ProblemError, match="isotropic"):
+        certify(BODY, Friction(2.0, 1.0, 1.0), bound, 0.5)
+
+
+@pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
+def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
+    """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their power at most delta below.
+
+    These are all that the allowance for finite delta uses (docs/bound.md, section 3).
+    """
+    q, r = np.random.default_rng(35).uniform(-3, 3, (2, 2, 300))
+    rest = np.zeros((3, 300))
+    exact = loaded_balance(BODY, q, r, rest, rest, 1e-10)
+    soft = loaded_balance(BODY, q, r, rest, rest, delta)
+    # the dissipation J of the regularised motion itself: evaluated there, no step taken
+    there = loaded_balance(BODY, q, r, rest, soft.velocity, 1e-12, steps=0)
+    least = exact.potential
+    assert np.all(there.potential >= least - 1e-7)
+    assert np.all(there.potential <= least + delta + 1e-7)
+    assert np.all(soft.power >= there.potential - delta - 1e-7)
+    assert np.all(soft.power <= soft.potential + 1e-7)
+    # and not vacuously: motions do change
+    assert np.max(there.potential - least) > 1e-3 * delta

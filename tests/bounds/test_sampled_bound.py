@@ -1,0 +1,182 @@
+"""The upper bound: identities of its parts, limits where it is known, and gaits it must exceed."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.optimize import linprog
+
+from colloc.bounds.coulomb_motion import Motion, balanced_motion, fundamental
+from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
+from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
+from colloc.bounds.sampling import Domain
+from colloc.mechanics.balance import instant, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.numerics.minimax_program import smallest_maximum
+from colloc.numerics.spline import TensorSpline
+from colloc.system.errors import ProblemError
+
+FRICTIONS = [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0)]
+
+
+def random_points(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(0, 2 * np.pi, n)
+    return rng.uniform(-np.pi, np.pi, (2, n)), np.stack([np.cos(turn), np.sin(turn)])
+
+
+def test_splines_add_up_to_one_and_differentiate():
+    spline = TensorSpline(2, np.pi, 5)
+    q, r = random_points(1, 50)
+    q *= 0.99
+    coefficients = np.random.default_rng(2).standard_normal(spline.size)
+    np.testing.assert_allclose(spline.matrix(q).sum(axis=1), 1.0, rtol=1e-13)
+    h = 1e-6
+    slope = (spline.matrix(q + h * r) - spline.matrix(q - h * r)) @ coefficients / (2 * h)
+    np.testing.assert_allclose(spline.slope(q, r) @ coefficients, slope, atol=1e-8)
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_symmetric_basis_has_its_parities_and_misses_nothing(mirror):
+    spline = TensorSpline(2, np.pi, 4)
+    q, _ = random_points(3, 40)
+    f = spline.symmetric_basis(mirror, -1)
+    at = spline.matrix(q) @ f
+    np.testing.assert_allclose((spline.matrix(-q) @ f).toarray(), mirror * at.toarray(), atol=1e-12)
+    np.testing.assert_allclose((spline.matrix(-q[::-1]) @ f).toarray(), -at.toarray(), atol=1e-12)
+    sizes = [spline.symmetric_basis(a, b).shape[1] for a in (1, -1) for b in (1, -1)]
+    assert sum(sizes) == spline.size
+    assert np.linalg.matrix_rank(f.toarray()) == f.shape[1]
+
+
+def test_every_shape_has_a_representative_in_the_fundamental_domain():
+    q, _ = random_points(4, 500)
+    images = [q, -q, q[::-1], -q[::-1]]
+    assert np.any([fundamental(Chain(), image) for image in images], axis=0).all()
+
+
+def test_largest_gain_is_the_maximum_over_heading():
+    rng = np.random.default_rng(5)
+    amplitudes = {k: rng.standard_normal(200) + 1j * rng.standard_normal(200) for k in (1, 3)}
+    theta = np.linspace(0, 2 * np.pi, 4001)
+    brute = np.max([np.real(sum(np.exp(1j * k * t) * a for k, a in amplitudes.items())) for t in theta], axis=0)
+    gain, heading = largest_gain(amplitudes)
+    np.testing.assert_allclose(gain, brute, rtol=1e-4)
+    at = np.real(sum(np.exp(1j * k * heading) * a for k, a in amplitudes.items()))
+    np.testing.assert_allclose(at, gain, rtol=1e-12)
+
+
+def test_rows_are_the_gain_and_its_derivatives():
+    space = PotentialSpace(TensorSpline(2, np.pi, 4), (0, 1, 2), True)
+    motion = balanced_motion(Chain(), Friction(1.7, 1.0, 1.3), *random_points(6, 60))
+    samples = Samples(space, motion)
+    free = 0.1 * np.random.default_rng(7).standard_normal(space.size)
+    chosen, heading = np.arange(motion.size), np.random.default_rng(8).uniform(0, 6, motion.size)
+    matrix, constant = samples.rows(chosen, heading)
+    gain = np.real(sum(np.exp(1j * k * heading) * a for k, a in samples.amplitudes(free).items())) / motion.power
+    np.testing.assert_allclose(matrix @ free + constant, gain, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("mu", FRICTIONS)
+def test_mirror_images_and_end_swap_move_alike(mu):
+    """The symmetries that halve the unknowns hold for the solved motions, and so for the ratio of any symmetric potential."""
+    friction = Friction(*mu)
+    q, r = random_points(9, 80)
+    space = PotentialSpace(TensorSpline(2, np.pi, 4), (1,) if friction.reversible else (0, 1), True)
+    free = 0.1 * np.random.default_rng(10).standard_normal(space.size)
+    ratio = Samples(space, balanced_motion(Chain(), friction, q, r)).ratio(free)[0]
+    for image in ((-q, -r), (-q[::-1], r[::-1])):
+        other = Samples(space, balanced_motion(Chain(), friction, *image)).ratio(free)[0]
+        np.testing.assert_allclose(other, ratio, rtol=1e-5)
+
+
+def test_centre_of_mass_gives_exactly_one_for_isotropic_friction():
+    """|int V ds| <= int |V| ds, with equality for a translation: the centre of mass alone proves 1 and no less."""
+    body, rng = Chain(), np.random.default_rng(11)
+    q, r = random_points(12, 2000)
+    z = rng.standard_normal((3, 2000))
+    z[2, :100], r[:, :100] = 0.0, 0.0
+    now = instant(body, Friction(), q, r, z, 1e-13)
+    speed = np.hypot(*body.centre_velocity(now.posture, now.velocity))[0]
+    ratio = speed / total_power(now.velocity, now.force)[0]
+    assert ratio.max() <= 1 + 1e-12
+    np.testing.assert_allclose(ratio[:100], 1.0, rtol=1e-12)
+    assert ratio[100:].max() < 1
+
+
+def test_two_links_with_reversible_friction_cannot_move():
+    """A path in one angle retraces itself, so the true bound is 0; splines approach it as their knots get finer."""
+    values = [efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(n, (1,), 64, 1)).sampled for n in (8, 16, 32)]
+    assert values[0] > 1.5 * values[1] > 2.25 * values[2]
+    assert values[2] < 0.01
+
+
+@pytest.mark.slow
+def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
+    bound = efficiency_bound(Chain((0.5, 0.5)), Friction(1.0, 1.0, 3.0), budget=Budget(8, (0, 1), 32, 2, 3, 20))
+    assert 0.05 < bound.sampled < 1.0
+
+
+def test_minimax_program_agrees_with_a_simplex_solver():
+    """The interior-point optimum against HiGHS, and its multipliers as a proof of the value (weak duality)."""
+    rng = np.random.default_rng(15)
+    rows, constants = rng.standard_normal((60, 8)), rng.uniform(0.0, 1.0, 60)
+    best = smallest_maximum(sparse.csr_matrix(rows), constants, sparse.csr_matrix((8, 8)))
+    left = np.hstack([rows, -np.ones((60, 1))])
+    simplex = linprog(np.eye(9)[8], A_ub=left, b_ub=-constants, bounds=(None, None), method="highs-ds")
+    assert best.value == pytest.approx(simplex.fun, abs=1e-6)
+    assert best.weights.sum() == pytest.approx(1.0, abs=1e-6)
+    np.testing.assert_allclose(rows.T @ best.weights, 0.0, atol=1e-6)
+    assert best.weights @ constants == pytest.approx(best.value, abs=1e-6)
+
+
+def test_roughness_is_the_integral_of_squared_second_derivatives():
+    """f = x^2 y on [-a, a]^2, interpolated exactly by cubic splines: |D^2 f|^2 = 4 y^2 + 8 x^2 integrates to 16 a^4."""
+    a = 1.3
+    spline = TensorSpline(2, a, 4)
+    q = np.random.default_rng(16).uniform(-a, a, (2, 400))
+    c = np.linalg.lstsq(spline.matrix(q).toarray(), q[0] ** 2 * q[1], rcond=None)[0]
+    np.testing.assert_allclose(spline.matrix(q) @ c, q[0] ** 2 * q[1], atol=1e-10)
+    # the midpoint rule with 8 points an axis misses 1/64 of the mean square
+    assert c @ spline.roughness @ c == pytest.approx(16 * a**4 * (1 - 1 / 64), rel=1e-9)
+
+
+def test_climbs_find_the_summit_of_a_crease():
+    """A crease at an angle to all axes: coordinate steps would stop on it, random directions do not."""
+    domain = Domain(Chain(), Friction(), 2.0)
+    start = domain.lattice(6, 12).take(np.arange(0, 120, 4))
+
+    def crease(motion: Motion) -> np.ndarray:
+        turn = np.arctan2(motion.rates[1], motion.rates[0])
+        a, b = motion.angles
+        return -5 * np.abs(a + 0.7 * b - 0.5 * np.sin(turn)) - (a - 0.3) ** 2 - (b - 0.2) ** 2
+
+    top = domain.summits(crease, start, 0.3, 0.2, 40, np.random.default_rng(17))
+    assert np.median(crease(top)) > -0.05
+    assert np.all(crease(top) >= crease(start))
+
+
+def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
+    tiny = Budget(intervals=3, harmonics=(1,), shapes=6, directions=6, rounds=1, starts=10)
+    cache = tmp_path / "bounds.json"
+    first = efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: pytest.fail("not taken from the cache"))
+    assert efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache) == first
+    assert "gap 0.1000" in first.report(first.sampled - 0.1)
+    assert "not certified between" in first.report(0.3)
+    keys = {
+        bound_key(Domain(b, f, a), tiny)
+        for b in (Chain(), Chain((0.3, 0.4, 0.3)))
+        for f in (Friction(), Friction(mu_b=2.0))
+        for a in (2.0, 2.5)
+    }
+    assert len(keys) == 8
+    cache.write_text("{")
+    with pytest.raises(ProblemError, match="cannot be read"):
+        efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
+
+
+@pytest.mark.parametrize(("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((0.2,) * 5), 2.0, "four links")])
+def test_impossible_requests_are_refused(body, limit, match):
+    with pytest.raises(ProblemError, match=match):
+        efficiency_bound(body, Friction(), limit)

@@ -1,0 +1,113 @@
+"""Budgets of counts that no machine disturbs: iterations, evaluations, nonzeros, instructions. Times are in benchmarks/.
+
+A budget is the count measured when it was written plus a margin of a quarter; raise one only with a reason.
+"""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
+from colloc.collocation.point_equations import point_function
+from colloc.collocation.transcription import transcribe
+from colloc.collocation.warm_start import feasible_point
+from colloc.numerics.blocks import oracles
+from colloc.numerics.multiplier_estimate import estimated_multipliers, quasi_definite_factors
+from colloc.search.nlp import Solver
+from colloc.smooth.balance import solve_smooth
+from colloc.smooth.motion import sine_wave
+
+
+@pytest.mark.parametrize(
+    ("links", "formulation", "value", "jacobian", "hessian"),
+    [
+        (3, "map", 600, 4500, 13500),
+        (3, "lifted", 700, 4200, 14000),
+        (6, "map", 1200, 10700, 46500),
+        (6, "lifted", 1400, 13100, 44500),
+    ],
+)
+def test_instructions_of_a_point(links, formulation, value, jacobian, hessian):
+    local = point_function(formulation, Chain((1 / links,) * links), Friction())
+    assert local.value.n_instructions() <= value
+    assert local.jacobian.n_instructions() <= jacobian
+    assert local.hessian.n_instructions() <= hessian
+
+
+@pytest.mark.parametrize(("formulation", "jacobian", "hessian"), [("map", 170, 85), ("lifted", 400, 260)])
+def test_nonzeros_grow_by_so_many_for_every_interval(formulation, jacobian, hessian):
+    """Half a period, three links, three points an interval: sparsity is what keeps a solve linear in the mesh."""
+    counts = []
+    for intervals in (20, 40):
+        problem = Problem(
+            "p", ellipse(0.3, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=intervals, formulation=formulation
+        )
+        options = oracles(transcribe(problem).assembly).options
+        counts.append((options["jac_g"].nnz_out(1), options["hess_lag"].nnz_out(0)))
+    growth = np.diff(counts, axis=0)[0] / 20
+    assert growth[0] <= jacobian
+    assert growth[1] <= hessian
+
+
+@pytest.mark.parametrize("formulation", ["map", "lifted"])
+def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_mesh_only(formulation):
+    """No symmetry: the net rotation couples all intervals."""
+    fill = []
+    for intervals in (20, 40):
+        problem = Problem("p", ellipse(0.3, 1, 0.5), intervals=intervals, formulation=formulation)
+        solver = Solver(transcribe(problem))
+        t = solver.transcription
+        x = feasible_point(t, problem.gait.parameters(problem.guess), 0.1)
+        jacobian, _ = solver.equality_jacobian(x, 0.1)
+        gradient = np.random.default_rng(1).normal(size=jacobian.shape[1])
+        left = gradient + jacobian.T @ estimated_multipliers(jacobian, gradient)
+        # what is left is orthogonal to every equation
+        assert np.abs(jacobian @ left).max() < 1e-8 * np.abs(gradient).max()
+        fill.append(quasi_definite_factors(jacobian).L.nnz)
+    assert fill[1] < 2.3 * fill[0]
+
+
+@pytest.mark.parametrize(
+    ("law", "delta", "mean", "largest"),
+    [
+        ((1, 1, 1), 1e-1, 5.5, 12),
+        ((1, 1, 1), 1e-4, 9.7, 24),
+        ((1, 1, 1), 1e-12, 13.5, 80),
+        ((1.7, 1, 1.3), 1e-4, 10, 30),
+        ((0.5, 1, 5), 1e-4, 11, 34),
+        ((10, 1, 1), 1e-4, 10, 150),
+        ((10, 1, 1), 1e-12, 12.5, 140),
+    ],
+)
+def test_steps_of_the_balance_solver(law, delta, mean, largest):
+    rng = np.random.default_rng(0)
+    angles, rates = rng.uniform(-np.pi, np.pi, (2, 2000)), rng.normal(size=(2, 2000))
+    iterations = solve_balance(Chain(), Friction(*law), angles, rates, delta).require().iterations
+    assert iterations.mean() <= mean
+    assert iterations.max() <= largest
+
+
+def test_panels_and_steps_of_a_smooth_body():
+    solved = solve_smooth(sine_wave(), Friction(), np.linspace(0, 0.45, 10), 1e-4).require()
+    assert solved.panels.max() <= 60
+    assert solved.iterations.max() <= 100
+
+
+@pytest.mark.parametrize(("name", "iterations", "levels"), [("three_link", 75, 7), ("three_link_offset", 120, 8)])
+def test_effort_of_a_solve(solved, name, iterations, levels):
+    solution, _ = solved(name)
+    assert sum(level.iterations for level in solution.levels) <= iterations
+    assert len(solution.levels) <= levels
+    assert solution.mesh.n <= 40
+
+
+def test_balance_solves_an_iteration_asks_for():
+    """Value, Jacobian and Hessian at one point share one solve of the balance."""
+    from colloc.collocation.warm_start import feasible_point
+    from colloc.search.nlp import Solver
+
+    problem = Problem("p", ellipse(0.3, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=12)
+    solver = Solver(transcribe(problem))
+    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
+    result = solver.solve(x, 0.1, radius=1.0)
+    assert result.optimal
+    assert solver.transcription.velocity.solves <= 1.5 * result.iterations + 6

@@ -1,0 +1,121 @@
+"""A robot can use it: whatever the pacing, the exported samples do what the result does, within the joint speed limits."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from colloc.commands.export import main
+from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.results.store import save
+from colloc.system.errors import ProblemError
+from colloc.verification.replay import replay
+from colloc.verification.trajectory import timed
+
+WAVE = Fourier(
+    np.array([0.2, 0.0, -0.3]), np.array([[0.9], [0.2], [0.1]]), np.array([[0.1, 0.2], [0.8, 0.1], [0.3, 0.4]])[:, :1]
+)
+
+
+def path_of(gait):
+    return lambda t: (gait.angles(t), gait.rates(t))
+
+
+def path_through(angles):
+    """Periodic spline through samples at equal times."""
+    closed = np.concatenate([angles, angles[:, :1]], axis=1)
+    spline = CubicSpline(np.linspace(0.0, 1.0, closed.shape[1]), closed, axis=1, bc_type="periodic")
+    return lambda t: (spline(t), spline(t, 1))
+
+
+@pytest.mark.parametrize("settings", [{"period": 3.0}, {"limits": 2.0}, {"limits": np.array([1.0, 2.5, 4.0]), "period": 9.0}])
+def test_distance_and_work_do_not_depend_on_pacing(settings):
+    body, friction = Chain((0.25,) * 4), Friction(1.7, 1.0, 1.3)
+    before = replay(body, friction, path_of(WAVE), 1e-4)
+    after = replay(body, friction, path_through(timed(path_of(WAVE), 200.0, **settings).angles), 1e-4)
+    assert after.distance == pytest.approx(before.distance, rel=2e-4)
+    assert after.work == pytest.approx(before.work, rel=2e-4)
+
+
+@pytest.mark.parametrize("limits", [0.7, np.array([0.5, 2.0, 1.0])])
+@pytest.mark.parametrize("slower", [1.0, 1.2, 5.0])
+def test_joint_speed_limits_hold_at_the_samples_and_between_them(limits, slower):
+    fastest = timed(path_of(WAVE), 100.0, limits=limits)
+    made = timed(path_of(WAVE), 100.0, slower * fastest.period, limits)
+    allowed = np.broadcast_to(limits, 3)[:, None]
+    assert (np.abs(made.speeds) <= allowed * (1 + 1e-9)).all()
+    steps = np.diff(np.concatenate([made.angles, made.angles[:, :1]], axis=1), axis=1) * 100.0
+    assert (np.abs(steps) <= allowed * (1 + 1e-9)).all()
+
+
+def test_the_fastest_pacing_keeps_some_joint_at_its_limit():
+    limits = np.array([0.5, 2.0, 1.0])
+    made = timed(path_of(WAVE), 1e5, limits=limits)  # a high rate: the period is hardly rounded
+    assert (np.abs(made.speeds) / limits[:, None]).max(axis=0).min() > 0.995
+
+
+def test_without_limits_or_with_loose_ones_the_pace_is_even():
+    for settings in ({}, {"limits": 100.0}):
+        made = timed(path_of(WAVE), 50.0, 4.0, **settings)
+        np.testing.assert_allclose(made.phase, np.arange(200) / 200, atol=1e-9)
+        np.testing.assert_allclose(made.speeds, WAVE.rates(made.phase) / 4.0, atol=1e-9)
+
+
+def test_the_period_is_a_whole_number_of_samples_and_never_shorter_than_asked():
+    made = timed(path_of(WAVE), 7.0, 2.03)
+    assert made.period == pytest.approx(15 / 7)
+    assert made.time[-1] == pytest.approx(14 / 7)
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({}, "needs a period"),
+        ({"period": -1.0}, "must be positive"),
+        ({"period": np.nan}, "must be positive"),
+        ({"period": 0.1, "limits": 1.0}, "too short for the joint speed limits; use at least"),
+        ({"limits": 0.0}, "must be positive"),
+        ({"limits": np.array([1.0, 2.0])}, "2 joint speed limits for 3 joints"),
+        ({"period": 0.01}, "too few"),
+        ({"period": 1e9}, "too many"),
+    ],
+)
+def test_impossible_wishes_are_refused(settings, complaint):
+    with pytest.raises(ProblemError, match=complaint):
+        timed(path_of(WAVE), 100.0, **settings)
+
+
+def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_path, capsys):
+    file = save(three_link, tmp_path / "x.h5")
+    assert main([str(file), "--max-speed", "2", "--rate", "100", "--periods", "2"]) == 0
+    lines = (tmp_path / "x.csv").read_text().splitlines()
+    facts = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
+    rows = list(csv.reader(line for line in lines if not line.startswith("#")))
+    assert rows[0] == ["time_s", "joint_1_rad", "joint_2_rad", "joint_1_rad_per_s", "joint_2_rad_per_s"]
+    values = np.array(rows[1:], dtype=float)
+    n = int(facts["samples_per_period"])
+    assert len(values) == 2 * n
+    np.testing.assert_allclose(values[:n, 1:], values[n:, 1:], atol=1e-12)
+    np.testing.assert_allclose(np.diff(values[:, 0]), 0.01, atol=1e-7)
+    problem = three_link.problem
+    replayed = replay(problem.body, problem.friction, path_through(values[:n, 1:3].T), 1e-4)
+    assert replayed.efficiency == pytest.approx(json.loads(facts["efficiency"]), rel=2e-4)
+    assert replayed.distance == pytest.approx(json.loads(facts["distance_per_period_body_lengths"]), rel=2e-4)
+
+    assert main([str(file), "--period", "4", "--output", str(tmp_path / "y.json")]) == 0
+    data = json.loads((tmp_path / "y.json").read_text())
+    assert np.shape(data["angles_rad"]) == (2, 200)
+    assert data["status"] == "solved"
+    capsys.readouterr()
+    assert main([str(file)]) == 2
+    assert "needs a period in seconds" in capsys.readouterr().err
+
+
+def test_a_corner_where_every_joint_rests_does_not_stop_the_clock():
+    there_and_back = path_of(ellipse(0.0, 1.0, 0.0))
+    made = timed(there_and_back, 100.0, limits=1.0)
+    assert made.period == pytest.approx(4.0, abs=0.02)

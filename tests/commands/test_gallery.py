@@ -1,0 +1,38 @@
+"""Every file in problems/ is solved, agrees with its own reference, and with the numbers that the gallery prints."""
+
+import json
+
+import pytest
+
+from colloc.smooth.concertina import Concertina
+from scripts.gallery import PICTURES, TABLE, examples, prescribed_row, solved_row
+
+NUMBERS = json.loads(TABLE.read_text())
+SLOW = 4.0
+"""Files that took longer [s of processor time] are left to the slow tests."""
+
+
+def cases():
+    for example in examples():
+        slow = NUMBERS.get(example.name, {}).get("cpu_seconds", 0.0) > SLOW
+        yield pytest.param(example, id=example.name, marks=[pytest.mark.slow] if slow else [])
+
+
+@pytest.mark.parametrize("example", list(cases()))
+def test_the_example_does_what_it_says(example, solved):
+    row = solved_row(solved(example.name)[0]) if example.optimised else prescribed_row(example)
+    assert row["status"] in ("solved", "computed")
+    # the reference of a concertina crawler is its limit epsilon -> 0, see tests/smooth/test_smooth_concertina.py
+    if example.reference is not None and not isinstance(example.stated.get("PROBLEM"), Concertina):
+        assert row["efficiency"] == pytest.approx(example.reference.efficiency, abs=example.reference.tolerance)
+    if example.name in NUMBERS:
+        before = NUMBERS[example.name]
+        allowed = 3e-5 + 3 * (before["error"] + row["error"])
+        assert row["efficiency"] == pytest.approx(before["efficiency"], abs=allowed)
+        assert row["status"] == before["status"]
+
+
+def test_the_gallery_has_no_entries_without_a_file():
+    names = {example.name for example in examples()}
+    assert set(NUMBERS) - {"versions"} <= names
+    assert {path.stem for path in PICTURES.glob("*.png")} <= names

@@ -1,0 +1,118 @@
+"""Results are rechecked without CasADi and compared as paths; tampering and differences show."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from colloc.commands import compare
+from colloc.commands import verify as recheck
+from colloc.commands.main import SUBCOMMANDS, main
+from colloc.results.solution import Solution
+from colloc.results.store import load, save
+
+
+def changed(solution, certificate=None, levels=None):
+    return Solution(
+        solution.problem, levels or solution.levels, certificate or solution.certificate, solution.seconds, solution.source
+    )
+
+
+def test_verify_certifies_without_loading_casadi_or_matplotlib(three_link, tmp_path):
+    file = save(three_link, tmp_path / "x.h5")
+    code = (
+        "import sys; from colloc.commands.main import main; code = main(['verify', sys.argv[1]]);"
+        "print(code, [m for m in ('casadi', 'matplotlib') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True)
+    assert result.stdout.splitlines()[-1] == "0 []"
+    assert "three_link: certified" in result.stdout
+    assert result.stderr == ""
+
+
+def test_verify_uses_other_instants_and_agrees(three_link):
+    again = recheck.rechecked(three_link)
+    assert again.instants % three_link.certificate.instants
+    assert again.passed
+    assert abs(again.efficiency - three_link.certificate.efficiency) < 1e-6
+
+
+def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp_path, capsys):
+    boast = replace(three_link.certificate, efficiency=three_link.certificate.efficiency + 1e-3)
+    file = save(changed(three_link, certificate=boast), tmp_path / "boast.h5")
+    assert recheck.main([str(file), "--json"]) == 4
+    report = json.loads(capsys.readouterr().out)
+    assert not report["certified"]
+    assert "is off by" in report["complaint"]
+
+    last = three_link.last
+    x = last.x.copy()
+    x[three_link.layout.parameters[1, 0]] += 0.05
+    file = save(changed(three_link, levels=[*three_link.levels[:-1], replace(last, x=x)]), tmp_path / "gait.h5")
+    assert recheck.main([str(file)]) == 4
+    assert "NOT CERTIFIED" in capsys.readouterr().out
+
+
+def test_verify_refuses_what_is_no_result(tmp_path, capsys):
+    (tmp_path / "x.h5").write_text("nothing")
+    assert recheck.main([str(tmp_path / "x.h5")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_path_distance_of_circles_and_insensitivity_to_start_pacing_and_direction():
+    t = np.arange(400) / 400
+
+    def circle(radius, phase, count=1.0, x=0.0):
+        return np.stack([x + radius * np.cos(2 * np.pi * phase), radius * np.sin(2 * np.pi * phase)])
+
+    assert compare.path_distance(circle(1.0, t), circle(1.5, t)) == pytest.approx(0.5, abs=1e-3)
+    assert compare.path_distance(circle(1.0, t), circle(1.0, t, x=0.3)) == pytest.approx(0.3, abs=1e-3)
+    other = circle(1.0, 0.3 - t + 0.1 * np.sin(2 * np.pi * t))
+    assert compare.path_distance(circle(1.0, t), other) < 1e-4
+
+
+def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_path, capsys):
+    offset = solved("three_link_offset")[0]
+    a, b = save(three_link, tmp_path / "a.h5"), save(offset, tmp_path / "b.h5")
+    mirror = three_link.problem.with_(intervals=30)
+    other = save(Solution(mirror, three_link.levels, three_link.certificate), tmp_path / "c.h5")
+    assert compare.main([str(a), str(b)]) == 1
+    printed = capsys.readouterr().out
+    assert "different: efficiencies differ by 20" in printed
+    assert "guess" in printed
+    assert compare.main([str(a), str(other), "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["same"]
+    assert report["problem"] == {"intervals": ["24", "30"]}
+    assert compare.main([str(a), str(tmp_path / "none.h5")]) == 2
+
+
+def test_every_subcommand_answers_help_without_casadi():
+    for name in SUBCOMMANDS:
+        code = (
+            f"import sys; from colloc.commands.main import main\ntry: main(['{name}', '--help'])\nexcept SystemExit as e: "
+            + ("print(e.code, 'casadi' in sys.modules)")
+        )
+        printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        assert printed.startswith(f"usage: colloc {name} ")
+        assert printed.rstrip().endswith("0 False")
+
+
+def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
+    assert main(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"  {name} " in printed for name in SUBCOMMANDS)
+    assert main([]) == 2
+    capsys.readouterr()
+    for words, hint in ((["repot"], "colloc report?"), (["x.py"], "colloc solve x.py?"), (["zzzz"], "choose one of solve,")):
+        assert main(words) == 2
+        assert hint in capsys.readouterr().err
+    assert main(["--version"]) == 0
+    assert "casadi" in capsys.readouterr().out
+
+
+def test_loading_keeps_what_verify_needs(three_link, tmp_path):
+    assert load(save(three_link, tmp_path / "x.h5")).certificate == three_link.certificate

@@ -1,0 +1,106 @@
+"""Admissible shapes: smooth bounds against plain segment intersection."""
+
+import numpy as np
+import pytest
+
+from colloc.collocation.layout import problem_mesh
+from colloc.collocation.shape_checks import shape_checks
+from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.problem import Problem
+from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import (
+    SMOOTHING,
+    crossing_bounds,
+    crossing_depth,
+    share_of_first,
+    smooth_minimum,
+    tangent_of_minimum,
+)
+
+AROUND_THE_CORNER = Fourier(np.zeros(2), np.array([[2.877], [0.172]]), np.array([[0.0], [-2.872]]))
+"""A gait that rounds the shape (2 pi/3, 2 pi/3), where the first end passes the third link, within 2e-3 rad."""
+
+
+@pytest.mark.parametrize(
+    "lengths", [(1 / 3, 1 / 3, 1 / 3), (0.5, 0.3, 0.2), (0.2, 0.3, 0.5), (0.25, 0.5, 0.25), (0.3, 0.4, 0.3)]
+)
+def test_bounds_never_allow_a_crossing_and_forbid_little_else(lengths):
+    body = Chain(lengths)
+    rng = np.random.default_rng(1)
+    angles = rng.uniform(-np.pi, np.pi, (2, 40000))
+    allowed = crossing_bounds(body, angles).max(axis=0) <= np.pi
+    crossing = crossing_depth(body, angles) > 0
+    assert not np.any(allowed & crossing)
+    exact = crossing_bounds(body, angles).max(axis=0) <= np.pi + 0.5 * SMOOTHING + 1e-9
+    assert np.array_equal(exact[~allowed] | crossing[~allowed], np.ones((~allowed).sum(), bool))
+    assert (crossing.mean() > 0.02) == (lengths[0] + lengths[2] > lengths[1])
+
+
+def test_equal_links_touch_where_the_known_lines_say():
+    body = Chain()
+    a = np.linspace(2 * np.pi / 3, np.pi, 20)
+    for b_edge in (2 * np.pi - 2 * a, (2 * np.pi - a) / 2):
+        b = np.clip(b_edge, 0, np.pi)
+        first, second = 2 * a + b, a + 2 * b
+        edge = np.isclose(np.minimum(first, second), 2 * np.pi)
+        inside, outside = np.stack([a, b - 1e-6])[:, edge], np.stack([a + 1e-6, b + 1e-6])[:, edge]
+        assert crossing_depth(body, inside).max(initial=0) < 1e-5
+        assert np.all(crossing_depth(body, outside)[np.abs(outside[0]) < np.pi] > 0)
+
+
+def test_longer_chains_see_every_pair():
+    body = Chain((0.25,) * 4)
+    square = np.array([[np.pi / 2 + 0.2], [np.pi / 2 + 0.2], [np.pi / 2 + 0.2]])
+    assert crossing_depth(body, square)[0] > 0
+    assert crossing_depth(body, square * 0.7)[0] == 0
+
+
+def test_two_links_cannot_cross():
+    assert crossing_bounds(Chain((0.5, 0.5)), np.zeros((1, 3))) is None
+    assert np.array_equal(crossing_depth(Chain((0.5, 0.5)), np.array([[3.0, 0.0]])), [0.0, 0.0])
+
+
+def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
+    rng = np.random.default_rng(2)
+    first, second = rng.normal(size=(2, 500)) * 3 * SMOOTHING
+    share = share_of_first(first, second)
+    assert tangent_of_minimum(first, second, share) == pytest.approx(smooth_minimum(first, second), abs=1e-15)
+    assert np.all(tangent_of_minimum(first, second, rng.permutation(share)) >= smooth_minimum(first, second) - 1e-15)
+    step = 1e-8
+    slope = (smooth_minimum(first + step, second) - smooth_minimum(first - step, second)) / (2 * step)
+    assert share == pytest.approx(slope, abs=1e-6)
+
+
+def corner_peak(gait):
+    """The check at the corner, the instant of its peak, and the peak's height, on a mesh of 40 intervals."""
+    problem = Problem(name="corner", guess=AROUND_THE_CORNER)
+    check = next(c for c in shape_checks(problem.body) if c.name.endswith("(left)"))
+    times = worst_instants(gait, problem_mesh(problem), [check])[0]
+    values = check_values(check, gait, times)
+    return check, times[[np.argmax(values)]], values.max()
+
+
+def test_the_peak_at_a_corner_is_found_where_dense_sampling_finds_it():
+    check, time, peak = corner_peak(AROUND_THE_CORNER)
+    dense = time + np.linspace(-0.01, 0.01, 200_001)
+    assert check_values(check, AROUND_THE_CORNER, dense).max() == pytest.approx(peak, abs=1e-8)
+
+
+def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
+    check, time, _ = corner_peak(AROUND_THE_CORNER)
+    share = held_shares(check, AROUND_THE_CORNER, time)
+    assert 0.1 < share[0] < 0.9
+    errors, blind = [], []
+    for size in (1e-2, 5e-3, 2.5e-3):
+        moved = Fourier(np.zeros(2), AROUND_THE_CORNER.cos + size * np.array([[0.3], [-0.8]]), AROUND_THE_CORNER.sin)
+        height = corner_peak(moved)[2]
+        cut = float(np.array(check.cut(moved.angles(time), share)).ravel()[0])
+        errors.append(abs(cut - height))
+        blind.append(height - check_values(check, moved, time)[0])
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all((orders > 1.7) & (orders < 2.3))
+    assert errors[-1] < 1e-5
+    # without it the constraint at that instant falls behind the peak in proportion to the move
+    assert min(blind) > 1e-4
+    assert blind[0] > 3 * blind[-1]

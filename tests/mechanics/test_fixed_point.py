@@ -1,0 +1,199 @@
+"""The balance solver: an independent oracle, its invariances, and extreme delta, starts and friction."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad_vec
+
+from colloc.mechanics.balance import instant, net_force, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.system.errors import NotConvergedError, ProblemError
+
+ISOTROPIC = Friction()
+FRICTIONS = [Friction(), Friction(1.7, 1, 1.3), Friction(10, 1, 1), Friction(0.5, 1, 5), Friction(1, 1, 3), Friction(3, 1, 1)]
+
+
+def random_instants(seed, count, n_joint=2):
+    rng = np.random.default_rng(seed)
+    rates = rng.normal(size=(n_joint, count))
+    rates[0, ::10] = 0.0
+    return rng.uniform(-np.pi, np.pi, (n_joint, count)), rates
+
+
+def naive_net_force(lengths, angles, rates, z, delta, friction):
+    """Force and torque about the tail of one body, by walking along it point by point."""
+
+    def density(s):
+        phi, x, y = 0.0, 0.0, 0.0
+        vx, vy, w = z[0], z[1], z[2]
+        left = s
+        for i, length in enumerate(lengths):
+            if i > 0:
+                phi += angles[i - 1]
+                w += rates[i - 1]
+            step = min(left, length)
+            c, sn = np.cos(phi), np.sin(phi)
+            x, y = x + step * c, y + step * sn
+            vx, vy = vx - w * step * sn, vy + w * step * c
+            left -= step
+            if left <= 0:
+                break
+        speed = np.sqrt(vx**2 + vy**2 + delta**2)
+        along, across = vx * c + vy * sn, -vx * sn + vy * c
+        mu_s = friction.mu_f if along > 0 else friction.mu_b
+        fx = -(mu_s * along * c - friction.mu_t * across * sn) / speed
+        fy = -(mu_s * along * sn + friction.mu_t * across * c) / speed
+        return np.array([fx, fy, x * fy - y * fx])
+
+    breaks = np.cumsum(lengths)[:-1]
+    return quad_vec(density, 0, 1, points=breaks, epsabs=1e-11, epsrel=1e-11)[0]
+
+
+@pytest.mark.parametrize("friction", FRICTIONS[:4])
+def test_net_force_is_the_integral_along_the_body(friction):
+    body = Chain((0.25, 0.45, 0.3))
+    rng = np.random.default_rng(11)
+    for _ in range(6):
+        angles, rates, z = rng.uniform(-3, 3, 2), rng.normal(size=2), rng.normal(size=3)
+        now = instant(body, friction, angles[:, None], rates[:, None], z[:, None], 0.05)
+        expected = naive_net_force(body.lengths, angles, rates, z, 0.05, friction)
+        np.testing.assert_allclose(net_force(now.posture, now.force)[:, 0], expected, atol=2e-9)
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize("delta", [1.0, 1e-2, 1e-4, 1e-8, 1e-12])
+def test_every_instant_converges_whatever_friction_and_delta(friction, delta):
+    angles, rates = random_instants(12, 150)
+    solved = solve_balance(Chain(), friction, angles, rates, delta)
+    assert solved.converged.all()
+    assert solved.residual.max() <= 1e-11
+
+
+@pytest.mark.parametrize("delta", [1e-1, 1e-4])
+def test_fixed_point_and_newton_agree(delta):
+    angles, rates = random_instants(13, 200)
+    newton = solve_balance(Chain(), ISOTROPIC, angles, rates, delta, tolerance=1e-13)
+    fixed = solve_balance(Chain(), ISOTROPIC, angles, rates, delta, tolerance=1e-13, method="fixed_point", max_iterations=5000)
+    assert newton.converged.all()
+    assert fixed.converged.all()
+    np.testing.assert_allclose(newton.z, fixed.z, atol=1e-10)
+    assert np.median(newton.iterations) <= 8
+    assert np.median(newton.iterations) < 0.7 * np.median(fixed.iterations)
+
+
+def test_the_solution_does_not_depend_on_the_start():
+    angles, rates = random_instants(14, 100)
+    rng = np.random.default_rng(15)
+    reference = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-4)
+    for scale in (1.0, 1e3, 1e6):
+        other = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-4, start=scale * rng.normal(size=(3, 100)))
+        assert other.converged.all()
+        np.testing.assert_allclose(other.z, reference.z, atol=1e-9)
+
+
+def test_a_start_next_to_the_answer_does_not_lose_it():
+    """One joint moves 4e-5 times as fast as the other. From here the anchor goes to a link from which nothing converges."""
+    angles = np.array([[-2.450491783538704], [3.0288778624868327]])
+    rates = np.array([[-11.194977583218439], [4.929179798711658e-04]])
+    start = np.array([[6.882907034601281e-04], [-3.7304329219234784], [11.192336543699575]])
+    law = Friction(3, 1, 1)
+    from_rest, from_start = (solve_balance(Chain(), law, angles, rates, 1e-6, start=s).require() for s in (None, start))
+    assert np.abs(from_start.z - from_rest.z).max() < 1e-9
+    assert np.abs(start - from_rest.z).max() < 1e-3
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_scaling_the_rates_and_delta_scales_the_solution(friction):
+    angles, rates = random_instants(16, 60)
+    one, seven = (solve_balance(Chain(), friction, angles, k * rates, k * 1e-3).z for k in (1.0, 7.0))
+    np.testing.assert_allclose(seven, 7 * one, atol=1e-8)
+
+
+def test_reversing_the_rates_reverses_the_solution_where_friction_is_reversible_and_only_there():
+    angles, rates = random_instants(17, 60)
+    for friction, reverses in ((Friction(3, 1, 1), True), (Friction(1, 1, 3), False)):
+        there, back = (solve_balance(Chain(), friction, angles, k * rates, 1e-3).z for k in (1, -1))
+        assert np.allclose(there, -back, atol=1e-9) == reverses
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_mirror_image(friction):
+    angles, rates = random_instants(18, 60)
+    z, mirrored = (solve_balance(Chain(), friction, k * angles, k * rates, 1e-3).z for k in (1, -1))
+    np.testing.assert_allclose(mirrored, z * np.array([[1], [-1], [-1]]), atol=1e-9)
+
+
+def test_balance_does_not_change_when_the_lab_is_rotated():
+    body, friction = Chain(), Friction(1.7, 1, 1.3)
+    angles, rates = random_instants(19, 30)
+    z = solve_balance(body, friction, angles, rates, 1e-3).z
+    now = instant(body, friction, angles, rates, z, 1e-3)
+    force = net_force(now.posture, now.force)
+    turned_posture = body.posture(angles)
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = type(turned_posture)(
+        c * turned_posture.cos - s * turned_posture.sin,
+        s * turned_posture.cos + c * turned_posture.sin,
+        c * turned_posture.x - s * turned_posture.y,
+        s * turned_posture.x + c * turned_posture.y,
+    )
+    turned_z = np.stack([c * z[0] - s * z[1], s * z[0] + c * z[1], z[2]])
+    velocity = body.velocity(turned, rates, turned_z)
+    np.testing.assert_allclose(velocity.vs, now.velocity.vs, atol=1e-12)
+    np.testing.assert_allclose(velocity.vn, now.velocity.vn, atol=1e-12)
+    np.testing.assert_allclose(net_force(turned, now.force)[2], force[2], atol=1e-12)
+
+
+def test_the_balanced_velocity_minimises_dissipation_and_power_is_at_least_friction_times_speed():
+    body = Chain()
+    angles, rates = random_instants(20, 100)
+    z = solve_balance(body, ISOTROPIC, angles, rates, 1e-10).z
+    now = instant(body, ISOTROPIC, angles, rates, z, 1e-10)
+    best = total_power(now.velocity, now.force)
+    rng = np.random.default_rng(21)
+    for _ in range(20):
+        other = instant(body, ISOTROPIC, angles, rates, z + 0.1 * rng.normal(size=z.shape), 1e-10)
+        assert np.all(total_power(other.velocity, other.force) >= best - 1e-8)
+
+
+def test_frozen_joints_do_not_move_the_body():
+    angles, _ = random_instants(22, 10)
+    solved = solve_balance(Chain(), Friction(10, 1, 3), angles, np.zeros_like(angles), 1e-4)
+    assert np.array_equal(solved.z, np.zeros((3, 10)))
+
+
+def test_what_does_not_converge_is_reported_and_required_loudly():
+    angles, rates = random_instants(23, 50)
+    solved = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-6, max_iterations=2, method="newton")
+    assert not solved.converged.all()
+    assert np.array_equal(solved.converged, solved.residual <= 1e-11)
+    with pytest.raises(NotConvergedError, match="of 50 instants"):
+        solved.require()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"delta": 0.0}, "delta"),
+        ({"delta": -1e-4}, "delta"),
+        ({"delta": float("nan")}, "delta"),
+        ({"angles": np.zeros((3, 4))}, "shape"),
+        ({"rates": np.full((2, 4), np.nan)}, "finite"),
+        ({"start": np.zeros((2, 4))}, "start"),
+        ({"method": "magic"}, "method"),
+    ],
+)
+def test_unusable_input_is_refused(change, message):
+    arguments = {"angles": np.zeros((2, 4)), "rates": np.ones((2, 4)), "delta": 1e-4, **change}
+    with pytest.raises(ProblemError, match=message):
+        solve_balance(Chain(), ISOTROPIC, **arguments)
+
+
+def test_a_link_at_stick_keeps_its_relative_accuracy_at_tiny_delta():
+    # one joint moves, the other is frozen: two links stay together and rest if they can
+    angles = np.array([[0.4], [2.6]])
+    rates = np.array([[0.0], [1.0]])
+    solved = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-13)
+    assert solved.converged.all()
+    assert np.abs(solved.anchor_velocity).max() < 1e-9

@@ -1,0 +1,133 @@
+"""Static friction: held links, cases without a kinetic solution, and the flap body."""
+
+import numpy as np
+import pytest
+
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from scripts.models.flap import FlapBody, axial_force, flap_gap, flap_motion
+from scripts.models.static_friction import (
+    SYMMETRIC_CASES,
+    WORKED_CASES,
+    held_link,
+    kinetic_gap,
+    link_speeds,
+    slowest_link,
+    symmetric_balance,
+)
+
+BODY, ISOTROPIC = Chain(), Friction()
+
+
+def test_link_speed_is_the_largest_on_the_link():
+    rng = np.random.default_rng(31)
+    angles, rates, z = rng.normal(size=(2, 30)), rng.normal(size=(2, 30)), rng.normal(size=(3, 30))
+    velocity = BODY.velocity(BODY.posture(angles), rates, z)
+    sigma = np.linspace(-1 / 6, 1 / 6, 101)[:, None, None]
+    sampled = np.hypot(velocity.vs, velocity.vn + sigma * velocity.w).max(axis=0)
+    np.testing.assert_allclose(link_speeds(BODY, velocity), sampled, rtol=1e-12)
+
+
+@pytest.mark.parametrize("case", WORKED_CASES, ids=lambda c: c.name)
+def test_held_links_creep_at_order_delta_and_bear_part_of_the_friction(case):
+    held = held_link(BODY, ISOTROPIC, case)
+    ratio = held.speed / held.delta
+    assert ratio[-1] < 10
+    assert ratio[-1] == pytest.approx(ratio[-2], rel=1e-3)
+    assert 0 < held.density[-1] < 0.999
+    assert held.density[-1] == pytest.approx(held.density[-2], abs=1e-5)
+
+
+@pytest.mark.parametrize("case", SYMMETRIC_CASES, ids=lambda c: c.name)
+def test_symmetric_cases_have_no_kinetic_solution(case):
+    """The unbalanced force falls with the one velocity that symmetry leaves free, and jumps over zero at rest."""
+    gap = kinetic_gap(BODY, ISOTROPIC, case)
+    assert gap.no_solution
+    V = np.concatenate([-np.geomspace(1, 1e-8, 60), np.geomspace(1e-8, 1, 60)])
+    unbalanced = symmetric_balance(BODY, ISOTROPIC, case, V, 1e-15)
+    assert (np.diff(unbalanced) <= 1e-9).all()
+    assert np.abs(unbalanced).min() > 0.9 * min(gap.below, -gap.above)
+
+
+@pytest.mark.parametrize("case", SYMMETRIC_CASES, ids=lambda c: c.name)
+def test_delta_supplies_the_missing_part(case):
+    """The solver, which knows no symmetry, finds the root of the one-velocity balance."""
+    gap = kinetic_gap(BODY, ISOTROPIC, case)
+    held = held_link(BODY, ISOTROPIC, case)
+    assert held.link == 1
+    if case.name == "C":
+        assert held.couple[-1] == pytest.approx(abs(gap.fraction), rel=1e-3)
+        assert held.density[-1] < 1e-10
+    else:
+        assert held.density[-1] == pytest.approx(abs(gap.fraction), rel=1e-3)
+        f = abs(gap.fraction)
+        assert held.speed[-1] / held.delta[-1] == pytest.approx(f / np.sqrt(1 - f * f), rel=1e-3)
+
+
+def test_regions_lie_where_the_paper_finds_them():
+    def held(angles: tuple[float, float], rates: tuple[float, float]) -> tuple[bool, int]:
+        a, r = np.array(angles)[:, None], np.array(rates)[:, None]
+        z = solve_balance(BODY, ISOTROPIC, a, r, 1e-4).require().z
+        speed, link = slowest_link(BODY, ISOTROPIC, a, r, z, 1e-4)
+        return bool(speed[0] < 1e-3), int(link[0])
+
+    assert held((1.6, 1.5), (1.0, 0.9)) == (True, 1)  # C: middle link, both angles near pi/2
+    assert held((2.5, 0.2), (1.0, 0.0)) == (True, 2)  # D: joint 2 rests, joint 1 bent beyond pi/2
+    assert held((-2.0, 1.0), (1.0, 0.0))[0]
+    assert held((3.0, -3.0), (1.0, -0.7)) == (True, 1)  # F: near pi and -pi
+    assert not held((0.3, 0.4), (1.0, 0.3))[0]
+    assert not held((0.3, 0.4), (1.0, 0.0))[0]
+
+
+class TestFlapBody:
+    body = FlapBody()
+
+    def test_geometry_against_plain_trigonometry(self):
+        angles, rates, z = np.array([[0.4], [-0.9]]), np.array([[1.3], [0.2]]), np.array([[0.3], [-0.2], [0.7]])
+        velocity = self.body.velocity(self.body.posture(angles), rates, z)
+        for flap in (0, 1):
+            a, w = angles[flap, 0], rates[flap, 0] + 0.7
+            middle = 0.05 * np.array([np.cos(a), np.sin(a)])
+            v = np.array([0.3 - w * middle[1], -0.2 + w * middle[0]])
+            assert velocity.vs[flap + 1, 0] == pytest.approx(v @ [np.cos(a), np.sin(a)], abs=1e-14)
+            assert velocity.vn[flap + 1, 0] == pytest.approx(v @ [-np.sin(a), np.cos(a)], abs=1e-14)
+            assert velocity.w[flap + 1, 0] == pytest.approx(w)
+        assert velocity.vn[0, 0] == pytest.approx(-0.2 + 0.4 * 0.7)
+
+    @pytest.mark.parametrize("reference", [0, 1, 2])
+    def test_any_reference_describes_the_same_motion(self, reference):
+        rng = np.random.default_rng(33)
+        angles, rates, z = rng.normal(size=(2, 5)), rng.normal(size=(2, 5)), rng.normal(size=(3, 5))
+        tail = self.body.tail_velocity(self.body.posture(angles, reference), rates, z, reference)
+        one = self.body.velocity(self.body.posture(angles, reference), rates, z, reference)
+        other = self.body.velocity(self.body.posture(angles), rates, tail)
+        np.testing.assert_allclose(np.array(one), np.array(other), atol=1e-13)
+
+    def test_kinetic_friction_has_no_solution(self):
+        """The force falls strictly with the velocity (the dissipation is convex) and leaps over zero at rest."""
+        V = np.concatenate([-np.geomspace(3, 1e-8, 100), [0.0], np.geomspace(1e-8, 3, 100)])
+        for opening in (0.1, 0.7, 1.4):
+            assert flap_gap(self.body, ISOTROPIC, opening, 1.0).no_solution
+            force = axial_force(self.body, ISOTROPIC, opening, 1.0, V, 1e-16)
+            assert (np.diff(force) <= 1e-10).all()
+            flaps = flap_gap(self.body, ISOTROPIC, opening, 1.0).at_rest
+            assert np.abs(force).min() == pytest.approx(abs(flaps), rel=1e-6)
+            assert 0 < flaps < 0.2  # shorter than the body, which is 0.8 long
+
+    def test_delta_gives_the_limit_law(self):
+        opening = np.linspace(0.1, 1.5, 7)
+        fraction = np.array([flap_gap(self.body, ISOTROPIC, o, 1.0).fraction for o in opening])
+        angles, rates = flap_motion(opening, np.ones(7))
+        errors = []
+        for delta in (1e-4, 1e-5):
+            z = solve_balance(self.body, ISOTROPIC, angles, rates, delta).require().z
+            assert np.abs(z[1:]).max() < 1e-12  # along the body only, though nothing imposes it
+            errors.append(np.abs(z[0] / delta - fraction / np.sqrt(1 - fraction**2)).max())
+        assert errors[1] < 1e-4
+        assert errors[0] / errors[1] > 5
+
+    def test_closing_flaps_push_the_other_way(self):
+        opened, closed = (axial_force(self.body, ISOTROPIC, 0.7, rate, np.zeros(1), 1e-9)[0] for rate in (1.0, -1.0))
+        assert opened == pytest.approx(-closed)
+        assert opened > 0

@@ -1,0 +1,103 @@
+"""Animations: pictures that move with the body, files others can play, and a clear word where ffmpeg is missing."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from colloc.commands.animate import animate, main
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.problem import Problem
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.pictures.animation import pictures
+from colloc.pictures.publication import save_panels
+from colloc.results.solution import Solution
+from colloc.results.store import save
+
+
+def crawler(n_link):
+    j = np.arange(n_link - 1)
+    guess = Fourier(np.zeros(n_link - 1), 0.6 * np.cos(0.9 * j)[:, None], 0.6 * np.sin(0.9 * j)[:, None] + 0.1)
+    return Problem("crawler", guess, Chain((1 / n_link,) * n_link), Friction(1.0, 1.0, 2.0), delta=1e-2, intervals=8)
+
+
+def dark(picture):
+    """Centre of the dark pixels of the left part: the body."""
+    left = picture[40:, : int(0.68 * picture.shape[1])]
+    rows, columns = np.nonzero(left.max(axis=2) < 80)
+    return columns.mean(), rows.mean()
+
+
+def test_the_body_advances_by_its_distance_from_period_to_period(three_link):
+    drawn = list(pictures(three_link, 2, 3, width=600))
+    assert len(drawn) == 6
+    assert len({picture.shape for picture in drawn}) == 1
+    assert all(edge % 2 == 0 for edge in drawn[0].shape[:2])  # video wants even numbers
+    x = [dark(picture)[0] for picture in drawn]
+    assert x[2] - x[0] == pytest.approx(x[4] - x[2], abs=1.5)
+    assert x[2] - x[0] > 20
+    assert dark(drawn[0])[1] == pytest.approx(dark(drawn[4])[1], abs=1.5)
+
+
+@pytest.mark.parametrize("n_link", [2, 8])
+def test_short_and_long_chains_are_drawn(n_link, unsolved):
+    solution = unsolved(crawler(n_link))
+    first, second = list(pictures(solution, 2, 1, width=400))
+    assert (first != second).any()
+    bare = next(pictures(solution, 2, 1, width=400, arrows=False))
+    assert (first != bare).any()
+
+
+def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsys):
+    file = save(three_link, tmp_path / "x.h5")
+    assert main([str(file), "--periods", "1", "--seconds", "1", "--fps", "10", "--width", "300"]) == 0
+    assert "saved" in capsys.readouterr().out
+    with Image.open(tmp_path / "x.gif") as image:
+        assert image.n_frames == 10
+        assert image.info["duration"] == 100
+        assert image.info["loop"] == 0
+        assert image.size[0] == 300
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_mp4_plays(three_link, tmp_path):
+    path = animate(three_link, tmp_path / "x.mp4", periods=1, seconds=1.0, fps=10.0, width=301)
+    probe = ["ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames,width", "-of", "csv=p=0", path]
+    assert subprocess.run(probe, capture_output=True, text=True, check=True).stdout.strip() == "300,10"
+
+
+def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(three_link, tmp_path, monkeypatch, capsys):
+    file = save(three_link, tmp_path / "x.h5")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main([str(file), "--format", "mp4"]) == 2
+    printed = capsys.readouterr().err
+    assert "ffmpeg, which is not installed" in printed
+    assert "--format gif" in printed
+    assert {path.name for path in tmp_path.iterdir()} == {"x.h5"}
+
+
+@pytest.mark.parametrize(
+    "options", [["--fps", "0"], ["--periods", "0"], ["--seconds", "nan"], ["--width", "5"], ["--fps", "1e9"]]
+)
+def test_impossible_wishes_are_refused(options, three_link, tmp_path, capsys):
+    file = save(three_link, tmp_path / "x.h5")
+    assert main([str(file), *options]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_solve_without_levels_has_nothing_to_show(three_link, tmp_path, capsys):
+    file = save(Solution(three_link.problem, []), tmp_path / "x.h5")
+    assert main([str(file)]) == 2
+    assert "holds no gait" in capsys.readouterr().err
+
+
+def test_publication_figures_are_pdf_and_png_of_journal_width(three_link, tmp_path):
+    written = save_panels(three_link, tmp_path / "x")
+    names = {path.name for path in written}
+    assert names == {f"x-{n}.pdf" for n in ("filmstrip", "lab", "angles", "speeds", "power", "convergence", "shape-1-2")}
+    assert all(path.read_bytes().startswith(b"%PDF") for path in written)
+    with Image.open(tmp_path / "x-power.png") as image:
+        assert image.size[0] == pytest.approx(3.4 * 300, abs=1)

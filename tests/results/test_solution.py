@@ -1,0 +1,163 @@
+"""The solved problem: its interpolant, its certificate, its budgets, and the schemes against each other."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import read_problem_file
+from colloc.mechanics.balance import instant
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.pictures.figure import solution_figure
+from colloc.pictures.publication import panels
+from colloc.results.certificate import certify
+from colloc.results.solution import Solution
+from colloc.results.store import load, save
+from colloc.search.optimise import maximise_efficiency
+from colloc.system.errors import ProblemError
+from colloc.verification.replay import replay
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):
+    assert three_link.status == "solved"
+    gait = three_link.gait
+    assert abs(three_link.certificate.efficiency - 0.2600) < 1e-4
+    np.testing.assert_allclose([gait.mean[0], gait.cos[0, 0], gait.sin[0, 0]], [0.0, 2.859, 1.302], atol=2e-3)
+    guess = three_link.problem.guess
+    start = replay(
+        three_link.problem.body, Friction(), lambda t: (guess.angles(t), guess.rates(t)), 1e-4, instants=400, most_instants=800
+    )
+    assert start.efficiency < 0.5 * three_link.efficiency
+
+
+def test_iterations_stay_within_budget(three_link):
+    assert sum(level.iterations for level in three_link.levels) < 120
+    assert all(level.optimal for level in three_link.levels)
+
+
+@pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
+def test_sampled_motion_is_consistent(symmetry, solved):
+    solution = solved("three_link")[0] if symmetry == "bilateral" else _smooth(symmetry)
+    t = np.linspace(0, 1, 4001)
+    motion = solution.sample(t)
+    dt = t[1] - t[0]
+    # theta' = omega and centre' = its velocity, through the symmetry's second half
+    middle = slice(1, -1)
+    jump = np.abs(np.diff(motion.theta)).max()
+    assert jump < 20 * dt
+    error = np.gradient(motion.theta, dt)[middle] - motion.z[2][middle]
+    assert np.median(np.abs(error)) < 1e-3
+    body = solution.problem.body
+    now = instant(body, solution.problem.friction, motion.angles, motion.rates, motion.z, solution.last.delta)
+    cx, cy = body.centre_velocity(now.posture, now.velocity)
+    c, s = np.cos(motion.theta), np.sin(motion.theta)
+    speed = np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
+    assert np.median(np.abs(np.gradient(motion.centre, dt, axis=1) - speed)) < 1e-3
+    # tail velocities are those of the balance
+    exact = solve_balance(body, solution.problem.friction, motion.angles, motion.rates, solution.last.delta).z
+    assert np.median(np.abs(motion.z - exact)) < 2e-3
+    # a period advances by d along x and does not turn
+    np.testing.assert_allclose(motion.centre[:, -1] - motion.centre[:, 0], [solution.distance, 0.0], atol=2e-6)
+    assert abs(motion.theta[-1] - motion.theta[0]) < 1e-9
+    later = solution.sample(t[:5] + 3)
+    expected = motion.centre[:, :5] + np.array([[3 * solution.distance], [0.0]])
+    np.testing.assert_allclose(later.centre, expected, atol=1e-5)
+
+
+def _smooth(symmetry):
+    """A quick solve at large delta, where everything is smooth."""
+    problem = Problem(
+        "smooth", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, symmetry), delta=0.3, delta_start=0.3, mesh_tolerance=1e-4
+    )
+    return maximise_efficiency(problem)
+
+
+def test_distance_and_work_equal_those_of_the_replay_on_a_grid_ten_times_finer(three_link):
+    certificate = certify(three_link, instants=2 * 10 * three_link.mesh.n_point)
+    assert abs(three_link.efficiency / certificate.efficiency - 1) < 1e-4
+    assert certificate.efficiency_error < 1e-6
+    assert certificate.passed
+
+
+def test_a_solution_that_lies_fails_its_certificate(three_link):
+    from dataclasses import replace
+
+    from colloc.results.solution import Solution
+
+    def with_last(**changes):
+        return Solution(three_link.problem, [*three_link.levels[:-1], replace(three_link.last, **changes)])
+
+    names = {c.name for c in certify(with_last(efficiency=three_link.efficiency * 1.001)).failures}
+    assert names == {"replay gap"}
+    wrong = three_link.last.x.copy()
+    wrong[three_link.layout.parameters[0, 0]] += 0.3
+    names = {c.name for c in certify(with_last(x=wrong)).failures}
+    assert {"joint limits", "replay gap"} <= names
+    failed = with_last(optimal=False)
+    failed.certificate = three_link.certificate
+    assert failed.status == "not converged"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["gauss-5", "gauss-3", "radau-3"])
+def test_refined_meshes_reach_one_part_in_a_million(scheme):
+    problem = Problem(
+        "fine",
+        ellipse(0, 2.85, 1.29),
+        gait=Harmonic(1, "bilateral"),
+        delta_start=1e-3,
+        intervals=20,
+        scheme=scheme,
+        mesh_tolerance=1e-6,
+    )
+    solution = maximise_efficiency(problem)
+    certificate = certify(solution, tolerance=1e-8, instants=6400)
+    assert solution.status == "solved"
+    assert abs(solution.efficiency / certificate.efficiency - 1) < 1e-6 + certificate.efficiency_error / certificate.efficiency
+    assert abs(certificate.efficiency - 0.2600297) < 1e-6
+
+
+@pytest.mark.slow
+def test_lifted_and_map_formulations_find_the_same_optimum(three_link):
+    other = maximise_efficiency(three_link.problem.with_(formulation="lifted", intervals=30))
+    assert other.status == "solved"
+    assert abs(other.certificate.efficiency - three_link.certificate.efficiency) < 1e-5
+
+
+def test_a_solution_is_shown_in_a_line(three_link):
+    assert re.fullmatch(r"<Solution three_link, solved, d/W = 0\.26003 \+- \de-\d\d at delta = 1.0e-04>", repr(three_link))
+    failed = Solution(three_link.problem, three_link.levels[:1])
+    assert "three_link, not converged" in repr(failed)
+    assert "(not replayed) at delta = 1.0e-01" in repr(failed)
+    assert repr(Solution(three_link.problem, [])) == "<Solution three_link, not converged>"
+
+
+def test_the_tour_of_the_readme_works_on_a_failed_solution_and_certifies_nothing(three_link, tmp_path):
+    for failed in (Solution(three_link.problem, three_link.levels[:1]), Solution(three_link.problem, [])):
+        again = load(save(failed, tmp_path / "failed.h5"))
+        for solution in (failed, again):
+            assert solution.status == "not converged"
+            assert not solution.certificate.passed
+            assert np.isnan([solution.certificate.efficiency, solution.certificate.efficiency_error]).all()
+            assert "nothing was checked" in solution.certificate.failures[0].line()
+    with pytest.raises(ProblemError, match="three_link holds no gait: its solve failed before the first level"):
+        again.efficiency
+
+
+def test_all_public_names_are_found_by_completion():
+    import colloc
+
+    assert set(colloc.__all__) <= set(dir(colloc))
+
+
+def test_bodies_of_any_number_of_joints_are_drawn(unsolved):
+    for name, axes in (("two_link", 5), ("three_link", 5), ("four_link", 5)):
+        solution = unsolved(read_problem_file(ROOT / "problems" / f"{name}.py").problem)
+        assert len(solution_figure(solution).axes) == axes
+        assert "angles" in panels(solution)

@@ -1,0 +1,70 @@
+"""Results files: round trip, plain h5py, and damage."""
+
+import h5py
+import numpy as np
+import pytest
+
+from colloc.results.store import load, save
+from colloc.system.errors import StoreError
+from colloc.system.sealed_file import seal
+
+
+def test_round_trip_keeps_everything(three_link, tmp_path):
+    again = load(save(three_link, tmp_path / "a b" / "ü.h5"))
+    assert again.problem.hash == three_link.problem.hash
+    assert again.status == "solved"
+    assert again.certificate == three_link.certificate
+    assert again.source == three_link.source
+    assert len(again.levels) == len(three_link.levels)
+    np.testing.assert_array_equal(again.last.x, three_link.last.x)
+    t = np.linspace(0, 2, 11)
+    np.testing.assert_array_equal(again.sample(t).tail, three_link.sample(t).tail)
+
+
+def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
+    with h5py.File(save(three_link, tmp_path / "x.h5")) as file:
+        angles = file["motion/joint_angles"]
+        assert angles.attrs["units"] == b"rad"
+        assert angles.shape == (2, file["motion/t"].size)
+        assert file.attrs["status"].decode() == "solved"
+        assert "PROBLEM" in file["source"].asstr()[()]
+        assert file["levels/000"].attrs["delta"] == three_link.levels[0].delta
+
+
+def test_nothing_is_left_behind_and_a_failed_write_keeps_the_old_file(three_link, tmp_path, monkeypatch):
+    path = save(three_link, tmp_path / "x.h5")
+    before = path.read_bytes()
+
+    def broken(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("colloc.results.store._write_motion", broken)
+    with pytest.raises(StoreError, match="No space left"):
+        save(three_link, path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
+
+
+def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
+    with pytest.raises(StoreError, match="there is no file"):
+        load(tmp_path / "none.h5")
+    (tmp_path / "text.h5").write_text("hello")
+    with pytest.raises(StoreError, match="not a readable"):
+        load(tmp_path / "text.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = [1.0]
+    with pytest.raises(StoreError, match="carries no checksum"):
+        load(tmp_path / "other.h5")
+    seal(tmp_path / "other.h5")
+    with pytest.raises(StoreError, match="not a colloc solution"):
+        load(tmp_path / "other.h5")
+    good = save(three_link, tmp_path / "good.h5")
+    data = good.read_bytes()
+    (tmp_path / "cut.h5").write_bytes(data[: len(data) // 2])
+    with pytest.raises(StoreError):
+        load(tmp_path / "cut.h5")
+    with h5py.File(good, "a") as file:
+        del file["problem"]
+        file["problem"] = '{"name": "x"}'
+    with pytest.raises(StoreError, match="damaged"):
+        load(good)

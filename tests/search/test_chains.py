@@ -1,0 +1,200 @@
+"""Chains of 2 to 8 links: self-contact of all pairs, the two-link body, and the problem files."""
+
+import numpy as np
+import pytest
+
+from colloc.collocation.layout import problem_mesh
+from colloc.collocation.shape_checks import shape_checks
+from colloc.collocation.transcription import transcribe
+from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.commands.solve import main
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.problem import Problem
+from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, passing_depth
+from colloc.mechanics.friction import Friction
+from colloc.search.far_contact import crossing_pairs, last_free
+from colloc.search.nlp import Solver
+from colloc.system.errors import ProblemError
+from colloc.verification.replay import replay
+
+BODIES = [Chain((0.25,) * 4), Chain((0.1, 0.4, 0.2, 0.3)), Chain((0.2,) * 5), Chain((1 / 8,) * 8)]
+
+
+def crossing(body, angles, i, j):
+    """Plain intersection of two links, by solving for the point on both lines."""
+    x, y = body.joints(angles)
+    p, q = x[i] + 1j * y[i], x[j] + 1j * y[j]
+    r, s = x[i + 1] + 1j * y[i + 1] - p, x[j + 1] + 1j * y[j + 1] - q
+    area = (r.conj() * s).imag
+    on_first, on_second = (((q - p).conj() * s).imag / area, ((q - p).conj() * r).imag / area)
+    return (on_first > 0) & (on_first < 1) & (on_second > 0) & (on_second < 1)
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda b: f"{b.n_link} links")
+def test_clearance_never_allows_a_crossing_and_forbids_little_else(body):
+    rng = np.random.default_rng(2)
+    angles = rng.uniform(-1, 1, (body.n_joint, 20000)) * rng.uniform(0.5, np.pi, 20000)
+    seen = 0
+    for i, j in far_pairs(body):
+        value = clearance(body, angles, i, j)[0]
+        cross = crossing(body, angles, i, j)
+        seen += cross.sum()
+        assert not (cross & (value >= 0)).any()
+        assert (cross | (value >= -2 * CLEARANCE_SMOOTHING)).all()
+    assert seen > 20
+    assert len(far_pairs(body)) == (body.n_link - 2) * (body.n_link - 3) // 2
+
+
+def test_clearance_is_the_same_seen_from_the_head_and_in_a_mirror():
+    body = Chain((0.1, 0.4, 0.2, 0.3))
+    other = Chain(body.lengths[::-1])
+    angles = np.random.default_rng(3).uniform(-2, 2, (3, 50))
+    value = clearance(body, angles, 0, 3)
+    np.testing.assert_allclose(clearance(body, -angles, 0, 3), value, atol=1e-15)
+    np.testing.assert_allclose(clearance(other, -angles[::-1], 0, 3), value, atol=1e-15)
+
+
+def test_parallel_links_that_slip_through_each_other_are_caught():
+    # links 1 and 4 are parallel at every instant, and their distance passes through zero between two samples
+    body = Chain((0.3, 0.2, 0.2, 0.3))
+    tilt = np.array([-0.03, -0.01, 0.01, 0.03])
+    angles = np.stack([tilt - 1.0, np.full(4, 2.0), np.pi - 1.0 - tilt])
+    height = body.joints(angles)[1]
+    np.testing.assert_allclose(height[3], height[4], atol=1e-12)
+    assert height[3, 1] < 0 < height[3, 2]
+    assert crossing_depth(body, angles, [(0, 3)]).max() < 1e-9
+    assert passing_depth(body, angles, [(0, 3)]) > 1e-3
+    assert clearance(body, angles[:, 1:3].mean(axis=1, keepdims=True), 0, 3)[0, 0] < 0
+
+
+def curl(amplitude, **changes):
+    """Five links that curl up as a whole; they close a ring at 2 pi / 5 a joint."""
+    guess = Fourier(np.zeros(4), np.full((4, 1), amplitude), np.zeros((4, 1)))
+    fields = {"body": Chain((0.2,) * 5), "gait": Harmonic(1, "antipodal"), "intervals": 12, "mesh_tolerance": 0.0}
+    return Problem("curl", guess, **(fields | changes))
+
+
+def test_last_free_gait_stops_before_links_cross():
+    problem = curl(1.0)
+    free = problem.gait.parameters(problem.guess)
+    bad = 1.6 * free
+    program = transcribe(problem)
+    assert (0, 4) in crossing_pairs(program, bad)
+    between = last_free(program, free, bad)
+    assert not crossing_pairs(program, between)
+    assert 1.0 < between.max() / free.max() < 1.6
+
+
+def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell():
+    problem = curl(1.1, body=Chain((0.15, 0.25, 0.2, 0.1, 0.3)))
+    far = tuple(far_pairs(problem.body))
+    transcription = transcribe(problem, None, far)
+    own = transcription.layout.parameters[:, 0]
+    x = np.zeros(transcription.layout.n)
+    x[own] = problem.gait.parameters(problem.guess) + 0.1 * np.random.default_rng(4).standard_normal(own.size)
+    solver = Solver(transcription)
+    parameters = solver.oracles.parameter_vector(0.01, transcription.block_parameters(x[own]))
+    value = np.array(solver.oracles.options["jac_g"](x, parameters)[0]).ravel()
+    fine = np.linspace(transcription.mesh.edges[:-1], transcription.mesh.edges[1:], 2001)
+    angles = transcription.gait(x).angles(fine.T.ravel())
+    for i, j in far:
+        rows = transcription.groups[f"links {i + 1} and {j + 1}"]
+        nearest = clearance(problem.body, angles, i, j).reshape(transcription.mesh.n, -1).min(axis=1)
+        np.testing.assert_allclose(-value[rows], nearest, atol=1e-3)
+        assert (transcription.constraint_upper[rows] == 0).all()
+
+
+def tips_passing(side):
+    """Four links near a closed square, where head and tail tip pass each other; `side` moves the joints [rad]."""
+    square, body = np.full(3, np.pi / 2), Chain((0.25,) * 4)
+
+    def gap(q):
+        x, y = body.joints(q[:, None])
+        return np.array([x[-1, 0] - x[0, 0], y[-1, 0] - y[0, 0]])
+
+    step = 1e-6 * np.eye(3)
+    slope = np.stack([(gap(square + h) - gap(square - h)) / 2e-6 for h in step], axis=1)
+    # the head tip moves across the corner of what is allowed: links cross where it is right of and below the tail tip
+    across = np.linalg.lstsq(slope, np.array([0.3, 0.3]), rcond=None)[0]
+    return Fourier(square + side, np.zeros((3, 1)), across[:, None])
+
+
+def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
+    body = Chain((0.25,) * 4)
+    check = next(c for c in shape_checks(body, [(0, 3)]) if c.name == "links 1 and 4")
+    mesh = problem_mesh(Problem("tips", tips_passing(np.full(3, -0.3)), body, intervals=40))
+    first = tips_passing(np.array([-0.002, 0.0, 0.001]))
+
+    def peak(gait):
+        times = worst_instants(gait, mesh, [check])[0]
+        values = check_values(check, gait, times)
+        return times[[np.argmax(values)]], values.max()
+
+    time, height = peak(first)
+    dense = time + np.linspace(-0.01, 0.01, 200_001)
+    assert check_values(check, first, dense).max() == pytest.approx(height, abs=1e-8)
+    share = held_shares(check, first, time)
+    assert 0.1 < share[0] < 0.9
+    errors, blind = [], []
+    for size in (1e-2, 5e-3, 2.5e-3):
+        moved = tips_passing(np.array([-0.002, 0.0, 0.001]) + size * np.array([0.3, -0.8, 0.5]))
+        height = peak(moved)[1]
+        cut = float(np.array(check.cut(moved.angles(time), share)).ravel()[0])
+        errors.append(abs(cut - height))
+        blind.append(height - check_values(check, moved, time)[0])
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(orders > 1.7)
+    assert errors[-1] < 1e-5
+    assert min(blind) > 10 * errors[-1]
+
+
+@pytest.mark.parametrize("lengths", [(0.5, 0.5), (0.3, 0.7)])
+@pytest.mark.parametrize("friction", [Friction(), Friction(3, 1, 1), Friction(0.5, 2, 2)])
+def test_scallop_theorem(lengths, friction):
+    # one joint retraces its path; with equal speeds both ways nothing is left, whatever the delta
+    body = Chain(lengths)
+
+    def even(t):
+        return 0.3 + 1.5 * np.sin(2 * np.pi * t)[None], 3 * np.pi * np.cos(2 * np.pi * t)[None]
+
+    def uneven(t):
+        phase, rate = 2 * np.pi * t + 0.6 * np.sin(2 * np.pi * t), 2 * np.pi * (1 + 0.6 * np.cos(2 * np.pi * t))
+        return 0.3 + 1.5 * np.sin(phase)[None], 1.5 * (np.cos(phase) * rate)[None]
+
+    for delta in (1e-1, 1e-4):
+        fine = replay(body, friction, even, delta, instants=400, tolerance=1)
+        assert fine.distance < 1e-10
+        assert fine.work > 0.1
+    # regularised friction depends on speed a little: different speeds there and back leave a distance of order delta
+    viscous, dry = (replay(body, friction, uneven, delta, instants=800, tolerance=1).distance for delta in (3e-1, 3e-3))
+    assert dry < 3e-3
+    assert dry < viscous / 3
+
+
+def test_two_links_without_directional_friction_are_refused_in_words():
+    with pytest.raises(ProblemError, match="scallop"):
+        Problem("two", Fourier([0.0], [[1.0]], [[0.0]]), body=Chain((0.5, 0.5)), gait=Harmonic(1, "antipodal"))
+
+
+def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_friction_gives(solved):
+    solution, _ = solved("two_link")
+    assert solution.status == "solved"
+
+    def efficiency(amplitude):
+        gait = Fourier([0.0], [[amplitude]], [[0.0]])
+        body, friction = solution.problem.body, solution.problem.friction
+        return replay(body, friction, lambda t: (gait.angles(t), gait.rates(t)), 1e-4, tolerance=1e-5).efficiency
+
+    sweep = np.linspace(0.8, 2.4, 9)
+    values = [efficiency(a) for a in sweep]
+    assert abs(sweep[np.argmax(values)] - abs(solution.gait.cos[0, 0])) < 0.15
+    assert solution.certificate.efficiency == pytest.approx(max(values), rel=5e-3)
+    assert solution.certificate.efficiency >= max(values) * (1 - 1e-6)
+
+
+@pytest.mark.parametrize("name", ["two_link", "four_link", "five_link"])
+def test_problem_files_of_chains_solve_and_are_certified(name, tmp_path):
+    arguments = [f"problems/{name}.py", "--delta", "1e-3", "--mesh-tolerance", "1e-4", "--no-figure", "--quiet"]
+    assert main([*arguments, "--output", str(tmp_path)]) == 0
+    assert (tmp_path / f"{name}.h5").exists()

@@ -1,0 +1,162 @@
+"""From class to class and from chain to chain: what an optimum keeps on the way."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc.gaits.path_samples import path_length
+from colloc.gaits.symmetry import SYMMETRIES
+from colloc.mechanics.contact import crossing_depth
+from colloc.search import class_transfer as prolongation
+from colloc.search.class_transfer import laid_into, maximise_from, over_links, prolonged
+from colloc.search.optimise import maximise_efficiency
+from colloc.search.path_start import nearest_parameters, transcribed
+from colloc.system.errors import ProblemError
+from scripts.class_rows import FEWER, equal_links, named_gait, rows
+
+THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
+PHASES = np.linspace(0.0, 1.0, 101)
+FIVE_HARMONICS = Fourier(
+    [0.00357, -0.00357],
+    [[2.50125, -0.00401, -0.12198, 0.00064, -0.03095], [-2.50125, 0.00401, 0.12198, -0.00064, 0.03095]],
+    [[0.84175, -0.00217, -0.2703, 0.00101, -0.0018]] * 2,
+)
+"""The optimum of five harmonics (`scripts.class_table`), efficiency 0.40044."""
+
+
+def arcs(symmetry="bilateral"):
+    problem = Problem("p", ellipse(0, 1.8, 1.2), gait=FreePath(4.0, symmetry), intervals=20)
+    program = transcribed(problem)
+    return program.member(nearest_parameters(program, problem.guess))
+
+
+GAITS = {
+    "Fourier": ellipse(0.2, 1.5, 1.0),
+    "Corners": Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]])),
+    "bilateral Corners": Corners(np.array([[2.0, 2.5, 2.2], [-2.0, -2.1, -2.2]]), "bilateral"),
+}
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_links_cut_in_two_move_as_before(name):
+    """New joints in the middles of links stay straight, old ones keep their angles; joining the halves undoes it."""
+    gait = GAITS[name]
+    cut = over_links(gait, THREE, SIX)
+    np.testing.assert_allclose(cut.angles(PHASES)[1::2], gait.angles(PHASES), atol=1e-12)
+    np.testing.assert_allclose(cut.angles(PHASES)[::2], 0, atol=1e-12)
+    x, y = THREE.joints(gait.angles(PHASES))
+    x6, y6 = SIX.joints(cut.angles(PHASES))
+    np.testing.assert_allclose([x6[::2], y6[::2]], [x, y], atol=1e-12)
+    np.testing.assert_allclose(over_links(cut, SIX, THREE).angles(PHASES), gait.angles(PHASES), atol=1e-12)
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def test_a_path_of_arcs_keeps_its_symmetry_in_another_chain(symmetry):
+    gait = arcs(symmetry)
+    assert isinstance(gait, ArcPath)
+    laid = over_links(gait, THREE, Chain((0.25,) * 4))
+    assert laid.symmetry == symmetry
+    # the polygon is paced by its own length, so sets of points are compared
+    same = over_links(gait, THREE, THREE)
+    points, path = same.angles(np.linspace(0, 1, 4001)), gait.angles(PHASES)
+    distance = np.linalg.norm(points[:, :, None] - path[:, None, :], axis=0).min(axis=0)
+    assert distance.max() < 2e-3
+
+
+@pytest.mark.parametrize("lengths", [(0.25,) * 4, (0.2,) * 5, (0.1, 0.4, 0.4, 0.1)])
+def test_a_large_gait_is_admissible_in_any_chain(lengths):
+    laid = over_links(ellipse(0, 2.8, 1.3), THREE, Chain(lengths))
+    angles = laid.angles(np.linspace(0, 1, 2001))
+    assert np.abs(angles).max() <= np.pi
+    assert crossing_depth(Chain(lengths), angles).max() == 0
+    np.testing.assert_allclose(angles, -angles[::-1, ::-1], atol=1e-12)
+
+
+def test_a_truncated_path_that_overshoots_its_limits_starts_a_search_all_the_same():
+    square = Corners(np.array([[3.1, 3.1, -3.1, -3.1], [-0.6, 0.6, 0.6, -0.6]]))
+    problem = Problem("square", square, gait=Polygon(4), intervals=16)
+    stated = prolonged(problem, square, Harmonic(3))
+    angles = stated.guess.angles(PHASES)
+    assert 3.0 < np.abs(angles).max() <= np.pi
+    assert crossing_depth(THREE, angles).max() == 0
+    with pytest.raises(ProblemError, match="beyond the limit"):
+        problem.with_(gait=Harmonic(3))
+
+
+@pytest.mark.parametrize("symmetry", ["none", "bilateral"])
+@pytest.mark.parametrize("gait_class", [Harmonic, Polygon])
+def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class):
+    corners = {"none": [[0.4, 0.5, 0.6], [0.2, 0.1, 0.3]], "bilateral": [[0.4, 0.5, 0.45], [-0.4, -0.42, -0.45]]}
+    small = Corners(np.array(corners[symmetry]), symmetry)
+    laid = laid_into(gait_class(3, symmetry), small, THREE)
+    assert path_length(laid) == pytest.approx(0.2 * np.pi, rel=2e-3)
+    np.testing.assert_allclose(laid.angles(PHASES[:-1]).mean(axis=1), small.angles(PHASES[:-1]).mean(axis=1), atol=1e-3)
+    if symmetry == "bilateral":
+        np.testing.assert_allclose(laid.angles(PHASES), -laid.angles(-PHASES)[::-1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("results", "tried", "kept"),
+    [
+        ({10: 0.40035, 100: 0.9}, [10], 0.40035),  # keeps the optimum to 1e-4: no other trial
+        ({10: 0.39, 100: 0.38}, [10, 100], 0.39),
+        ({10: 0.39, 100: 0.41}, [10, 100], 0.41),
+        ({10: None, 100: 0.3}, [10, 100], 0.3),
+        ({10: 0.3, 100: None}, [10, 100], 0.3),
+        ({10: None, 100: None}, [10, 100], None),
+    ],
+)
+def test_the_best_certified_search_is_kept_and_none_is_made_in_vain(monkeypatch, results, tried, kept):
+    begun = []
+
+    def solve(stated, on_level):
+        factor = round(stated.delta_start / stated.delta)
+        begun.append(factor)
+        value = results[factor]
+        return SimpleNamespace(status="solved" if value else "not converged", measured=SimpleNamespace(efficiency=value))
+
+    monkeypatch.setattr(prolongation, "maximise_efficiency", solve)
+    problem = Problem("p", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"))
+    solution = maximise_from(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 0.40037)
+    assert begun == tried
+    assert solution.measured.efficiency == kept
+
+
+@pytest.mark.slow
+def test_a_richer_class_keeps_what_its_seed_had():
+    """From 100 times the final delta, where friction is regularised most, the search leaves this optimum: 0.3998."""
+    problem = Problem("five", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60)
+    from_afar = maximise_efficiency(prolonged(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 100.0))
+    assert from_afar.status == "solved"
+    assert from_afar.certificate.efficiency < 0.4003
+    solution = maximise_from(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 0.40044)
+    assert solution.status == "solved"
+    assert solution.certificate.efficiency > 0.4010
+
+
+@pytest.mark.slow
+def test_where_a_near_start_fails_one_from_afar_is_tried():
+    """A hexagon as an octagon has corners on its sides, where its first level at 10 times the final delta loses its way."""
+    hexagon = Corners(np.array([[2.58068, 3.11378, 2.97774, 2.81594], [-2.58068, -2.58089, -2.67289, -2.81594]]), "bilateral")
+    problem = Problem("six", hexagon, gait=Polygon(6, "bilateral"), intervals=60)
+    near = maximise_efficiency(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80))
+    assert near.status != "solved"
+    solution = maximise_from(problem, hexagon, Polygon(8, "bilateral"), 0.40154, intervals=80)
+    assert solution.status == "solved"
+    assert solution.certificate.efficiency > 0.4015
+
+
+@pytest.mark.parametrize("links", [3, 4, 5])
+def test_every_richer_class_of_the_tables_starts_from_a_poorer_one(links):
+    listed = rows(links, False)
+    named = {"large loop", "middle loop", "small triangle", "best small gait", "fold", FEWER, *(f"start {k}" for k in range(6))}
+    for name, row in listed.items():
+        kind, number, *rest = name.split()
+        assert set(row.seeds) <= named | set(listed), name
+        assert len(set(row.seeds)) == len(row.seeds)
+        poorer = [other for other in listed if other.split()[0] == kind and int(other.split()[1]) < int(number)]
+        if poorer and not (kind == "corners" and rest == ["side"]):
+            assert set(row.seeds) & set(poorer), name
+        Problem("p", named_gait("start 0", links, Friction(), row.gait_class), equal_links(links), intervals=row.intervals)

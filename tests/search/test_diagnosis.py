@@ -1,0 +1,104 @@
+"""Failures are named in mechanical words, and redundant equations are found before a solve."""
+
+import time
+
+import numpy as np
+import pytest
+
+from colloc.collocation.transcription import transcribe
+from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.problem import FORMULATIONS, Problem
+from colloc.mechanics.body import Chain
+from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
+from colloc.search.nlp import Solver
+from colloc.search.path_start import transcribed
+
+
+def stated(**changes):
+    return Problem("p", ellipse(0.1, 1.4, 0.8), **{"gait": Harmonic(1, "none"), "intervals": 8, **changes})
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_every_row_has_a_meaning_and_a_phase(formulation):
+    transcription = transcribe(stated(formulation=formulation))
+    phases = []
+    for row in range(transcription.assembly.m):
+        what, phase = row_meaning(transcription, row)
+        assert what.startswith(("the ", "closure", "contact"))
+        phases.append(phase)
+    assert 0 <= min(phases) <= max(phases) <= 1
+
+
+@pytest.mark.parametrize(
+    ("gait", "links"),
+    [
+        (FreePath(8.0, "bilateral"), 3),
+        (FreePath(8.0, "none"), 3),
+        (FreePath(8.0, "antipodal"), 4),
+        (Polygon(4, "bilateral", "side"), 3),
+        (Polygon(3, "none"), 3),
+    ],
+)
+def test_every_row_of_a_path_has_a_meaning_of_its_own_and_a_phase(gait, links):
+    guess = ellipse(0.0, 1.0, 0.6) if links == 3 else Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
+    problem = Problem("path", guess, Chain((1 / links,) * links), gait=gait, intervals=24)
+    transcription = transcribed(problem)
+    said = {row_meaning(transcription, row)[0] for row in range(transcription.assembly.m)}
+    phases = [row_meaning(transcription, row)[1] for row in range(transcription.assembly.m)]
+    assert min(phases) >= 0.0
+    assert max(phases) <= gait.fraction + 1e-12
+    assert not any(what.startswith("contact of") and "links" not in what for what in said)
+    assert not said & set(transcription.groups)
+
+
+def test_a_broken_balance_is_named_with_its_window():
+    solver = Solver(transcribe(stated(formulation="map")), {"max_iter": 0})
+    t = solver.transcription
+    x = feasible_point(t, stated().gait.parameters(stated().guess), 0.1)
+    x[t.layout.z[2, 10:13]] += 0.1
+    result = solver.solve(x, 0.1)
+    text = explanation(t, result, 0.1)
+    assert "torque" in text or "balance" in text or "rotation" in text
+    assert "phase" in text
+    assert "Try to" in text
+
+
+def test_a_redundant_rotation_constraint_is_detected():
+    problem = stated()
+    solver = Solver(transcribe(problem))
+    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
+    assert redundant_equations(solver, x, 0.1) == []
+    # close the rotation twice
+    t = transcribe(problem)
+    rows = t.groups["rotation"]
+    linear = t.assembly.linear.tolil()
+    linear[t.groups["orientation"].start] = linear[rows.start]
+    doubled = Solver(_with_linear(t, linear.tocsr()))
+    assert redundant_equations(doubled, x, 0.1) == ["orientation", "rotation"]
+
+
+def test_the_search_for_redundant_equations_takes_time_in_proportion_to_the_mesh():
+    """Its factors once filled the square of the mesh: 1,000 intervals took minutes and 30 GB."""
+    problem = stated().with_(intervals=600)
+    solver = Solver(transcribe(problem))
+    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
+    begin = time.process_time()
+    assert redundant_equations(solver, x, 0.1) == []
+    assert time.process_time() - begin < 5.0  # 0.2 s; 20 s with factors that fill
+
+
+def _with_linear(transcription, linear):
+    from dataclasses import replace
+
+    return replace(transcription, assembly=replace(transcription.assembly, linear=linear))
+
+
+def test_running_out_of_iterations_says_so():
+    problem = stated(delta=0.05, delta_start=0.05)
+    solver = Solver(transcribe(problem), {"max_iter": 2})
+    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.05)
+    text = explanation(solver.transcription, solver.solve(x, 0.05), 0.05)
+    assert "after 2 iterations" in text
+    assert np.char.find(text, "Maximum_Iterations") >= 0

@@ -1,0 +1,93 @@
+"""Waves of smooth bodies: references, symmetries, and chains of links against them."""
+
+import numpy as np
+import pytest
+
+from colloc.mechanics.friction import Friction
+from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
+from colloc.smooth.period import measured_period, period
+from colloc.system.errors import ProblemError
+from scripts.models.chain_study import chain_period
+from scripts.models.wave_optimum import odd_wave, optimise_wave
+
+ALONG = Friction(100.0, 1.0, 1.0)
+
+
+def test_wave_B_to_eight_digits():
+    """Two unrelated discretisations in time and arc length agree to 8 digits, and with the design notes' 0.737066."""
+    p = measured_period(sine_wave(), ALONG, 1e-4, intervals=8)
+    q = period(sine_wave(), ALONG, 1e-4, intervals=3, nodes=7, panels=11, order=11)
+    assert p.efficiency == pytest.approx(q.efficiency, abs=2e-9)
+    assert p.errors["efficiency"] < 1e-9
+    assert p.efficiency == pytest.approx(0.737066, abs=1e-6)
+
+
+def test_wave_B_by_a_chain_of_links_extrapolated():
+    """Independent of all panels: links have closed-form friction; their quadratic error is extrapolated away."""
+    coarse, fine = (np.array(chain_period(sine_wave(), ALONG, 1e-4, n, 16)) for n in (160, 320))
+    d, W = (4 * fine - coarse) / 3
+    assert d / W == pytest.approx(period(sine_wave(), ALONG, 1e-4, intervals=2).efficiency, abs=2e-5)
+
+
+def test_a_chain_overestimates_the_work_in_proportion_to_the_anisotropy():
+    """Relative excess (mu_t/mu_f) <kappa^2> / (12 n^2), derived in scripts.models.chain_study."""
+    n = 80
+    for mu in (10.0, 100.0):
+        friction = Friction(mu, 1.0, 1.0)
+        smooth = period(sine_wave(), friction, 1e-4, intervals=2)
+        _, W = chain_period(sine_wave(), friction, 1e-4, n, 16)
+        predicted = mu * (2 * np.pi) ** 2 / 2 / (12 * n**2)
+        assert pytest.approx(predicted, rel=0.15) == W / smooth.W - 1
+
+
+def test_standing_wave_does_not_travel():
+    """Theta(1 - s) = -Theta(s) in shape and rate: by symmetry nothing moves the body."""
+    p = period(standing_wave(), Friction(), 1e-4, intervals=2)
+    assert p.d < 1e-12
+    assert 0.4 < p.W < 0.5
+
+
+def test_isotropic_waves_are_ineffective():
+    """The paper's figure 6: work 0.4 to 0.5 (B: 0.505), distance below 0.005."""
+    for wave in (sine_wave(), tanh_wave()):
+        p = period(wave, Friction(), 1e-4, intervals=6, quadrature_tolerance=1e-6)
+        assert 0.4 < p.W < 0.51
+        assert p.d < 0.005
+
+
+def test_the_half_period_and_the_whole_agree():
+    """The mirror-image second half, computed instead of inferred."""
+    wave = sine_wave()
+    whole = Motion(wave.angle, wave.rate, stages=(0.0, 0.5, 1.0))
+    a, b = (period(m, Friction(10.0, 1.0, 1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8) for m in (wave, whole))
+    assert a.d == pytest.approx(b.d, abs=1e-8)
+    assert pytest.approx(b.W, abs=1e-8) == a.W
+    assert abs(b.rotation) < 1e-10
+
+
+@pytest.mark.parametrize("friction", [Friction(), Friction(0.5, 1.0, 2.0), ALONG])
+def test_no_wave_beats_the_bound(friction):
+    for wave in (sine_wave(0.5, 2.0), sine_wave(1.2, 1.0)):
+        assert period(wave, friction, 1e-4, intervals=1).efficiency < 1 / friction.smallest
+
+
+def test_unusable_studies_are_refused():
+    with pytest.raises(ProblemError, match="intervals must be at least 1"):
+        period(sine_wave(), Friction(), 1e-3, intervals=0)
+    with pytest.raises(ProblemError, match="antipodal"):
+        chain_period(Motion(lambda s, t: s, lambda s, t: s), Friction(), 1e-3, 5)
+
+
+def test_an_optimised_wave_beats_the_sine_wave_but_not_the_bound():
+    friction = Friction(10.0, 1.0, 1.0)
+    found = optimise_wave(friction, np.array([1.0]), 1.0, most_waves=2.0, evaluations=24)
+    sine = period(sine_wave(), friction, 1e-4, intervals=1)
+    assert sine.efficiency + 0.01 < found.period.efficiency < 1.0
+    assert 0 < found.waves <= 2.0
+
+
+def test_odd_wave_with_one_harmonic_is_the_sine_wave():
+    s, t = np.linspace(0, 1, 9)[:, None] * np.ones((1, 2)), np.array([0.1, 0.3])
+    for field in ("angle", "rate"):
+        ours, theirs = (getattr(w, field)(s, t) for w in (odd_wave(np.array([0.7]), 1.5), sine_wave(0.7, 1.5)))
+        np.testing.assert_allclose(ours, theirs, atol=1e-14)

@@ -1,0 +1,374 @@
+"""Many starts: admissible reproducible samples, gaits that are the same, archives, and runs that nothing stops."""
+
+import json
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from colloc.commands import multistart
+from colloc.gaits.equivalence import distance, images, irreversibility, phase_distance, reversed_in_time
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
+from colloc.gaits.problem import Problem
+from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, shape_speed, start_gait
+from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import crossing_depth
+from colloc.mechanics.friction import Friction
+from colloc.results.archive import Archive, load_archive, save_archive
+from colloc.results.delta_limit import efficiency_at_zero_delta, resolution_warning
+from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
+from colloc.results.solution import SOLVED
+from colloc.search import continuation, level_run
+from colloc.search.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
+from colloc.search.continuation import continue_delta
+from colloc.search.optimise import is_trivial, maximise_efficiency
+from colloc.search.parameter_continuation import continue_parameter, with_parameter
+from colloc.studies import campaign
+from colloc.system.errors import ProblemError, StoreError
+from colloc.verification.replay import replay
+
+REVERSIBLE, IRREVERSIBLE = Friction(3, 1, 1), Friction(0.5, 1, 5)
+GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
+
+
+def problem(**changes):
+    fields = {"gait": Harmonic(1, "bilateral"), "delta": 0.1, "intervals": 10, "mesh_tolerance": 0.0}
+    return Problem(**{"name": "quick", "guess": ellipse(0.2, 1.2, 0.8), **fields, **changes})
+
+
+def replayed(gait, friction, instants=200):
+    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
+    return replay(Chain(), friction, path, 1e-2, instants=instants, most_instants=instants)
+
+
+@pytest.mark.parametrize(("friction", "n_image"), [(REVERSIBLE, 8), (IRREVERSIBLE, 4)])
+def test_images_of_a_gait_keep_its_distance_work_and_rotation(friction, n_image):
+    original = replayed(GAIT, friction)
+    found = images(GAIT, Chain(), friction)
+    assert len(found) == n_image
+    for image in found:
+        other = replayed(image, friction)
+        # the replay integrates the rotation forwards in time, so its quadrature error is not the same for a reversed gait
+        np.testing.assert_allclose([other.distance, other.work], [original.distance, original.work], rtol=1e-6)
+        np.testing.assert_allclose(abs(other.rotation), abs(original.rotation), rtol=1e-8)
+
+
+def test_reversal_alone_changes_the_motion_where_friction_tells_forward_from_backward():
+    forward, backward = (replayed(g, IRREVERSIBLE).distance for g in (GAIT, reversed_in_time(GAIT)))
+    assert abs(forward / backward - 1) > 0.05
+
+
+@pytest.mark.parametrize("coefficients", [(1, 1, 1), (1.7, 1, 1.3), (0.5, 1, 5)])
+def test_bilateral_gaits_close_their_rotation_for_any_friction(coefficients):
+    rng = np.random.default_rng(5)
+    gait = Harmonic(2, "bilateral").fourier(0.5 * rng.normal(size=5), 2)
+    motion = replayed(gait, Friction(*coefficients))
+    assert abs(motion.rotation) < 1e-10
+    assert motion.distance > 1e-3
+
+
+def test_a_retraced_gait_goes_nowhere_unless_friction_tells_forward_from_backward():
+    retraced = Fourier([0.4, -0.9], [[0.9], [0.5]], [[0.0], [0.0]])
+    assert irreversibility(retraced) < 1e-7
+    assert irreversibility(GAIT) > 0.1
+    assert enclosed_area(retraced) == 0
+    assert replayed(retraced, REVERSIBLE).efficiency < 1e-9
+    assert replayed(retraced, IRREVERSIBLE).efficiency > 1e-2
+
+
+def test_distance_does_not_see_start_phase_or_symmetry_but_sees_everything_else():
+    for phase in (0.1, 0.37, 0.9):
+        assert phase_distance(GAIT, shifted(GAIT, phase)) < 1e-7
+    for image in images(GAIT, Chain(), REVERSIBLE):
+        assert distance(shifted(image, 0.21), GAIT, Chain(), REVERSIBLE) < 1e-7
+    moved = Fourier(GAIT.mean + np.array([0.1, 0.0]), GAIT.cos, GAIT.sin)
+    assert phase_distance(GAIT, moved) == pytest.approx(0.1, rel=1e-6)
+    assert distance(GAIT, reversed_in_time(GAIT), Chain(), IRREVERSIBLE) > 0.1
+    assert distance(GAIT, images(GAIT, Chain((0.2, 0.3, 0.5)), IRREVERSIBLE)[-1], Chain(), IRREVERSIBLE) < 1e-7
+
+
+def test_phase_distance_is_the_smallest_over_a_brute_force_scan():
+    other = reversed_in_time(GAIT)
+    t = np.arange(64) / 64
+    scan = [np.sqrt(np.mean(np.sum((GAIT.angles(t) - other.angles(t + a)) ** 2, axis=0))) for a in np.linspace(0, 1, 2001)]
+    assert phase_distance(GAIT, other) == pytest.approx(min(scan), rel=1e-5)
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize(("symmetry", "harmonics"), [("none", 1), ("bilateral", 2), ("antipodal", 1)])
+def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, symmetry, harmonics):
+    stated = problem(gait=Harmonic(harmonics, symmetry), joint_limit=2.8)
+    t = np.arange(500) / 500
+    seen = []
+    for k in (0, 1, BLOCK - 1, BLOCK, 3 * BLOCK + 7):
+        gait = start_gait(stated, sampler, 3, k)
+        angles = gait.angles(t)
+        assert np.abs(angles).max() <= 2.8
+        assert not crossing_depth(stated.body, angles).any()
+        assert shape_speed(gait) >= stated.smallest_shape_speed
+        again = stated.gait.fourier(stated.gait.parameters(gait), 2)
+        assert phase_distance(gait, again) < 1e-7
+        np.testing.assert_array_equal(angles, start_gait(stated, sampler, 3, k).angles(t))
+        assert np.abs(angles - start_gait(stated, sampler, 4, k).angles(t)).max() > 1e-2
+        seen.append(angles)
+    assert min(np.abs(a - b).max() for i, a in enumerate(seen) for b in seen[:i]) > 1e-2
+    with pytest.raises(ProblemError, match="sampler"):
+        start_gait(stated, "dice", 0, 0)
+
+
+@pytest.mark.parametrize("friction", [REVERSIBLE, IRREVERSIBLE])
+def test_closing_the_rotation_keeps_the_enclosed_area(friction):
+    stated = problem(friction=friction, gait=Harmonic(1, "none"))
+    start = stated.gait.parameters(start_gait(stated, SAMPLERS[0], 0, 3))
+    closed = closed_parameters(stated, start, 0.1)
+    (before, after), _ = net_rotations(stated, np.array([start, closed]), 0.1)
+    assert abs(before) > 1e-3
+    assert abs(after) < 1e-6
+    areas = [enclosed_area(stated.gait.fourier(p, 2)) for p in (start, closed)]
+    assert areas[1] == pytest.approx(areas[0], rel=0.2)
+
+
+def test_an_almost_retraced_gait_is_opened_without_turning_it_round():
+    stated = problem(friction=Friction(10, 1, 1), gait=Harmonic(1, "none"))
+    for sign in (1.0, -1.0):
+        narrow = stated.gait.parameters(Fourier([0.5, -0.3], [[0.9], [0.7]], [[0.0], [0.01 * sign]]))
+        opened = opened_parameters(stated, narrow, 0.1)
+        before, after = (enclosed_area(stated.gait.fourier(p, 2)) for p in (narrow, opened))
+        assert after * before > 0
+        assert abs(after) > 3 * abs(before)
+        assert abs(net_rotations(stated, opened[None], 0.1)[0][0]) < 1e-3
+
+
+def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retraced_one():
+    stated = problem(gait=Harmonic(1, "none"), intervals=20)
+    solution = continue_delta(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
+    assert solution.last.optimal
+    assert not is_trivial(solution)
+    assert irreversibility(solution.gait) > 0.1
+
+
+def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
+    # with a threshold above every efficiency each level counts as going nowhere
+    monkeypatch.setattr(level_run, "TRIVIAL_EFFICIENCY", 2.0)
+    monkeypatch.setattr(continuation, "_FIRST_DELTAS", 2)
+    solution = maximise_efficiency(problem())
+    assert is_trivial(solution)
+    assert solution.status != SOLVED
+    assert "goes nowhere" in solution.message
+
+
+def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
+    # where friction resists backwards sliding five times as much, small gaits beat large ones
+    stated = problem(friction=Friction(0.5, 1, 5), delta=1e-3, delta_start=1e-2, guess=ellipse(0.5, 0.12, 0.12), intervals=14)
+    solution = maximise_efficiency(stated)
+    assert solution.status == SOLVED
+    assert on_speed_floor(stated, solution.gait)
+    assert "smallest_shape_speed = 0.1" in solution.message
+    assert not on_speed_floor(stated, ellipse(0.2, 1.2, 0.8))
+    found = [outcome(0, solution.gait), outcome(1)]
+    lines = multistart.summary_lines(stated, found, basins(stated, found))
+    assert sum("on the bound smallest_shape_speed" in line for line in lines) == 1
+
+
+def outcome(start, gait=GAIT, efficiency=0.2, status=SOLVED):
+    return Outcome(start, status, "", gait, gait, efficiency, 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25)
+
+
+def test_basins_join_images_of_one_gait_and_nothing_else():
+    stated = problem(friction=REVERSIBLE, gait=Harmonic(2, "none"))
+    same = [outcome(k, shifted(g, 0.1 * k)) for k, g in enumerate(images(GAIT, Chain(), REVERSIBLE))]
+    other = outcome(20, Fourier(GAIT.mean + 0.3, GAIT.cos, GAIT.sin))
+    better = outcome(21, GAIT, 0.21)
+    failed = outcome(22, status=ERROR)
+    found = basins(stated, [*same, other, better, failed])
+    assert [b.best.efficiency for b in found] == [0.21, 0.2, 0.2]
+    assert sorted(len(b.starts) for b in found) == [1, 1, 8]
+    assert sum(b.frequency for b in found) == pytest.approx(10 / 11)
+    assert counts([*same, failed]) == {SOLVED: 8, ERROR: 1}
+
+
+def test_an_archive_comes_back_as_it_was_written(tmp_path):
+    archive = Archive(problem(), SAMPLERS[0], 7, "command", {k: outcome(k) for k in (4, 1)})
+    assert load_archive(save_archive(Archive(problem(), SAMPLERS[0], 7), tmp_path / "empty.h5")).outcomes == {}
+    back = load_archive(save_archive(archive, tmp_path / "sub" / "a.h5"))
+    assert (back.problem.hash, back.sampler, back.seed, back.command) == (problem().hash, SAMPLERS[0], 7, "command")
+    assert sorted(back.outcomes) == [1, 4]
+    for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
+        assert getattr(back.outcomes[4], name) == getattr(archive.outcomes[4], name)
+    np.testing.assert_array_equal(back.outcomes[1].gait.sin, GAIT.sin)
+    assert [p.name for p in (tmp_path / "sub").glob("[!.]*")] == ["a.h5"]
+    (tmp_path / "bad.h5").write_bytes(b"not HDF5")
+    for name in ("bad.h5", "missing.h5"):
+        with pytest.raises(StoreError):
+            load_archive(tmp_path / name)
+
+
+def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
+    def solve(stated, watch):
+        solve.calls += 1
+        if solve.calls == 2:
+            raise ZeroDivisionError("one bad start")
+        solution = continue_delta(stated, watch)
+        if solve.calls == 3:
+            monkeypatch.setattr(campaign.time, "perf_counter", lambda: 1e12)
+            watch(solution.last)
+        return solution
+
+    solve.calls = 0
+    monkeypatch.setattr(campaign, "maximise_efficiency", solve)
+    found = list(campaign.run_starts(problem(), range(3), executor=ThreadPoolExecutor))
+    assert [o.start for o in found] == [0, 1, 2]
+    assert found[0].iterations > 0
+    assert (found[1].status, found[1].message) == (ERROR, "ZeroDivisionError: one bad start")
+    assert found[2].status == TIME_LIMIT
+    assert "the last optimum was at delta = 1.0e-01" in found[2].message
+
+
+class _Dying(Executor):
+    """Breaks, like a pool whose worker was killed, whenever start 2 is submitted."""
+
+    def __init__(self, workers):
+        self.broken = False
+
+    def submit(self, function, *arguments):
+        if self.broken:
+            raise BrokenProcessPool("died")
+        future = Future()
+        if arguments[3] == 2:
+            self.broken = True
+            future.set_exception(BrokenProcessPool("died"))
+        else:
+            future.set_result(outcome(arguments[3]))
+        return future
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_a_worker_that_dies_costs_one_start(workers):
+    found = list(campaign.run_starts(problem(), range(6), workers=workers, executor=_Dying))
+    assert sorted(o.start for o in found) == [0, 1, 2, 3, 4, 5]
+    assert [o.start for o in found if o.status == CRASHED] == [2]
+
+
+FILE = """
+from colloc import *
+PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.2, 1.2, 0.8),
+                  friction=Friction(10, 1, 1), delta=0.1, intervals=10, mesh_tolerance=1e-3)
+"""
+
+
+def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, capsys, monkeypatch):
+    path, out = tmp_path / "quick.py", tmp_path / "out"
+    path.write_text(FILE, encoding="utf-8")
+    multistart.main([str(path), "--starts", "2", "--output", str(out)])
+    printed = capsys.readouterr().out
+    assert "0 starts done already, 2 to go" in printed
+    archive = load_archive(out / "quick.starts.h5")
+    assert sorted(archive.outcomes) == [0, 1]
+    asked = []
+
+    def run(stated, starts, **settings):
+        for k in starts:
+            asked.append(k)
+            yield outcome(k, ellipse(0.2, 1.2, 0.8))
+
+    monkeypatch.setattr(campaign, "run_starts", run)
+    assert multistart.main([str(path), "--starts", "4", "--output", str(out), "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert asked == [2, 3]
+    assert summary["starts"] == 4
+    assert sum(summary["counts"].values()) == 4
+    assert summary["optima"][0]["efficiency"] >= 0.2 - 1e-12
+    assert multistart.main([str(path), "--starts", "4", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 2
+    assert "another problem, sampler or seed" in capsys.readouterr().err
+
+
+def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
+    path = tmp_path / "quick.py"
+    path.write_text(FILE, encoding="utf-8")
+    for options, text in ((["--starts", "0"], "--starts"), (["--workers", "0"], "--workers"), (["--time-limit", "0"], "time")):
+        assert multistart.main([str(path), *options]) == 2
+        assert text in capsys.readouterr().err
+    assert multistart.main([str(tmp_path / "none.py")]) == 2
+
+
+def test_continuation_in_a_friction_coefficient_meets_the_direct_solution():
+    steps = continue_parameter(problem(delta=0.03), "friction.mu_t", 2.0, first_step=0.5)
+    assert [s.value for s in steps] == [1.0, 1.5, 2.0]
+    assert all(s.optimal for s in steps)
+    direct = continue_delta(problem(delta=0.03, friction=Friction(2, 1, 1), guess=steps[-1].solution.gait))
+    assert steps[-1].solution.efficiency == pytest.approx(direct.efficiency, rel=1e-6)
+    assert with_parameter(problem(), "intervals", 15.2).intervals == 15
+    for name in ("friction.mu_x", "viscosity", "name"):
+        with pytest.raises(ProblemError, match="is not a number of a problem"):
+            with_parameter(problem(), name, 2.0)
+
+
+def test_a_failed_step_is_halved_and_kept(monkeypatch):
+    from colloc.search import parameter_continuation as homotopy
+
+    def solve(stated):
+        far = abs(stated.joint_limit - solve.last) > 0.3
+        solve.last = solve.last if far else stated.joint_limit
+        return SimpleNamespace(last=SimpleNamespace(optimal=not far, delta=0.1), problem=stated, gait=stated.guess)
+
+    solve.last = 3.0
+    monkeypatch.setattr(homotopy, "continue_delta", solve)
+    steps = continue_parameter(problem(joint_limit=3.0), "joint_limit", 2.5)
+    assert [(s.value, s.optimal) for s in steps] == [(3.0, True), (2.5, False), (2.75, True), (2.5, True)]
+
+
+def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
+    limit = efficiency_at_zero_delta(three_link)
+    assert limit.error < 1e-3 * limit.value
+    assert abs(limit.value - three_link.certificate.efficiency_at_zero_delta) < 3 * limit.error
+    assert resolution_warning(three_link) is None
+
+
+def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
+    coarse = continue_delta(problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait))
+    assert "under-resolved by 5 intervals" in resolution_warning(coarse)
+    with pytest.raises(ValueError, match="at least two converged levels"):
+        efficiency_at_zero_delta(coarse)
+
+
+class _Losing(Executor):
+    """Gives up on start 1 in its own way, as Dask does on a task that kills its workers."""
+
+    def __init__(self, workers):
+        pass
+
+    def submit(self, function, *arguments):
+        future = Future()
+        if arguments[3] == 1:
+            future.set_exception(RuntimeError("killed worker"))
+        else:
+            future.set_result(outcome(arguments[3]))
+        return future
+
+
+def test_a_start_that_the_executor_loses_does_not_end_the_run():
+    found = {o.start: o for o in campaign.run_starts(problem(), range(3), executor=_Losing)}
+    assert (found[1].status, found[1].message) == (CRASHED, "its worker failed twice (RuntimeError: killed worker).")
+    assert found[0].status == found[2].status == SOLVED
+
+
+def test_starts_run_on_a_dask_cluster_and_end_as_they_do_here():
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        found = list(campaign.run_starts(problem(), range(2), workers=2, executor=lambda n: client.get_executor()))
+    assert sorted(o.start for o in found) == [0, 1]
+    there = {o.start: o for o in found}
+    here = campaign.run_start(problem(), SAMPLERS[0], 0, 1, 300.0)
+    assert there[1].status == here.status
+    assert there[1].efficiency == pytest.approx(here.efficiency, rel=1e-6)
+
+
+def test_known_gaits_take_the_place_of_samples():
+    stated, near = problem(), ellipse(0.1, 1.3, 0.8)
+    (found,) = campaign.run_starts(stated, [7], executor=ThreadPoolExecutor, known={7: near})
+    assert phase_distance(found.guess, near) < 1e-7

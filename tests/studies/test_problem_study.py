@@ -1,0 +1,353 @@
+"""Studies: where starts travel, that nothing depends on workers, what is kept, and one file that xarray opens."""
+
+import json
+import random
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from colloc.commands import sweep as sweep_study
+from colloc.gaits.gait_class import DIRECT, RETROGRADE, gait_class, wave_direction, winding
+from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.gaits.problem import Problem
+from colloc.mechanics.friction import Friction
+from colloc.results.distinct_optima import CRASHED, Outcome
+from colloc.results.solution import NOT_CONVERGED, SOLVED
+from colloc.studies import cell as study_cell
+from colloc.studies.journal import read_journal
+from colloc.studies.run import StudyRun
+from colloc.studies.store import load_study, save_study
+from colloc.studies.study import Axis, Study, read_study_file
+from colloc.studies.table import NO_PROBLEM, best_over, study_table
+from colloc.system.errors import ProblemError, StoreError
+from colloc.verification.replay import replay
+
+FILE = """
+from colloc import *
+from colloc.studies.study import Axis, Study
+
+def problem(mu_t, mu_b):
+    return Problem("tiny", ellipse(0.0, 2.85, 1.3), friction=Friction(mu_t, 1, mu_b), gait=Harmonic(1, "bilateral"),
+                   delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=1e-4)
+
+STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1)), Axis("mu_b", (1.0,))), problem, cold_starts=0, passes=0)
+"""
+
+
+def problem(x=1.0, y=1.0, kind="a"):
+    return Problem("p", ellipse(0.0, 1.0 + 0.01 * len(kind), 0.5), friction=Friction(x, 1, y), intervals=10)
+
+
+def grid(**changes):
+    axes = (Axis("x", (1.0, 2.0, 3.0, 4.0)), Axis("y", (1.0, 2.0, 3.0)))
+    return Study(**{"name": "grid", "axes": axes, "problem": problem, **changes})
+
+
+def outcome(start, guess, gait, efficiency, status=SOLVED):
+    return Outcome(start, status, "", guess, gait, efficiency, 1e-7, 0.1, 0.5, 1e-4, 3, 0.1, 0.1)
+
+
+def landscape(stated, start_from, start, time_limit):
+    """In place of a solve: two basins, parted by the amplitude of the first joint; only 0.9 of the way is kept each time."""
+    guess = start_from()
+    good = guess.cos[0, 0] > 1.5
+    if stated.friction.mu_t == 3.0 and stated.friction.mu_b == 2.0:
+        return outcome(start, guess, guess, np.nan, NOT_CONVERGED)
+    top = 2.0 if good else 1.0
+    gait = Fourier(guess.mean, guess.cos + 0.9 * (top - guess.cos[0, 0]) * np.array([[1], [-1]]), guess.sin)
+    return outcome(start, guess, gait, (0.3 if good else 0.2) + 0.01 * stated.friction.mu_t)
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    monkeypatch.setattr(study_cell, "run_guess", landscape)
+    monkeypatch.setattr(
+        study_cell, "rough_efficiency", lambda p, g: (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t
+    )
+    monkeypatch.setattr(study_cell, "start_gait", lambda p, sampler, seed, k: ellipse(0.0, 1.9, 0.4))
+
+
+def finished(run, **options):
+    return list(run.run(**{"executor": ThreadPoolExecutor, **options}))
+
+
+def test_starts_travel_from_the_value_before_and_between_all_texts():
+    study = grid(axes=(Axis("x", (1.0, 2.0, 3.0)), Axis("kind", ("a", "b", "c")), Axis("y", (1.0, 2.0), travels=False)))
+    assert study.before((0, 0, 0)) == []
+    assert set(study.before((2, 2, 1))) == {(1, 2, 1), (2, 0, 1), (2, 1, 1)}
+    assert set(study.around((1, 0, 0))) == {(0, 0, 0), (2, 0, 0), (1, 1, 0), (1, 2, 0)}
+    assert len(list(study.cells())) == 18
+    assert study.problem_at((1, 1, 0)).friction.mu_t == 2.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"axes": ()}, "at least one Axis"),
+        ({"axes": (Axis("x", (1,)), Axis("x", (2,)))}, "same name"),
+        ({"name": "a b"}, "name must be"),
+        ({"chunk": 0}, "chunk must be"),
+        ({"time_limit": 0}, "must be positive"),
+        ({"problem": 3}, "must be a function"),
+        ({"axes": (Axis("x", range(1001)), Axis("y", range(1001)))}, "1000000 cells"),
+    ],
+)
+def test_bad_studies_are_refused_in_one_sentence(changes, text):
+    with pytest.raises(ProblemError, match=text):
+        grid(**changes)
+
+
+@pytest.mark.parametrize("values", [(), (1.0, 1.0), (1.0, "a"), (float("nan"),)])
+def test_bad_axes_are_refused(values):
+    with pytest.raises(ProblemError, match="axis x"):
+        Axis("x", values)
+
+
+def test_a_study_file_is_code_and_its_mistakes_are_named_with_their_line(tmp_path):
+    path = tmp_path / "s.py"
+    for text, message in (
+        ("x = 1", "states no STUDY"),
+        ("\n1/0", "line 2: ZeroDivisionError"),
+        ("STUDY = 3", "must be a Study"),
+    ):
+        path.write_text(text)
+        with pytest.raises(ProblemError, match=message):
+            read_study_file(path)
+    path.write_text(FILE)
+    study, source = read_study_file(path)
+    assert study.shape == (2, 1)
+    assert source == FILE
+
+
+def test_what_is_found_does_not_depend_on_workers_or_on_who_is_faster(fake, tmp_path, monkeypatch):
+    def slow(*arguments):
+        time.sleep(random.Random(arguments[2]).random() * 0.01)
+        return landscape(*arguments)
+
+    tables = []
+    for k, (workers, chunk) in enumerate([(1, 1), (4, 1), (4, 1), (1, 3)]):
+        monkeypatch.setattr(study_cell, "run_guess", slow)
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        run = StudyRun(grid(cold_every=3, chunk=chunk), folder)
+        finished(run, workers=workers)
+        tables.append(study_table(run).variables)
+    for table in tables[1:]:
+        np.testing.assert_array_equal(table["efficiency"], tables[0]["efficiency"])
+        np.testing.assert_array_equal(table["cos"], tables[0]["cos"])
+
+
+def test_a_good_basin_found_anywhere_spreads_everywhere_and_a_poor_one_does_not(fake, tmp_path, monkeypatch):
+    # cold starts in the cells (0, 0) and (3, 2); only the one in (3, 2) finds the good basin
+    good = lambda p, *_: ellipse(0.0, 1.9 if p.friction.mu_t == 4.0 else 1.2, 0.4)  # noqa: E731
+    monkeypatch.setattr(study_cell, "start_gait", good)
+    run = StudyRun(grid(cold_every=5, passes=0), tmp_path)
+    finished(run)
+    assert np.sum(study_table(run).variables["efficiency"] > 0.3) == 1
+    again = StudyRun(grid(cold_every=5, passes=10), tmp_path)
+    finished(again)
+    final = study_table(again).variables["efficiency"]
+    # the cell that never converges is walked around
+    assert np.isnan(final[2, 1])
+    assert np.sum(final > 0.3) == 11
+
+
+def test_a_run_that_is_left_goes_on_where_it_stopped_and_solves_nothing_twice(fake, tmp_path):
+    run = StudyRun(grid(passes=0), tmp_path)
+    seen = []
+    for progress in run.run(executor=ThreadPoolExecutor, ahead=0):
+        seen.append(progress.cell)
+        if len(seen) == 5:
+            break
+    again = StudyRun(grid(passes=0), tmp_path)
+    assert set(again.missing) == set(again.cells) - set(seen)
+    rest = [p.cell for p in finished(again)]
+    assert set(rest) | set(seen) == set(again.cells)
+    assert not set(rest) & set(seen)
+    assert finished(StudyRun(grid(passes=0), tmp_path)) == []
+    keys = [(r.problem_hash, a.key) for r in read_journal(tmp_path).records for a in r.attempts]
+    assert len(keys) == len(set(keys))
+
+
+def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path, monkeypatch):
+    def stated(x, y):
+        if x == 2.0:
+            raise ZeroDivisionError("not here")
+        return problem(x, y)
+
+    monkeypatch.setattr(study_cell, "run_guess", lambda *a: 1 / 0)
+    run = StudyRun(grid(problem=stated), tmp_path)
+    finished(run)
+    table = study_table(run).variables
+    assert set(table["status"][1]) == {NO_PROBLEM}
+    assert "x = 2.0, y = 1.0: ZeroDivisionError: not here" in table["message"][1, 0]
+    assert set(table["status"][0]) == {"error"}
+    assert "division by zero" in table["message"][0, 0]
+    assert StudyRun(grid(problem=stated), tmp_path).missing == []
+    assert len(StudyRun(grid(problem=stated), tmp_path, retry=True).missing) == 9
+    with pytest.raises(ProblemError, match="no problem in any cell"):
+        StudyRun(grid(problem=lambda x, y: 3), tmp_path)
+
+
+def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeypatch):
+    from colloc.studies import run as study_run
+    from colloc.system.task_pool import Lost
+
+    def completed(function, ready, **_):
+        while (task := ready()) is not None:
+            first = task.arguments[0][0].cell == (0, 1) and not task.arguments[0][0].tried
+            yield task, Lost("its worker died") if first else function(*task.arguments)
+
+    monkeypatch.setattr(study_run, "completed", completed)
+    run = StudyRun(grid(), tmp_path)
+    finished(run)
+    assert study_table(run).variables["starts"].min() >= 1
+    assert CRASHED in {a.outcome.status for a in run.cells[0, 1].attempts}
+    assert run.cells[0, 1].best is not None  # in the next round, from its neighbours
+
+
+def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    axes = (Axis("x", (1.0, 2.0, 3.0), "mu_t / mu_f"), Axis("kind", ("ä", "bb")))
+    run = StudyRun(grid(axes=axes, problem=lambda x, kind: problem(x, 1.0, kind)), tmp_path)
+    finished(run)
+    table = study_table(run, lambda p: 0.5 / p.friction.mu_t)
+    path = save_study(table, tmp_path / "a b" / "ü.nc", source="text", command="ä" * 70_000)
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        assert dict(data.sizes) == {"x": 3, "kind": 2, "joint": 2, "harmonic": 1}
+        assert data.efficiency.sel(x=2.0, kind="bb").item() == table.variables["efficiency"][1, 1]
+        assert data.x.attrs["long_name"] == "mu_t / mu_f"
+        assert data.efficiency.attrs["units"] == "1/weight"
+        assert list(data.kind.values) == ["ä", "bb"]
+        assert data.cos.dims == ("x", "kind", "joint", "harmonic")
+        assert data.status.values[0, 0] == SOLVED
+        np.testing.assert_allclose(data.upper_bound[:, 0], [0.5, 0.25, 0.5 / 3])
+        assert data.attrs["source"] == "text"
+        assert data.attrs["command"] == "ä" * 70_000  # more than one block of HDF5 holds
+        assert json.loads(data.attrs["versions"])["numpy"] == np.__version__
+        assert data.joint.attrs["units"] == "1"
+        assert data.message.values[0, 0] == ""
+        assert {name: data[name].dtype.kind for name in ("kind", "status", "message", "gait_class")} == dict.fromkeys(
+            ("kind", "status", "message", "gait_class"), data.kind.dtype.kind
+        )
+        assert all(isinstance(value, str) for variable in data.variables.values() for value in variable.attrs.values())
+    back = load_study(path)
+    np.testing.assert_array_equal(back.variables["efficiency"], table.variables["efficiency"])
+    assert back.dimensions["mean"] == ("x", "kind", "joint")
+    assert json.loads(back.attributes["versions"])["numpy"] == np.__version__
+    best, where = best_over(np.array([[1.0, np.nan], [np.nan, np.nan]]), 1)
+    np.testing.assert_array_equal(best, [1.0, np.nan])
+    assert where[0] == 0
+
+
+def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
+    quarter = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [1.0]])  # joint 2 repeats joint 1 a quarter period later
+    assert winding(quarter) == 1
+    assert wave_direction(quarter) == pytest.approx(1.0)
+    back = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [-1.0]])
+    assert (winding(back), wave_direction(back)) == (-1, pytest.approx(-1.0))
+    together = Fourier([0, 0], [[1.0], [1.0]], [[0.0], [0.0]])
+    assert wave_direction(together) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("mu_t", "kind"), [(20.0, RETROGRADE), (0.1, DIRECT)])
+def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
+    # the paper, section I: retrograde waves where transverse friction is large, direct ones where it is small
+    from colloc.mechanics.body import Chain
+
+    for sign in (1, -1):
+        gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
+        found = gait_class(gait, Chain(), Friction(mu_t, 1, 1))
+        assert found.kind == kind
+        assert found.symmetry == "both"
+        assert not found.retraced
+        assert abs(found.forward) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
+    from colloc.mechanics.body import Chain
+
+    gait, friction = Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]), Friction(5, 1, 1)
+    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
+    assert replay(Chain(), friction, path, 1e-3, instants=400, most_instants=400).distance > 0.01
+    assert abs(gait_class(gait, Chain(), friction).forward) > 0.9
+
+
+def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
+    path = tmp_path / "tiny.py"
+    path.write_text(FILE, encoding="utf-8")
+    out = tmp_path / "out put"
+    assert sweep_study.main([str(path), "--output", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "2 cells, 0 done already or without a problem, 2 to go" in printed
+    assert "2 of 2, 0 s left" in printed
+    table = load_study(out / "tiny.nc").variables
+    # the isotropic optimum of problems/three_link.py at a delta a hundred times larger
+    assert table["efficiency"][0, 0] == pytest.approx(0.2600, abs=2e-3)
+    assert table["gait_class"][0, 0].endswith("both")
+    assert sweep_study.main([str(path), "--output", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
+    np.testing.assert_array_equal(load_study(out / "tiny.nc").variables["efficiency"], table["efficiency"])
+
+
+def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
+    path = tmp_path / "tiny.py"
+    path.write_text(FILE, encoding="utf-8")
+    (tmp_path / "file").write_text("")
+    for options, text in (
+        (["--workers", "0"], "--workers"),
+        (["--chunk", "0"], "--chunk"),
+        (["--output", str(tmp_path / "file" / "x")], "cannot make the folder"),
+    ):
+        assert sweep_study.main([str(path), *options]) == 2
+        assert text in capsys.readouterr().err
+    assert sweep_study.main([str(tmp_path / "none.py")]) == 2
+    assert "there is no study file" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
+    path = tmp_path / "many.py"
+    path.write_text(FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))"), encoding="utf-8")
+    command = [sys.executable, "-m", "colloc.commands.sweep", str(path), "--output", str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    lines = [process.stdout.readline() for _ in range(3)]
+    process.send_signal(signal.SIGINT)
+    rest, errors = process.communicate(timeout=240)
+    assert process.returncode == 130
+    assert errors == "colloc: interrupted; what is done is kept, and the same command goes on from there.\n"
+    reported = sum(": round 0" in line or "round 0" in line for line in [*lines, *rest.splitlines()])
+    assert reported >= 2
+    kept = sum(bool(e > 0) for e in load_study(tmp_path / "tiny.nc").variables["efficiency"].ravel())
+    assert kept >= reported
+
+
+def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    path = tmp_path / "tiny.py"
+    path.write_text(FILE.replace('"mu_b", (1.0,)', '"mu_b", (1.0, 1.05)'), encoding="utf-8")
+    study, _ = read_study_file(path)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        run = StudyRun(study, tmp_path)
+        for _ in run.run(workers=2, executor=lambda n: client.get_executor(pure=False)):
+            pass
+    assert study_table(run).variables["efficiency"].min() > 0.25
+
+
+def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(tmp_path, capsys):
+    pytest.importorskip("distributed")
+    path = tmp_path / "tiny.py"
+    path.write_text(FILE, encoding="utf-8")
+    assert sweep_study.main([str(path), "--dask", "nonsense://x", "--output", str(tmp_path)]) == 2
+    assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
+    with pytest.raises(StoreError, match="cannot write"):
+        finished(StudyRun(grid(), tmp_path / "missing"))

@@ -1,0 +1,179 @@
+"""kill -9 at 120 random moments of a solve, a multi-start and a study: nothing that was finished is lost or broken.
+
+A run is forked, and killed after a random time, or (every other cycle) within milliseconds of the moment a result begins
+to be written. It says what it has finished through a pipe, after the function that writes has returned: that, with the
+very numbers, must be found afterwards. The next cycle goes on in the same folder; a complete one is started anew.
+"""
+
+import contextlib
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import pytest
+
+from colloc.commands import multistart, solve
+from colloc.commands import sweep as sweep_study
+from colloc.results import archive as store_archive
+from colloc.results import store
+from colloc.studies import campaign
+from colloc.studies import journal as study_journal
+from colloc.studies import store as _  # noqa: F401  imported before any fork
+from colloc.studies.store import load_study
+from colloc.system import task_pool
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="forks and kills")]
+CYCLES = 120
+PROBLEM = """
+from colloc import *
+PROBLEM = Problem("tiny", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, delta_start=1e-2, intervals=8,
+                  mesh_tolerance=0.0)
+"""
+STUDY = """
+from colloc import *
+from colloc.studies.study import Axis, Study
+def problem(mu_t):
+    return Problem("tiny", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t, 1, 1),
+                   delta=1e-2, delta_start=1e-2, intervals=8, mesh_tolerance=0.0)
+STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.05, 1.1, 1.15)),), problem, cold_starts=0, passes=0, warm_starts=1)
+"""
+
+
+def told(say, name, function, facts):
+    """The function, saying when it begins to write and, once it has returned, what is finished."""
+
+    def wrapped(*arguments, **options):
+        say({"begins": name})
+        result = function(*arguments, **options)
+        say({"finished": facts(*arguments)})
+        return result
+
+    return wrapped
+
+
+def child(kind, folder, pipe):
+    """Run a command to its end, in a forked process."""
+
+    def say(message):
+        os.write(pipe, json.dumps(message).encode() + b"\n")
+
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
+    if kind == "solve":
+        store.save = told(say, kind, store.save, solve_facts)
+        return solve.main([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
+    if kind == "multistart":
+        campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
+        facts = lambda archive, path: {str(k): o.gait.cos.sum() for k, o in archive.outcomes.items()}  # noqa: E731
+        store_archive.save_archive = told(say, kind, store_archive.save_archive, facts)
+        return multistart.main([str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"])
+    task_pool.process_pool = ThreadPoolExecutor
+    append = study_journal.Journal.append
+    study_journal.Journal.append = told(say, kind, append, lambda journal, records: attempt_facts(records))
+    return sweep_study.main([str(folder / "s.py"), "--output", str(folder), "--quiet"])
+
+
+def solve_facts(solution, path):
+    """What a file of one solve holds: its first level, be the run under way or finished, and the result if it is finished."""
+    facts = {"first level": solution.levels[0].x.sum()}
+    return facts if path.name.endswith(".partial.h5") else facts | {"result": solution.last.x.sum()}
+
+
+def attempt_facts(records):
+    """What the journal of a study holds: the gait of each attempt at each problem."""
+    return {f"{r.problem_hash} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts}
+
+
+def kept(kind, folder):
+    """What the files of a folder hold; every file that is there must be whole."""
+    if kind == "solve":
+        facts = {}
+        for name in ("tiny.partial.h5", "tiny.failed.h5", "tiny.h5"):
+            if (folder / name).exists():
+                facts |= solve_facts(store.load(folder / name), folder / name)
+        return facts
+    if kind == "multistart":
+        path = folder / "tiny.starts.h5"
+        outcomes = store_archive.load_archive(path).outcomes if path.exists() else {}
+        return {str(k): o.gait.cos.sum() for k, o in outcomes.items()}
+    if (folder / "tiny.nc").exists():
+        load_study(folder / "tiny.nc")
+    text = study_journal.read_journal(folder / "tiny.study")
+    assert text.damaged == 0
+    return attempt_facts(text.records)
+
+
+def cycle(kind, folder, rng, longest, at_a_write):
+    """Run and kill; what the run said it had finished, and whether it was killed before its end."""
+    read, write = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        with contextlib.suppress(BaseException):
+            os.close(read)
+            child(kind, folder, write)
+        os._exit(0)
+    os.close(write)
+    os.set_blocking(read, False)
+    begin, said = time.perf_counter(), b""
+    wait = rng.uniform(0, longest)
+    writes = int(rng.integers(1, 4)) if at_a_write else 10**9
+    while time.perf_counter() - begin < (20 * longest if at_a_write else wait):
+        if select.select([read], [], [], 0.001)[0]:
+            got = os.read(read, 2**16)
+            if not got:
+                break
+            said += got
+        if said.count(b'"begins"') >= writes:
+            time.sleep(rng.uniform(0, 0.02))
+            break
+    os.kill(pid, signal.SIGKILL)
+    status = os.waitpid(pid, 0)[1]
+    os.set_blocking(read, True)
+    with os.fdopen(read, "rb") as rest:
+        said += rest.read()
+    finished = {}
+    for line in said.decode().splitlines(keepends=True):
+        if line.endswith("\n"):
+            finished |= json.loads(line).get("finished", {})
+    return finished, os.WIFSIGNALED(status)
+
+
+def test_nothing_finished_is_lost_in_120_kills(tmp_path):
+    rng = np.random.default_rng(7)
+    seen = Counter()
+    for kind, whole in (("solve", 2), ("multistart", 4), ("sweep", 4)):
+        longest, number, before = 3.0, 0, {}
+        folder = tmp_path / f"{kind} 0"
+        folder.mkdir()
+        kills = 0
+        while kills < CYCLES // 3:
+            (folder / "p.py").write_text(PROBLEM)
+            (folder / "s.py").write_text(STUDY)
+            begin = time.perf_counter()
+            finished, killed = cycle(kind, folder, rng, longest, at_a_write=bool(kills % 2))
+            found = kept(kind, folder)
+            for key, value in (before | finished).items():
+                assert found[key] == value, f"{kind}: {key} was finished, and is lost or changed"
+            kills += killed
+            seen[f"{kind}: killed"] += killed
+            seen[f"{kind}: results checked"] += len(before | finished)
+            before = found
+            if not killed:
+                longest = time.perf_counter() - begin
+            if len(found) >= whole:
+                number, before = number + 1, {}
+                folder = tmp_path / f"{kind} {number}"
+                folder.mkdir()
+        left = list(tmp_path.rglob(".*.part"))
+        seen[f"{kind}: temporary files left"] = len(left)
+    print(dict(seen))
+    assert sum(n for name, n in seen.items() if name.endswith("killed")) >= 100
+    assert all(seen[f"{kind}: results checked"] > 10 for kind in ("solve", "multistart", "sweep"))

@@ -1,0 +1,274 @@
+"""Full disks, folders that cannot be written, two writers: a clear error or both results, never a broken file."""
+
+import contextlib
+import errno
+import multiprocessing
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from store_samples import KINDS, Samples, append, archive, outcome, record
+
+from colloc.commands import sweep as sweep_study
+from colloc.results.archive import load_archive, save_archive
+from colloc.studies.journal import Journal, read_journal
+from colloc.system.errors import CollocError, StoreError
+from colloc.system.file_lock import locked
+from colloc.system.json_cache import load_entries, save_entry
+from colloc.system.replaced_file import replaced_file
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits and processes")
+STUDY = """
+from colloc import *
+from colloc.studies.study import Axis, Study
+def problem(mu_t):
+    return Problem("tiny", ellipse(0, 2.85, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t, 1, 1),
+                   delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=0.0)
+STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1, 1.2)),), problem, cold_starts=0, passes=0)
+"""
+
+
+@contextlib.contextmanager
+def no_file_larger_than(size):
+    """What a write beyond `size` meets is an error of the system, as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def samples(three_link, tmp_path):
+    return Samples(tmp_path / "ö results", three_link)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("share", [0.05, 0.6, 0.98])
+def test_a_full_disk_is_a_clear_error_and_keeps_the_old_file(samples, kind, share):
+    path = samples.write(kind)
+    before, names = samples.read(kind), sorted(p.name for p in path.parent.iterdir())
+    size = path.stat().st_size if kind != "journal" else 300
+    with no_file_larger_than(int(share * size)), pytest.raises(CollocError, match="cannot write") as caught:
+        samples.write(kind, 1)
+    assert str(path.parent) in str(caught.value)
+    assert samples.read(kind) == before
+    left = sorted(p.name for p in path.parent.iterdir())
+    assert [n for n in left if not (n.startswith("journal-") or n.endswith(".lock"))] == [
+        n for n in names if not (n.startswith("journal-") or n.endswith(".lock"))
+    ]
+    samples.write(kind, 1)
+    assert samples.read(kind) != before
+
+
+def test_what_a_journal_says_is_written_is_on_the_disk(tmp_path, monkeypatch):
+    """Each record is flushed to the disk before `append` returns, and an error there is the writer's."""
+    flushed, fsync = [], os.fsync
+
+    def counted(handle):
+        flushed.append(os.fstat(handle).st_size)
+        fsync(handle)
+
+    monkeypatch.setattr("colloc.studies.journal.os.fsync", counted)
+    with Journal(tmp_path) as journal:
+        for k in range(3):
+            journal.append([record(k)])
+            assert flushed[k:] == [journal.path.stat().st_size]
+
+        def broken(_):
+            raise OSError(errno.EIO, "Input/output error")
+
+        monkeypatch.setattr("colloc.studies.journal.os.fsync", broken)
+        with pytest.raises(StoreError, match="Input/output error"):
+            journal.append([record(3)])
+    assert [r.attempts[0].key for r in read_journal(tmp_path).records] == ["key0", "key1", "key2"]
+
+
+def test_a_journal_goes_on_after_a_full_disk_without_a_broken_line(tmp_path):
+    with Journal(tmp_path) as journal:
+        journal.append([record(0)])
+        size = journal.path.stat().st_size
+        with no_file_larger_than(size + 100), pytest.raises(StoreError, match="What was finished before is kept"):
+            journal.append([record(1)])
+        assert journal.path.stat().st_size == size
+        journal.append([record(2)])
+    text = read_journal(tmp_path)
+    assert [r.attempts[0].key for r in text.records] == ["key0", "key2"]
+    assert text.damaged == 0
+
+
+def in_child(function, *arguments):
+    """Exit code of a forked process that runs a function; 77 for an exception."""
+    pid = os.fork()
+    if pid == 0:
+        code = 77
+        try:
+            code = function(*arguments) or 0
+        finally:
+            os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+@contextlib.contextmanager
+def open_to_others(folder, root):
+    """Others may pass through pytest's own folders: those from `folder` up to, and without, the system's temporary folder."""
+    temporary = Path(tempfile.gettempdir())
+    top = temporary if root.is_relative_to(temporary) else root.parent
+    before = {p: p.stat().st_mode for p in (folder, *folder.parents) if p.is_relative_to(top) and p != top}
+    try:
+        for p, mode in before.items():
+            p.chmod(mode | 0o011)
+        yield
+    finally:
+        for p, mode in before.items():
+            p.chmod(mode)
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(samples, tmp_path, tmp_path_factory):
+    temporary = Path(tempfile.gettempdir()).stat().st_mode
+    folder = tmp_path / "locked away"
+    folder.mkdir(mode=0o755)
+    (tmp_path / "s.py").write_text(STUDY)
+
+    def attempt():
+        if os.geteuid() == 0:
+            os.setuid(65534)  # nobody: permissions do not stop the superuser
+        else:
+            os.chmod(folder, 0o555)
+        refused = 0
+        for kind in KINDS:
+            samples.folder = folder
+            with contextlib.suppress(PermissionError):
+                os.makedirs(folder, exist_ok=True)
+            try:
+                samples.write(kind)
+            except CollocError as error:
+                refused += "cannot write" in str(error) and str(folder) in str(error)
+        return 10 * (refused == len(KINDS))
+
+    with open_to_others(tmp_path, tmp_path_factory.getbasetemp()):
+        assert in_child(attempt) == 10
+    assert list(folder.iterdir()) == []
+    assert Path(tempfile.gettempdir()).stat().st_mode == temporary
+
+
+def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
+    (tmp_path / "s.py").write_text(STUDY)
+    folder = tmp_path / "out" / "tiny.study"
+    with locked(folder / "lock"):
+        assert sweep_study.main([str(tmp_path / "s.py"), "--output", str(tmp_path / "out")]) == 2
+    assert f"in use by process {os.getpid()} on" in capsys.readouterr().err
+    with locked(folder / "lock"):
+        pass
+
+
+def _write_many(kind, folder, who, count):
+    folder = Path(folder)
+    for k in range(count):
+        if kind == "cache":
+            save_entry(folder / "c.json", f"{who}-{k}", {"value": k})
+        elif kind == "archive":
+            mine = archive([])
+            mine.outcomes[1000 * who + k] = outcome(1000 * who + k, 0.1 + 0.001 * k)
+            save_archive(mine, folder / "a.h5")
+        else:
+            append(folder, [record(1000 * who + k)])
+
+
+@pytest.mark.parametrize("kind", ["cache", "archive", "journal"])
+def test_two_writers_at_once_end_with_both_results(kind, tmp_path):
+    count = 12
+    context = multiprocessing.get_context("fork")
+    writers = [context.Process(target=_write_many, args=(kind, tmp_path, who, count)) for who in (1, 2)]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join()
+    if kind == "cache":
+        found = set(load_entries(tmp_path / "c.json"))
+        assert found == {f"{who}-{k}" for who in (1, 2) for k in range(count)}
+    elif kind == "archive":
+        outcomes = load_archive(tmp_path / "a.h5").outcomes
+        assert sorted(outcomes) == [1000 * who + k for who in (1, 2) for k in range(count)]
+        assert outcomes[2003].efficiency == 0.1 + 0.001 * 3
+    else:
+        text = read_journal(tmp_path)
+        assert text.damaged == 0
+        assert sorted(r.attempts[0].key for r in text.records) == sorted(
+            f"key{1000 * w + k}" for w in (1, 2) for k in range(count)
+        )
+
+
+def test_readers_see_the_old_file_or_the_new_one_while_it_is_replaced(samples):
+    path = samples.write("arrays")
+    pid = os.fork()
+    if pid == 0:
+        for k in range(40):
+            samples.write("arrays", k)
+        os._exit(0)
+    seen = set()
+    while os.waitpid(pid, os.WNOHANG)[0] == 0:
+        seen.add(samples.read("arrays", path)["a/b"][0])
+    assert seen <= set(map(float, range(40)))
+    assert len(seen) > 1
+
+
+def test_what_killed_processes_left_behind_is_swept_after_an_hour(tmp_path):
+    old, new, other = (tmp_path / f".{name}.part" for name in ("x[1].h5.aaa", "x[1].h5.bbb", "y.h5.ccc"))
+    for path in (old, new, other):
+        path.write_bytes(b"left")
+    os.utime(old, (0, 0))
+    os.utime(other, (0, 0))
+    with replaced_file(tmp_path / "x[1].h5") as name:
+        Path(name).write_bytes(b"whole")
+    assert [p.exists() for p in (old, new, other)] == [False, True, True]
+    assert (tmp_path / "x[1].h5").read_bytes() == b"whole"
+
+
+def test_an_error_of_the_disk_when_a_file_is_flushed_is_reported(tmp_path, monkeypatch):
+    def broken(_):
+        raise OSError(errno.EIO, "Input/output error")
+
+    (tmp_path / "x").write_text("old")
+    monkeypatch.setattr("colloc.system.replaced_file.os.fsync", broken)
+    with pytest.raises(StoreError, match="Input/output error"), replaced_file(tmp_path / "x") as name:
+        Path(name).write_text("new")
+    assert (tmp_path / "x").read_text() == "old"
+
+
+def _fill(samples, kind):
+    for version in range(1, 400):
+        samples.write(kind, version)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="mounting a small disk needs the superuser")
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_small_disk_that_fills_up(samples, kind, tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)], capture_output=True).returncode:
+        pytest.skip("no file system may be mounted here")
+    try:
+        samples.folder = disk
+        samples.write(kind)
+        before = samples.read(kind)
+        filling = np.zeros(2**20, dtype="u1").tobytes()
+        with contextlib.suppress(OSError), open(disk / "filling", "wb", buffering=0) as file:
+            while file.write(filling):
+                pass
+        with pytest.raises(CollocError, match="cannot write"):
+            _fill(samples, kind)
+        (disk / "filling").unlink()
+        after = samples.read(kind)
+        if kind != "journal":
+            assert after == before
+        samples.write(kind, 1)
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)

@@ -1,0 +1,141 @@
+"""The pool: nothing is lost with a worker, order may depend on results, one BLAS thread a process."""
+
+import os
+import signal
+import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from colloc.system.task_pool import Lost, Task, completed, process_pool
+
+
+def listed(tasks):
+    waiting = iter(tasks)
+    return lambda: next(waiting, None)
+
+
+def doubled(x):
+    return 2 * x
+
+
+def dying_once(x, folder):
+    """Kills its own process the first time it is called with 3, and every time with 5."""
+    flag = os.path.join(folder, f"died-{x}")
+    if x == 5 or (x == 3 and not os.path.exists(flag)):
+        open(flag, "w").close()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 2 * x
+
+
+def threads_in_use(n):
+    a = np.random.default_rng(0).normal(size=(n, n))
+    for _ in range(3):
+        a = a @ a / np.linalg.norm(a)
+    return len(os.listdir("/proc/self/task")), os.environ["OPENBLAS_NUM_THREADS"]
+
+
+def test_a_worker_killed_mid_run_loses_nothing_and_one_that_always_dies_is_named(tmp_path):
+    tasks = [Task(x, (x, str(tmp_path))) for x in range(9)]
+    found = {task.key: result for task, result in completed(dying_once, listed(tasks), workers=2, ahead=2)}
+    assert {x: r for x, r in found.items() if x != 5} == {x: 2 * x for x in range(9) if x != 5}
+    assert isinstance(found[5], Lost)
+    assert "died twice" in found[5].message
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="counts threads in /proc")
+def test_blas_threads_do_not_multiply_with_processes(monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
+    ((_, (count, setting)),) = completed(threads_in_use, listed([Task(0, (600,))]), workers=1)
+    assert setting == "1"
+    # the main thread, the one that watches the parent, and the queue's feeder if it has started
+    assert count <= 3
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
+
+
+def test_a_task_may_wait_for_the_result_of_another():
+    known = {0: 1}
+
+    def ready():
+        last = max(known)
+        return Task(last + 1, (known[last],)) if last < 6 and last + 1 not in asked and not asked.add(last + 1) else None
+
+    asked = set()
+    for task, result in completed(doubled, ready, workers=3, executor=ThreadPoolExecutor):
+        known[task.key] = result
+    assert known == {k: 2**k for k in range(7)}
+
+
+class Unreliable(Executor):
+    """Like a cluster that gives up on a task: an exception that is no result, every time for 4, once for 2."""
+
+    failed: ClassVar[set] = set()
+
+    def __init__(self, _):
+        pass
+
+    def submit(self, function, x):
+        future = Future()
+        if x == 4 or (x == 2 and 2 not in self.failed):
+            self.failed.add(x)
+            future.set_exception(ConnectionError("worker gone"))
+        else:
+            future.set_result(function(x))
+        return future
+
+    def shutdown(self, wait=True):
+        pass
+
+
+def test_what_a_cluster_gives_up_on_is_tried_again_alone_and_then_named():
+    Unreliable.failed.clear()
+    found = {t.key: r for t, r in completed(doubled, listed(Task(x, (x,)) for x in range(6)), workers=2, executor=Unreliable)}
+    assert found[2] == 4
+    assert found[4] == Lost("its worker failed twice (ConnectionError: worker gone).")
+    assert sorted(found) == list(range(6))
+
+
+class Broken(Executor):
+    def submit(self, *_):
+        raise BrokenProcessPool("cannot start")
+
+
+def test_a_pool_that_never_starts_is_an_error_and_not_an_endless_loop():
+    with pytest.raises(BrokenProcessPool):
+        list(completed(doubled, listed([Task(0, (0,))]), workers=2, executor=lambda n: Broken()))
+
+
+def test_nobody_waits_for_work_under_way_once_the_run_is_left():
+    run = completed(time.sleep, listed([Task(0, (0.0,)), Task(1, (5.0,))]), workers=2, executor=ThreadPoolExecutor)
+    begin = time.perf_counter()
+    next(run)
+    run.close()
+    assert time.perf_counter() - begin < 3.0
+
+
+def test_workers_do_not_outlive_a_parent_that_is_killed():
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(read)
+        with process_pool(1) as pool:
+            os.write(write, str(pool.submit(os.getpid).result()).encode())
+            time.sleep(60)
+        os._exit(0)
+    os.close(write)
+    worker = int(os.read(read, 100))
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    for _ in range(100):
+        try:
+            with open(f"/proc/{worker}/stat") as file:
+                gone = file.read().rpartition(")")[2].split()[0] == "Z"
+        except OSError:
+            gone = True
+        if gone:
+            break
+        time.sleep(0.05)
+    assert gone

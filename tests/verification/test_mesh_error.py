@@ -1,0 +1,189 @@
+"""The error estimate of a mesh against references that share nothing with it, and meshes planned from it."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from benchmarks.error_control import CASES, case_problem, held, outcome
+from colloc.collocation.layout import problem_mesh
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.problem import Problem
+from colloc.mechanics.balance import instant
+from colloc.mechanics.contact import crossing_depth
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
+from colloc.search import continuation
+from colloc.search.continuation import continue_delta
+from colloc.search.optimise import maximise_efficiency
+from colloc.verification import refinement
+from colloc.verification.adaptive_motion import fine_motion, rates_at
+from colloc.verification.kinks import kink_phases
+from colloc.verification.mesh_error import constraint_violation, gait_motion, mesh_error
+from colloc.verification.refinement import kink_knots, moved_knots, planned_mesh
+from colloc.verification.replay import replay
+
+GAIT = ellipse(0, 2.8, 1.25)
+DELTA = 1e-3
+
+
+def problem(name="gauss-3", friction=Friction(), **changes):
+    fields = {"delta": DELTA, "delta_start": DELTA, "gait": Harmonic(1, "bilateral"), "intervals": 20, "scheme": name}
+    return Problem("p", GAIT, friction=friction, **(fields | changes))
+
+
+@cache
+def replayed(friction):
+    return replay(problem().body, friction, path, DELTA, tolerance=1e-9, instants=6400, most_instants=25600)
+
+
+def path(t):
+    return GAIT.angles(t), GAIT.rates(t)
+
+
+@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+def test_adaptive_panels_agree_with_a_uniform_replay(friction):
+    fine = fine_motion(problem().body, friction, path, DELTA, np.linspace(0, 1, 21), 1e-8)
+    known = replayed(friction)
+    assert fine.unresolved.sum() <= 1e-8
+    assert abs(fine.path[-1]) == pytest.approx(known.distance, rel=1e-7)
+    assert fine.work[-1] == pytest.approx(known.work, rel=1e-7)
+    # dense output: the same motion from panels that end elsewhere
+    other = fine_motion(problem().body, friction, path, DELTA, np.linspace(0, 1, 24), 1e-8)
+    t = np.random.default_rng(5).uniform(0, 1, 200)
+    for mine, theirs in zip(fine.at(t), other.at(t), strict=True):
+        np.testing.assert_allclose(mine, theirs, atol=1e-7)
+
+
+@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+@pytest.mark.parametrize("name", ["trapezoid", "hermite-simpson", "gauss-2", "gauss-5", "radau-3"])
+def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, friction):
+    # collocating a given gait, by the scheme's own quadrature written out here
+    stated = problem(name, friction)
+    mesh = problem_mesh(stated)
+    error = mesh_error(stated, mesh, GAIT, DELTA, 1e-7)
+    t = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
+    rates = rates_at(stated.body, friction, path, DELTA, t)
+    theta, x, work = 0.0, 0.0, 0.0
+    for k in range(mesh.n):
+        stage = theta + mesh.h[k] * mesh.scheme.A @ rates.z[2, k]
+        x += mesh.h[k] * mesh.scheme.b @ (np.exp(1j * stage) * rates.centre[k])
+        work += mesh.h[k] * mesh.scheme.b @ rates.power[k]
+        theta += mesh.h[k] * mesh.scheme.b @ rates.z[2, k]
+    true = abs(x) / work / replayed(friction).efficiency - 1
+    assert error.total == pytest.approx(true, rel=2e-3, abs=3e-8)
+    assert abs(true) <= 1.02 * error.estimate
+    assert error.efficiency.sum() == pytest.approx(true, rel=0.1, abs=1e-6)
+
+
+def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
+    # at delta = 10, faster than all links, friction is viscous and the motion smooth
+    stated = problem(delta=10.0, delta_start=10.0)
+    for name, order in (("gauss-2", 4), ("radau-2", 3), ("gauss-3", 6)):
+        meshes = (Mesh(scheme(name), np.linspace(0, 0.5, n + 1)) for n in (20, 40))
+        coarse, fine = (np.abs(mesh_error(stated, mesh, GAIT, 10.0, 1e-11).work).sum() for mesh in meshes)
+        assert np.log2(coarse / fine) == pytest.approx(order, abs=0.5)
+
+
+def test_velocity_error_is_largest_where_links_stick():
+    stated = problem()
+    mesh = problem_mesh(stated)
+    error = mesh_error(stated, mesh, GAIT, DELTA)
+    fine = gait_motion(stated, GAIT, DELTA, mesh.edges, 1e-7)
+    kinks = kink_phases(stated.body, stated.friction, path, DELTA, fine)
+    worst = int(error.velocity.argmax())
+    assert np.any((kinks > mesh.edges[worst] - mesh.h[0]) & (kinks < mesh.edges[worst + 1] + mesh.h[0]))
+
+
+@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
+    stated = problem(friction=friction)
+    fine = gait_motion(stated, GAIT, DELTA, np.linspace(0, 0.5, 21), 1e-6)
+    kinks = kink_phases(stated.body, friction, path, DELTA, fine)
+    assert 4 <= kinks.size <= 24
+    # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 = 0)
+    np.testing.assert_allclose(np.sort(0.5 - kinks), kinks, atol=2e-4)
+    angles, rates = path(kinks)
+    z = solve_balance(stated.body, friction, angles, rates, DELTA).z
+    slow = np.abs(instant(stated.body, friction, angles, rates, z, DELTA).velocity.vs).min(axis=0)
+    assert (slow < 30 * DELTA).all()
+
+
+def test_knots_move_onto_kinks_and_keep_the_rest():
+    edges = np.linspace(0, 1, 11)
+    moved = moved_knots(edges, np.array([0.31, 0.55]))
+    np.testing.assert_allclose(moved, [0, 0.1, 0.2, 0.31, 0.4, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9, 1])
+    assert moved_knots(edges, np.array([])).size == 11
+
+
+def test_knots_on_kinks_save_points(monkeypatch):
+    stated = problem("gauss-7", intervals=16)
+    mesh = problem_mesh(stated)
+    with_knots = planned_mesh(stated, mesh, GAIT, DELTA, 1e-6)
+    monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.empty(0))
+    without = planned_mesh(stated, mesh, GAIT, DELTA, 1e-6)
+    points = [(plan.edges.size - 1) * scheme(plan.scheme).s for plan in (with_knots, without)]
+    assert points[0] < 0.9 * points[1]
+    fine = gait_motion(stated, GAIT, DELTA, mesh.edges, 1e-7)
+    knots = kink_knots(stated, GAIT, DELTA, fine)
+    assert np.abs(with_knots.edges[:, None] - knots).min(axis=0).max() < 1e-4
+
+
+@pytest.mark.parametrize("name", ["gauss-2", "gauss-3", "radau-3", "hermite-simpson"])
+def test_planned_meshes_are_as_accurate_as_they_say(name):
+    stated = problem(name)
+    for tolerance in (1e-4, 1e-6):
+        plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, tolerance)
+        assert plan.reached
+        error = mesh_error(stated, Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 0.1 * tolerance)
+        assert abs(error.total) <= error.estimate <= 1.1 * tolerance
+        again = planned_mesh(stated, Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1.1 * tolerance)
+        assert again is None
+
+
+def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
+    stated = problem("gauss-2", mesh_tolerance=1e-7, intervals=20)
+    plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, 1e-7, most_points=60)
+    assert not plan.reached
+    assert plan.estimate > 1e-7
+    small = planned_mesh
+    monkeypatch.setattr(continuation, "planned_mesh", lambda *a, **k: small(*a, **k, most_points=60))
+    solution = maximise_efficiency(stated)
+    assert solution.status == "certificate failed"
+    assert "mesh error" in solution.message
+    assert "mesh error" in [check.name for check in solution.certificate.failures]
+
+
+def test_a_refined_solution_knows_its_scheme_and_its_error():
+    stated = problem("gauss-2", mesh_tolerance=1e-5)
+    solution = continue_delta(stated)
+    assert solution.last.optimal
+    assert solution.last.scheme == solution.mesh.scheme.name != "gauss-2"
+    gait = solution.gait
+    known = replay(stated.body, stated.friction, lambda t: (gait.angles(t), gait.rates(t)), DELTA, tolerance=1e-8)
+    assert abs(solution.efficiency / known.efficiency - 1) < 1e-5
+
+
+def test_violations_are_reported_in_the_interval_where_they_are():
+    stated = problem()
+    mesh = problem_mesh(stated)
+    assert constraint_violation(stated, mesh, GAIT).max() == 0
+    wide = Fourier(GAIT.mean, 1.2 * GAIT.cos, 1.2 * GAIT.sin)
+    violation = constraint_violation(stated, mesh, wide)
+    t = np.linspace(0, 0.5, 2001)
+    excess = np.maximum(np.abs(wide.angles(t)).max(axis=0) - np.pi, crossing_depth(stated.body, wide.angles(t)))
+    cells = np.unique(np.clip(np.searchsorted(mesh.edges, t[excess > 1e-3]) - 1, 0, mesh.n - 1))
+    assert cells.size
+    assert (violation[cells] > 0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", range(len(CASES)), ids=[case[0].replace(" ", "-") for case in CASES])
+def test_estimate_is_never_optimistic_by_more_than_a_factor_two(index):
+    result = outcome(case_problem(index))
+    if not result["optimal"]:
+        pytest.skip(result["message"])
+    assert held(result, "against replay"), result
+    assert result["against optimum"] is None or held(result, "against optimum"), result
