@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.command_end import OK, run
+from colloc.commands.ending import OK, run
 from colloc.commands.options import add_result, new_parser, output_kind, output_path
 from colloc.results.solution import Solution
 from colloc.results.store import load

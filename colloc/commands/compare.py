@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.command_end import OK, run
+from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, new_parser
 from colloc.results.certificate import gait_path
 from colloc.results.distinct_optima import SAME_EFFICIENCY, SAME_GAIT

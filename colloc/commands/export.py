@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.command_end import OK, run
+from colloc.commands.ending import OK, run
 from colloc.commands.options import add_result, new_parser, output_kind, output_path
 from colloc.results.certificate import gait_path
 from colloc.results.solution import Solution

@@ -12,7 +12,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.command_end import NONE_FOUND, OK, run
+from colloc.commands.ending import NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.command_end import OK, run
+from colloc.commands.ending import OK, run
 from colloc.commands.options import add_result, new_parser, output_path
 from colloc.gaits.problem import Reference
 from colloc.pictures.report_page import report_page

@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colloc.command_end import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
+from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.paths import ArcPath
 from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import read_problem_file
-from colloc.level import Level
+from colloc.results.level import Level
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.progress import StatusLine, duration

@@ -17,7 +17,7 @@ from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import replace
 from pathlib import Path
 
-from colloc.command_end import INTERRUPTED, NONE_FOUND, OK, run
+from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
 from colloc.commands.options import add_printing, new_parser
 from colloc.studies.study import Study, read_study_file
 from colloc.system.errors import ProblemError, StoreError

@@ -13,7 +13,7 @@ import json
 import sys
 from collections.abc import Sequence
 
-from colloc.command_end import FAILED, OK, run
+from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import add_printing, add_result, new_parser
 from colloc.results.certificate import certify
 from colloc.results.solution import Certificate, Solution

@@ -82,7 +82,8 @@ class Problem:
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"condensed", "map", "lifted"}
-        How the balance becomes constraints, see `collocation.point_equations`; "condensed" eliminates them, see `collocation.reduced_space`.
+        How the balance becomes constraints, see `collocation.point_equations`; "condensed" eliminates them, see
+        `collocation.reduced_space`.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """

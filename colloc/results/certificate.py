@@ -59,7 +59,7 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     delta, breaks = solution.delta_per_period, corner_phases(solution.gait)
     fine = replay(problem.body, problem.friction, path, delta, instants=instants, tolerance=tolerance, breaks=breaks)
     at_tenth = replay(
-        problem.body, problem.friction, path, 0.1 * delta, instants=fine.instants, tolerance=tolerance, breaks=breaks
+        problem.body, problem.friction, path, 0.1 * delta, instants=fine.instants, tolerance=tolerance, breaks=breaks, near=fine
     )
     # the influence of delta is linear to leading order: the rest is a ninth of the last step
     at_zero = at_tenth.efficiency + (at_tenth.efficiency - fine.efficiency) / 9

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.level import Level
+from colloc.results.level import Level
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 

@@ -12,11 +12,11 @@ import numpy as np
 from colloc.collocation.layout import RADIANS, Layout, problem_layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.level import Level
 from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.results.level import Level
 from colloc.results.solution_card import solution_card
 from colloc.system.errors import ProblemError
 

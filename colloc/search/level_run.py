@@ -11,8 +11,8 @@ from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import CONDENSED, Problem
-from colloc.level import Level
 from colloc.mechanics.contact import Pairs
+from colloc.results.level import Level
 from colloc.search.closure import closed_parameters, opened_parameters
 from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.search.nlp import NlpResult, Solver

@@ -16,7 +16,7 @@ from colloc.collocation.transcription import Transcription
 from colloc.gaits.problem import CONDENSED
 from colloc.numerics.blocks import Oracles, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
-from colloc.stop_request import StopRequest
+from colloc.search.stop_request import StopRequest
 from colloc.system.interruption import interruptible
 
 IPOPT_OPTIONS: dict[str, object] = {

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
-from colloc.level import Level
 from colloc.results.certificate import certify
+from colloc.results.level import Level
 from colloc.results.solution import Solution
 from colloc.search.continuation import continue_delta
 from colloc.search.level_run import TRIVIAL, Report

@@ -12,9 +12,9 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, seed_class, start_gait
-from colloc.level import Level
 from colloc.numerics.machine_code import compiler
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
+from colloc.results.level import Level
 from colloc.results.solution import Certificate, Solution
 from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import is_trivial, maximise_efficiency

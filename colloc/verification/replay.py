@@ -7,14 +7,15 @@ solved for on a uniform grid over the whole period and integrated by Simpson's r
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_simpson, simpson
 
-from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
@@ -42,6 +43,8 @@ class Replay:
     error : float
         Estimated relative error of the efficiency, from the grid of half as many instants.
     instants : int
+    tail : ((n,), (3, n))
+        Phases and tail velocities there.
     """
 
     distance: float
@@ -52,43 +55,56 @@ class Replay:
     residual: float
     error: float
     instants: int
+    tail: tuple[np.ndarray, np.ndarray] = field(repr=False, compare=False)
+
+    def tail_velocity(self, t: np.ndarray) -> np.ndarray:
+        """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
+        known, z = self.tail
+        return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
 
-def _actuator_power(body: Chain, now: Instant, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Power of the joint moments, ``(n_time,)``: moment at a joint balances the friction on all links ahead of it."""
-    x, y = body.joints(angles)
-    fx = now.force.tangential * now.posture.cos - now.force.normal * now.posture.sin
-    fy = now.force.tangential * now.posture.sin + now.force.normal * now.posture.cos
-    power = np.zeros(angles.shape[1])
-    for joint in range(body.n_joint):
-        ahead = slice(joint + 1, None)
-        arm_x, arm_y = now.posture.x[ahead] - x[joint + 1], now.posture.y[ahead] - y[joint + 1]
-        moment = (arm_x * fy[ahead] - arm_y * fx[ahead] + now.force.couple[ahead]).sum(axis=0)
-        power -= moment * rates[joint]
-    return power
+class _Samples(NamedTuple):
+    """Of one piece of the period without jumps, each ``(n,)``, tail velocities ``(3, n)``."""
+
+    t: np.ndarray
+    z: np.ndarray
+    centre_x: np.ndarray
+    centre_y: np.ndarray
+    power: np.ndarray
+    actuator_power: np.ndarray
+    residual: np.ndarray
+
+    def every(self, n: int) -> _Samples:
+        return _Samples(*(a[..., ::n] for a in self))
+
+    def interleaved(self, new: _Samples) -> _Samples:
+        """With the samples `new` in between."""
+        merged = []
+        for a, b in zip(self, new, strict=True):
+            both = np.empty((*a.shape[:-1], a.shape[-1] + b.shape[-1]))
+            both[..., ::2], both[..., 1::2] = a, b
+            merged.append(both)
+        return _Samples(*merged)
 
 
-def _at(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Times, rotation rate, centre velocity, power, actuator power and residual at instants t."""
+def _sampled(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None) -> _Samples:
     angles, rates = path(t)
-    solved = solve_balance(body, friction, angles, rates, delta).require()
-    now = instant(body, friction, angles, rates, solved.z, delta)
-    cx, cy = body.centre_velocity(now.posture, now.velocity)
-    power = total_power(now.velocity, now.force)[0]
-    return t, solved.z[2], cx[0], cy[0], power, _actuator_power(body, now, angles, rates), solved.residual
+    solved = solve_balance(body, friction, angles, rates, delta, start=near).require()
+    motion = chain_motion(body, friction, angles, rates, delta, solved)
+    return _Samples(t, motion.z, motion.centre[0], motion.centre[1], motion.power, motion.actuator_power, solved.residual)
 
 
-def _integrated(segments: list[tuple[np.ndarray, ...]], every: int) -> tuple[float, float, float, float, float]:
+def _integrated(segments: list[_Samples], every: int) -> tuple[float, float, float, float, float]:
     """Distance, work, rotation, actuator work and largest residual, by Simpson's rule on every `every`-th instant."""
     heading, end, worked, actuated, worst = 0.0, 0j, 0.0, 0.0, 0.0
     for segment in segments:
-        t, omega, cx, cy, power, actuator, residual = (a[::every] for a in segment)
-        theta = heading + cumulative_simpson(omega, x=t, initial=0.0)
-        c, s = np.cos(theta), np.sin(theta)
-        end += simpson(c * cx - s * cy, x=t) + 1j * simpson(s * cx + c * cy, x=t)
+        s = segment.every(every)
+        theta = heading + cumulative_simpson(s.z[2], x=s.t, initial=0.0)
+        cos, sin = np.cos(theta), np.sin(theta)
+        end += simpson(cos * s.centre_x - sin * s.centre_y, x=s.t) + 1j * simpson(sin * s.centre_x + cos * s.centre_y, x=s.t)
         heading = float(theta[-1])
-        worked, actuated = worked + float(simpson(power, x=t)), actuated + float(simpson(actuator, x=t))
-        worst = max(worst, float(residual.max()))
+        worked, actuated = worked + float(simpson(s.power, x=s.t)), actuated + float(simpson(s.actuator_power, x=s.t))
+        worst = max(worst, float(s.residual.max()))
     return float(abs(end)), worked, heading, actuated, worst
 
 
@@ -102,6 +118,7 @@ def replay(
     tolerance: float = 1e-6,
     most_instants: int = 25600,
     breaks: np.ndarray | tuple[float, ...] = (),
+    near: Replay | None = None,
 ) -> Replay:
     """Distance, work and efficiency of a path over one period, to a relative error in the efficiency.
 
@@ -119,6 +136,8 @@ def replay(
     most_instants : int
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump (corners); they are integrated up to and from there.
+    near : Replay, optional
+        Of the same path or one like it: solves start from its velocities, which saves time and changes nothing else.
 
     Raises
     ------
@@ -138,7 +157,8 @@ def replay(
         inside = grid.copy()
         inside[0] += _ONE_SIDED * (b - a) if a > 0 else 0.0
         inside[-1] -= _ONE_SIDED * (b - a) if b < 1 else 0.0
-        segments.append((grid, *_at(body, friction, path, delta, inside)[1:]))
+        start = None if near is None else near.tail_velocity(grid)
+        segments.append(_sampled(body, friction, path, delta, inside, start)._replace(t=grid))
     while True:
         fine, coarse = _integrated(segments, 1), _integrated(segments, 2)
         if not (fine[1] > 0 and coarse[1] > 0):
@@ -146,16 +166,11 @@ def replay(
         # kinks at stick limit the order to two: the difference over three estimates the finer grid's error
         efficiency, before = fine[0] / fine[1], coarse[0] / coarse[1]
         error = abs(efficiency - before) / 3 / max(abs(efficiency), 1e-300)
-        n = sum(segment[0].size - 1 for segment in segments)
+        n = sum(segment.t.size - 1 for segment in segments)
         if error <= tolerance or 2 * n > most_instants:
-            return Replay(fine[0], fine[1], efficiency, fine[2], fine[3], fine[4], error, n)
-        segments = [_interleaved(old, _at(body, friction, path, delta, 0.5 * (old[0][1:] + old[0][:-1]))) for old in segments]
-
-
-def _interleaved(old: tuple[np.ndarray, ...], new: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    result = []
-    for a, b in zip(old, new, strict=True):
-        merged = np.empty(a.size + b.size)
-        merged[::2], merged[1::2] = a, b
-        result.append(merged)
-    return tuple(result)
+            known = np.concatenate([s.t[:-1] for s in segments]), np.concatenate([s.z[:, :-1] for s in segments], axis=1)
+            return Replay(fine[0], fine[1], efficiency, fine[2], fine[3], fine[4], error, n, known)
+        segments = [
+            old.interleaved(_sampled(body, friction, path, delta, *(0.5 * (a[..., 1:] + a[..., :-1]) for a in (old.t, old.z))))
+            for old in segments
+        ]

@@ -164,7 +164,7 @@ def test_code_of_another_user_is_not_run(part, folder, monkeypatch):
         found = list(stat(path, **options))
         return os.stat_result([*found[:4], 4711, *found[5:]]) if Path(path) == theirs else os.stat_result(found)
 
-    monkeypatch.setattr("colloc.private_folder.os.stat", other)
+    monkeypatch.setattr("colloc.system.private_folder.os.stat", other)
     assert not is_compiled(machine_code([function])[0])
     if part == "folder":
         with compiling(), pytest.raises(StoreError, match="belongs to another user"):

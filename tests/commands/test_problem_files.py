@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = {
     "concertina": ("scripts.continue_epsilon", r"0\.001 .*0\.99"),
     "concertina_anisotropic": ("scripts.continue_epsilon", r"forwards-1.7-1-1.3"),

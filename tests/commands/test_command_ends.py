@@ -13,7 +13,7 @@ import pytest
 from colloc.bounds.optimality_gap import upper_bound
 from colloc.bounds.sampled import QUICK as BUDGET
 from colloc.bounds.sampled import Domain, bound_key
-from colloc.command_end import exit_code
+from colloc.commands.ending import exit_code
 from colloc.commands.main import main as colloc
 from colloc.commands.solve import summary_lines
 from colloc.gaits.problem_file import read_problem_file
