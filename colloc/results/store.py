@@ -75,8 +75,13 @@ def load(path: str | os.PathLike[str]) -> Solution:
         If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
     """
     changed = was_changed(Path(path), FORMAT)
-    with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:
-        solution = _read(file)
+    try:
+        with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:
+            solution = _read(file)
+    except StoreError as error:
+        if not changed:
+            raise
+        raise StoreError(f"{path} was changed after colloc wrote it, and cannot be read any more: {error}") from None
     if changed:
         solution.changed = True
         message = f"{path} was changed after colloc wrote it; colloc verify {path} says what it is worth."
