@@ -13,7 +13,8 @@ import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant, net_force, total_power
 from colloc.mechanics.body import Chain
-from colloc.mechanics.friction import Friction, link_dissipation
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_dissipation
 
 _UNIT = Friction()
 _SHRINK = (0.5,) * 3 + (0.1,) * 5

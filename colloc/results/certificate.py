@@ -59,11 +59,15 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     if instants is None:
         instants = max(1600, 2 * int(np.ceil(5 * solution.mesh.n_point / problem.gait.fraction)))
     delta, breaks = solution.delta_per_period, corner_phases(solution.gait)
-    fine, at_tenth, at_hundredth = (
-        replay(problem.body, problem.friction, path, part * delta, instants=instants, tolerance=tolerance, breaks=breaks)
-        for part in (1.0, 0.1, 0.01)
-    )
-    replays = fine, at_tenth, at_hundredth
+
+    def replayed_at(part: float, near: Replay | None) -> Replay:
+        return replay(
+            problem.body, problem.friction, path, part * delta, instants=instants, tolerance=tolerance, breaks=breaks, near=near
+        )
+
+    fine = replayed_at(1.0, None)
+    at_tenth = replayed_at(0.1, fine)
+    replays = fine, at_tenth, replayed_at(0.01, at_tenth)
     errors = [replayed.efficiency * (replayed.error + replayed.turning) for replayed in replays]
     limit = extrapolated_limit([replayed.efficiency for replayed in replays], errors)
     checks = (

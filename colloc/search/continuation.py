@@ -15,10 +15,11 @@ import numpy as np
 
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
-from colloc.friction_unit import in_friction_units, restated
 from colloc.gaits.problem import Problem
-from colloc.results.solution import Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Solution
 from colloc.search.diagnosis import explanation, redundant_equations
+from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.level_run import LOWER_START, REMESH_RADIUS, SMALLEST_RADIUS, TRIVIAL, Report, Run
 from colloc.search.nlp import NlpResult, Solver
 from colloc.search.path_start import transcribed

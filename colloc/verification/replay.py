@@ -9,14 +9,14 @@ between the instants, so those of different panels may well cancel by accident, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
@@ -54,6 +54,8 @@ class Replay:
     error : float
         Relative error of the efficiency: what halving the panels changes, summed as magnitudes, and the residual.
     instants : int
+    tail : ((n,), (3, n))
+        Phases and tail velocities there.
     """
 
     distance: float
@@ -65,6 +67,12 @@ class Replay:
     residual: float
     error: float
     instants: int
+    tail: tuple[np.ndarray, np.ndarray] = field(repr=False, compare=False)
+
+    def tail_velocity(self, t: np.ndarray) -> np.ndarray:
+        """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
+        known, z = self.tail
+        return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
     @property
     def turning(self) -> float:
@@ -72,27 +80,13 @@ class Replay:
         return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
 
 
-def _actuator_power(body: Chain, now: Instant, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Power of the joint moments, ``(n_time,)``: moment at a joint balances the friction on all links ahead of it."""
-    x, y = body.joints(angles)
-    fx = now.force.tangential * now.posture.cos - now.force.normal * now.posture.sin
-    fy = now.force.tangential * now.posture.sin + now.force.normal * now.posture.cos
-    power = np.zeros(angles.shape[1])
-    for joint in range(body.n_joint):
-        ahead = slice(joint + 1, None)
-        arm_x, arm_y = now.posture.x[ahead] - x[joint + 1], now.posture.y[ahead] - y[joint + 1]
-        moment = (arm_x * fy[ahead] - arm_y * fx[ahead] + now.force.couple[ahead]).sum(axis=0)
-        power -= moment * rates[joint]
-    return power
-
-
 class _Panels(NamedTuple):
-    """Panels in order of time: left end and width ``(n,)``, and at five instants of each ``(n, 5)``: rotation rate, velocity of
-    the centre of mass in the body frame (complex), power, power of the joints, residual and lever."""
+    """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
+    of the centre of mass in the body frame (complex), power, power of the joints, residual and lever ``(n, 5)``."""
 
     left: np.ndarray
     width: np.ndarray
-    omega: np.ndarray
+    z: np.ndarray
     centre: np.ndarray
     power: np.ndarray
     actuator: np.ndarray
@@ -108,31 +102,26 @@ class _Panels(NamedTuple):
         return both.take(np.argsort(both.left))
 
 
-def _evaluated(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The last six of `_Panels` at instants t ``(n, k)``."""
+def _evaluated(
+    body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None
+) -> tuple[np.ndarray, ...]:
+    """The last six of `_Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``."""
     angles, rates = path(t.ravel())
-    solved = solve_balance(body, friction, angles, rates, delta).require()
-    now = instant(body, friction, angles, rates, solved.z, delta)
-    (cx, cy), (x, y) = body.centre_velocity(now.posture, now.velocity), body.joints(angles)
-    gx, gy = body.centre(now.posture)
-    values = (
-        solved.z[2],
-        cx[0] + 1j * cy[0],
-        total_power(now.velocity, now.force)[0],
-        _actuator_power(body, now, angles, rates),
-        solved.residual,
-        np.hypot(x - gx, y - gy).max(axis=0),
-    )
-    return tuple(value.reshape(t.shape) for value in values)
+    solved = solve_balance(body, friction, angles, rates, delta, start=near).require()
+    motion = chain_motion(body, friction, angles, rates, delta, solved)
+    (x, y), (gx, gy) = body.joints(angles), body.centre(body.posture(angles))
+    lever = np.hypot(x - gx, y - gy).max(axis=0)
+    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, solved.residual, lever)
+    return motion.z.T.reshape(*t.shape, 3), *(value.reshape(t.shape) for value in values)
 
 
 def _halves(panels: _Panels, new: tuple[np.ndarray, ...]) -> _Panels:
     """Both halves of panels, from the values at their instants and half way between these ``(n, 4)``."""
     fields = []
     for old, between in zip(panels[2:], new, strict=True):
-        merged = np.empty((old.shape[0], 9), dtype=old.dtype)
+        merged = np.empty((old.shape[0], 9, *old.shape[2:]), dtype=old.dtype)
         merged[:, ::2], merged[:, 1::2] = old, between
-        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, 5))
+        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, *old.shape[1:]))
     left, width = np.repeat(panels.left, 2), 0.5 * np.repeat(panels.width, 2)
     left[1::2] += width[1::2]
     return _Panels(left, width, *fields)
@@ -140,7 +129,7 @@ def _halves(panels: _Panels, new: tuple[np.ndarray, ...]) -> _Panels:
 
 def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rotation, displacement in the axes at the panel's begin (complex) and work of panels, on every `every`-th instant."""
-    omega, centre, power = (a[:, ::every] for a in (panels.omega, panels.centre, panels.power))
+    omega, centre, power = (a[:, ::every] for a in (panels.z[..., 2], panels.centre, panels.power))
     h, b = panels.width, rule[-1]
     turn = np.exp(1j * h[:, None] * (omega @ rule.T))
     return h * (omega @ b), h * ((turn * centre) @ b), h * (power @ b)
@@ -156,6 +145,7 @@ def replay(
     tolerance: float = 1e-6,
     most_instants: int = 100_000,
     breaks: np.ndarray | tuple[float, ...] = (),
+    near: Replay | None = None,
 ) -> Replay:
     """Distance, work and efficiency of a path over one period, to a relative error in the efficiency.
 
@@ -174,6 +164,8 @@ def replay(
         No panel is halved once there are so many.
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump (corners); they are integrated up to and from there.
+    near : Replay, optional
+        Of the same path or one like it: solves start from its velocities, which saves time and changes nothing else.
 
     Raises
     ------
@@ -192,7 +184,8 @@ def replay(
     # one-sided limits at jumps
     t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
     t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
-    panels = _Panels(left, width, *_evaluated(body, friction, path, delta, t))
+    start = None if near is None else near.tail_velocity(t.ravel())
+    panels = _Panels(left, width, *_evaluated(body, friction, path, delta, t, start))
     while True:
         turn, move, spent = _increments(_WHOLE, panels, 1)
         heading = np.concatenate([[0.0], np.cumsum(turn)])
@@ -215,8 +208,10 @@ def replay(
             break
         old = panels.take(chosen)
         between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
+        start = 0.5 * (old.z[:, :-1] + old.z[:, 1:]).reshape(-1, 3).T
         kept = np.setdiff1d(order, chosen)
-        panels = panels.take(kept).joined(_halves(old, _evaluated(body, friction, path, delta, between)))
+        panels = panels.take(kept).joined(_halves(old, _evaluated(body, friction, path, delta, between, start)))
+    known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
     return Replay(
         distance,
         work,
@@ -227,4 +222,5 @@ def replay(
         residual,
         float(gap.sum()) + residual,
         4 * panels.left.size,
+        (known, panels.z[:, :4].reshape(-1, 3).T),
     )

@@ -69,7 +69,7 @@ def test_the_largest_residual_of_all_instants_is_reported(monkeypatch):
     body, friction, path = random_path(1)
     for where in (0.1, 0.5, 0.9):
 
-        def poor(body, friction, angles, rates, delta, where=where):
+        def poor(body, friction, angles, rates, delta, start=None, where=where):
             solved = solve_balance(body, friction, angles, rates, delta)
             here = np.abs(angles - path(np.array([where]))[0]).max(axis=0) < 1e-2
             return replace(solved, residual=np.where(here, 3e-8, solved.residual))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from colloc.friction_unit import friction_unit, in_friction_units
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
+from colloc.search.friction_unit import friction_unit, in_friction_units
 from colloc.search.optimise import maximise_efficiency
 
 
