@@ -147,8 +147,8 @@ def row(index: int, result: dict) -> str:
 
 HEADER = """# Estimated and true efficiency errors
 
-Written by `python -m benchmarks.error_control`. All errors are relative. *Estimate*: what `verification.mesh_error` reports, the
-magnitudes of all intervals added up. *Expected*: their signed sum, without linearisation. *Replay*: true error of the
+Written by `python -m benchmarks.error_control`. All errors are relative. *Estimate*: what `verification.mesh_error` reports,
+the magnitudes of all intervals added up. *Expected*: their signed sum, without linearisation. *Replay*: true error of the
 collocated efficiency against a replay of the same gait. *Optimum*: against the optimum of a refined solve of higher order.
 *Ratio*: estimate over magnitude of the true error (errors below 3e-8 count as 3e-8); at least 0.5 is required.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.reference import link_moments as exact_moments
 from benchmarks.tables import interleaved_seconds, markdown_table
-from colloc.mechanics.friction import link_moments
+from colloc.mechanics.link_friction import link_moments
 from colloc.pictures.style import BLUE, GREEN, ORANGE, SKY, VERMILION, save, styled
 
 LENGTH = 1 / 3

@@ -132,7 +132,7 @@ def markdown(rows: list[dict], asked: int, command: str) -> str:
         "",
         f"One harmonic, Latin-hypercube starts (seed 0). Written by `{command}`.",
         "Certified: first-order conditions and an independent fine replay agree. Time: processor time of one start,",
-        "certificate included, derivatives compiled (`numerics.machine_code`), on one core of a machine that did other work too;",
+        "certificate included, derivatives compiled (`numerics.machine_code`), on a core of a busy machine;",
         "at the smaller delta that of going on from the result at the larger one. Replay: largest relative difference of the",
         "distinct optima's efficiencies from a second replay, on another grid and from another phase. On the floor: optima",
         "that are as slow as smallest_shape_speed = 0.1 allows; that bound, not mechanics, decides their size.",

@@ -13,8 +13,8 @@ matplotlib.use("Agg")
 # a run in the background of a shell script ignores Ctrl-C, and so would the programs that the tests interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-# no test finds code that an earlier run or the user compiled
-os.environ["COLLOC_CODE"] = "off"
+# no test finds CasADi functions that an earlier run or the user compiled
+os.environ["COLLOC_CODE"] = "balance"
 ROOT = Path(__file__).resolve().parents[1]
 
 

@@ -1,7 +1,7 @@
 """CasADi expressions of one mesh point: what collocation evaluates, each stated for a single instant.
 
-The physics is that of `mechanics.balance` and `mechanics.friction`; here it is only arranged into outputs. The balance itself
-is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
+The physics is that of `mechanics.balance` and `mechanics.link_friction`; here it is only arranged into outputs. The balance
+itself is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
 *formulations* of a point:
 
 ``lifted``
@@ -23,7 +23,8 @@ from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.problem import LIFTED
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.body import Chain
-from colloc.mechanics.friction import Friction, LinkForce, link_moments
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import LinkForce, link_moments
 from colloc.numerics.blocks import LocalFunction, local_function, total_function
 from colloc.numerics.machine_code import machine_code
 

@@ -13,17 +13,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colloc.commands.options import (
-    NONE_FOUND,
-    OK,
-    add_bound,
-    add_printing,
-    add_problem,
-    changed,
-    exit_code,
-    new_parser,
-    output_path,
-)
+from colloc.commands.ending import NONE_FOUND, OK, run
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
@@ -129,9 +120,8 @@ def _others_lines(kept: Mapping[StartName, Outcome], shown: int) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
     command = " ".join(["colloc multistart", *(sys.argv[1:] if arguments is None else arguments)])
-    return exit_code(lambda: _run(options, command))
+    return run(_parser(), lambda options: _run(options, command), arguments)
 
 
 def _run(options: argparse.Namespace, command: str) -> int:

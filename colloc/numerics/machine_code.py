@@ -3,6 +3,9 @@
 CasADi interprets its expressions; compiled, a Hessian of some ten thousand operations runs about ten times faster, with the
 same operations in the same order, so the same results to the last bit. Compiling takes seconds, so callers ask
 for it where it pays: functions whose code is in the folder are loaded, all others are interpreted, except within `compiling`.
+
+Loading a library runs it. So the folder is made for its user alone, and code is neither loaded from nor put into a place that
+anybody else could have written to (`colloc.system.private_folder`).
 """
 
 from __future__ import annotations
@@ -11,8 +14,6 @@ import contextlib
 import hashlib
 import os
 import platform
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
@@ -21,37 +22,25 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from colloc.numerics.c_compiler import BALANCE_ONLY, FOLDER, OFF, c_compiler, cache_folder, compile_library
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.replaced_file import replaced_file
+from colloc.system.private_folder import is_private, make_private
 
 _FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """-O2 takes half as long again to compile and gains a few per cent; contracted operations would round differently."""
 _WORTH_COMPILING = 1000
 """Operations below which a function gains nothing that matters."""
-_PATIENCE = 600.0
-FOLDER, OFF = "COLLOC_CODE", "off"
 _asked: ContextVar[bool] = ContextVar("compiling", default=False)
 
 
 def code_folder() -> Path | None:
-    """Where compiled code is kept: ``$COLLOC_CODE``, else ``colloc`` in the user's cache folder; None: nowhere ("off")."""
-    named = os.environ.get(FOLDER)
-    if named == OFF:
-        return None
-    if named:
-        return Path(named).absolute()
-    try:
-        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "colloc"
-    except RuntimeError:  # a user without a home
-        return None
+    """Where compiled functions are kept, see `cache_folder`; None: nowhere."""
+    return None if os.environ.get(FOLDER) == BALANCE_ONLY else cache_folder()
 
 
 def compiler() -> str | None:
-    """Path of the C compiler, if there is one and it may be used: ``$CC``, or the first of cc, gcc and clang that is found."""
-    if code_folder() is None:
-        return None
-    names = (os.environ.get("CC"), "cc", "gcc", "clang")
-    return next((found for name in names if name and (found := shutil.which(name))), None)
+    """Path of the C compiler, if there is one and it may be used."""
+    return None if code_folder() is None else c_compiler()
 
 
 @contextlib.contextmanager
@@ -92,29 +81,21 @@ def machine_code(functions: Sequence[ca.Function]) -> list[ca.Function]:
         return list(functions)
     content = "\n".join([ca.__version__, platform.machine(), *_FLAGS, *(f.serialize() for f in functions)])
     library = folder / f"{hashlib.sha256(content.encode()).hexdigest()[:32]}.so"
-    loaded = _loaded(functions, library) if os.path.exists(library) else None  # False where one may not look
+    # os.path.exists is False where one may not look
+    loaded = _loaded(functions, library) if os.path.exists(library) and is_private(library) else None
     if loaded is None and _asked.get():
+        make_private(folder)
         _compile(functions, library)
         loaded = _loaded(functions, library)
     return list(functions) if loaded is None else loaded
 
 
 def _compile(functions: Sequence[ca.Function], library: Path) -> None:
-    command = [str(compiler()), *_FLAGS]
-    with _scratch_folder() as folder, replaced_file(library) as unfinished:
+    with _scratch_folder() as folder:
         generator = ca.CodeGenerator("functions.c")
         for function in functions:
             generator.add(function)
-        command += [generator.generate(f"{folder}{os.sep}"), "-o", unfinished, "-lm"]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
-            failure = (done.stderr.strip().splitlines() or ["no message"])[-1] if done.returncode != 0 else ""
-        except subprocess.TimeoutExpired:
-            failure = f"took longer than {_PATIENCE:g} s"
-        except OSError as error:
-            failure = f"could not be run: {error.strerror or error}"
-        if failure:
-            raise StoreError(f"the C compiler {command[0]} failed ({failure}); set CC to another, or do without compiled code.")
+        compile_library(generator.generate(f"{folder}{os.sep}"), _FLAGS, library)
 
 
 @contextlib.contextmanager

@@ -13,7 +13,8 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
 from colloc.numerics.machine_code import compiler
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
-from colloc.results.solution import Certificate, Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Certificate, Solution
 from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import is_trivial, maximise_efficiency
 from colloc.system.errors import CollocError
@@ -69,14 +70,15 @@ def run_guess(problem: Problem, start_from: Callable[[], AnyGait], start: int, t
 
 def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
     optimal = [level for level in solution.levels if level.optimal]
-    measured: Certificate | Level | None = solution.certificate or (optimal[-1] if optimal else None)
+    certificate = solution.certificate
+    measured: Certificate | Level | None = certificate if certificate.replayed else optimal[-1] if optimal else None
     status = TRIVIAL if is_trivial(solution) else solution.status
     outcome = Outcome(start, status, solution.message, guess, solution.gait)
     if measured is not None:
         efficiency, distance, work = measured.efficiency, measured.distance, measured.work
         outcome = replace(outcome, delta=optimal[-1].delta, efficiency=efficiency, distance=distance, work=work)
-    if solution.certificate is not None:
-        outcome = replace(outcome, efficiency_error=solution.certificate.efficiency_error)
+    if certificate.replayed:
+        outcome = replace(outcome, efficiency_error=certificate.efficiency_error)
     return outcome
 
 

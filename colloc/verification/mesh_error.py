@@ -67,7 +67,7 @@ class MeshError:
 
 
 def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
-    """The gait's motion on adaptive panels, see `fine_motion`."""
+    """The gait's motion on adaptive panels, see `adaptive_motion`."""
     return fine_motion(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, edges, tolerance)
 
 

@@ -88,9 +88,7 @@ def test_bad_options_and_files(problem, tmp_path, capsys):
     ):
         assert main([good, *options]) == 2
         assert message in capsys.readouterr().err
-    with pytest.raises(SystemExit) as stop:
-        main([good, "--turbo"])
-    assert stop.value.code == 2
+    assert main([good, "--turbo"]) == 2
     assert "unrecognized arguments: --turbo" in capsys.readouterr().err
 
 
@@ -105,7 +103,7 @@ def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(problem, 
 
 
 def test_help_is_quick_and_does_not_need_casadi():
-    code = "import sys; from colloc.commands.solve import main\ntry: main(['--help'])\nexcept SystemExit: print('casadi' in sys.modules)"
+    code = "import sys; from colloc.solve import main\ntry: main(['--help'])\nexcept SystemExit: print('casadi' in sys.modules)"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.rstrip().endswith("False")
     assert "Exit codes" in result.stdout

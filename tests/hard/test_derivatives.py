@@ -146,7 +146,7 @@ def test_contact_at_its_corners(angles):
 @pytest.mark.parametrize("vs", [0.0, 0.3])
 def test_second_derivative_where_a_link_does_not_turn(vs):
     """I0 in the rotation rate at w = 0: -l^3 (a^2 - 2 vn^2) / (12 r^5), by expanding the integrand; an even function."""
-    from colloc.mechanics.friction import link_moments
+    from colloc.mechanics.link_friction import link_moments
 
     w = ca.SX.sym("w")
     length, vn, delta = 0.4, 0.05, 0.1

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from colloc.dask_pool import connected
+from colloc.system.dask_pool import connected
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import EngineGone, Lost, Task, completed, process_pool
 
