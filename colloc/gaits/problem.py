@@ -23,6 +23,10 @@ from colloc.system.errors import ProblemError
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
 FULL, IMPLICIT = "full", "implicit velocity"
 FORMULATIONS = (FULL, IMPLICIT)
+SMALLEST_DELTA = 1e-14
+"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
+LONGEST_NAME = 200
+"""File systems allow 255 bytes, and results of a problem add endings to its name."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
@@ -56,7 +60,7 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``.
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200.
     guess : Fourier, ArcPath or Corners, optional
         An admissible gait to start from, of any class; it is projected onto the class `gait`. By default a travelling wave
         (`colloc.gaits.guesses`).
@@ -111,6 +115,10 @@ class Problem:
     def _check_types(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        if len(self.name) > LONGEST_NAME:
+            raise ProblemError(
+                f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
+            )
         for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
             if not isinstance(getattr(self, field), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)
@@ -132,6 +140,11 @@ class Problem:
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
         if self.delta <= 0:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
+        if self.delta < SMALLEST_DELTA:
+            raise ProblemError(
+                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that order are lost in rounding. "
+                "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
+            )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
         if not 0 < self.joint_limit <= np.pi + 1e-12:
@@ -243,8 +256,12 @@ class Problem:
     @property
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
-        text = json.dumps(self.to_dict(), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return statement_hash(self.to_dict())
+
+
+def statement_hash(stated: dict) -> str:
+    """SHA-256 of what `Problem.to_dict` gave."""
+    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
 
 
 _NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
-from colloc.results.solution import Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Solution
+from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.reduced_search import Found, descended, refined, searched
@@ -53,11 +56,12 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
         Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
     """
     begin, levels = time.perf_counter(), list(before)
+    stated, (problem, unit) = problem, in_friction_units(problem)
 
     def report(level: Level) -> None:
-        levels.append(level)
+        levels.append(restated(level, unit))
         if on_level is not None:
-            on_level(level)
+            on_level(levels[-1])
 
     def ended(found: Found) -> None:
         report(level_found(found))
@@ -71,7 +75,7 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
     level, fails = answer(found)
     report(level)
     message = " ".join(part for part in (fails, lacks) if part)
-    return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)
+    return Solution(stated, levels, seconds=time.perf_counter() - begin, message=message)
 
 
 def maximise_efficiency(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
@@ -133,13 +137,15 @@ def best_gait(
     if starts == 1 or before:
         return maximise_efficiency(problem, on_level, before)
     begin = time.perf_counter()
-    chosen = best_of(problem, starts, seconds)
-    levels = [level_found(found) for found in chosen.levels]
+    own, unit = in_friction_units(problem)
+    chosen = best_of(own, starts, seconds)
+    levels = [restated(level_found(found), unit) for found in chosen.levels]
     for level in levels:
         if on_level is not None:
             on_level(level)
     solution = maximise_efficiency(problem, on_level, levels)
-    solution.starts, solution.others = chosen.starts, chosen.others
+    solution.starts = chosen.starts
+    solution.others = tuple(replace(other, efficiency=other.efficiency / unit) for other in chosen.others)
     solution.seconds = time.perf_counter() - begin
     return solution
 
