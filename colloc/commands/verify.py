@@ -16,7 +16,8 @@ from collections.abc import Sequence
 from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import add_printing, add_result, new_parser
 from colloc.results.certificate import certify
-from colloc.results.solution import Certificate, Solution
+from colloc.results.checks import Certificate
+from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine

@@ -8,8 +8,9 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.mechanics.balance import net_force
 from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import extrapolated_limit
-from colloc.results.solution import Certificate, Check, Solution
+from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import Path, Replay, replay
 

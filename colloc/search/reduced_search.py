@@ -16,8 +16,8 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.numerics.sqp import Stationarity, minimised, stationarity
+from colloc.reduced.closure import start_near
 from colloc.reduced.program import ReducedProgram, SearchSpace
-from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.verification.refinement import AIM, MeshPlan, planned_mesh
 
@@ -162,7 +162,7 @@ def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
 
 def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:
     """An optimum of a problem from a start, on a mesh that meets its tolerance; the second is what is missing, or ""."""
-    space, v = space_near(problem, start)
+    space, v = start_near(problem, start, problem.delta_start)
     found = settled_apart(space, v, problem.delta_start, FIRST_RADIUS, ROUGH)
     report(found)
     return refined(descended(found, problem, report), report)

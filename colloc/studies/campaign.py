@@ -12,9 +12,10 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
 from colloc.numerics.machine_code import compiler
+from colloc.results.checks import Certificate
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.level import Level
-from colloc.results.solution import Certificate, Solution
+from colloc.results.solution import Solution
 from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import is_trivial, maximise_efficiency
 from colloc.system.errors import CollocError

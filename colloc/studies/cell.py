@@ -12,14 +12,13 @@ import numpy as np
 
 from colloc.gaits.equivalence import phase_distance
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.laid_gaits import laid_into
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.reduced.closure import start_near
 from colloc.results.certificate import corner_phases
 from colloc.results.distinct_optima import ERROR, Outcome, fourier_series
 from colloc.results.solution import SOLVED
-from colloc.search.class_transfer import laid_into
-from colloc.search.closure import closed_parameters
-from colloc.search.path_start import nearest_parameters, transcribed
 from colloc.studies.campaign import run_guess
 from colloc.system.errors import CollocError
 from colloc.verification.replay import replay
@@ -123,14 +122,8 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
         return None
     try:
         near = laid_into(kind, gait, body, problem.joint_limit, problem.smallest_shape_speed)
-        if problem.has_path:
-            program = transcribed(problem, near)
-            projected = program.member(nearest_parameters(program, near))
-        else:
-            parameters = kind.parameters(near)
-            if kind.symmetry == "none":
-                parameters = closed_parameters(problem, parameters, problem.delta)
-            projected = kind.fourier(parameters, body.n_joint)
+        space, v = start_near(problem, near, problem.delta)
+        projected = space.member(v)
         problem.with_(guess=projected)
     except CollocError:
         return None

@@ -19,8 +19,9 @@ from colloc.pictures.motion_frames import frames
 from colloc.pictures.report_charts import forbidden_rectangles, plane_charts
 from colloc.pictures.report_page import json_block, report_page
 from colloc.results.chart import Chart, linear_ticks, log_ticks
+from colloc.results.checks import Check
 from colloc.results.markup import VOID, Markup, element, table
-from colloc.results.solution import Check, Solution
+from colloc.results.solution import Solution
 from colloc.results.store import save
 
 BROWSER = next((path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path), None)

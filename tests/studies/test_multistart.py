@@ -136,7 +136,9 @@ def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
 
 def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
     # where friction resists backwards sliding five times as much, small gaits beat large ones
-    stated = problem(friction=Friction(0.5, 1, 5), delta=1e-3, delta_start=1e-2, guess=ellipse(0.5, 0.12, 0.12), intervals=14)
+    stated = problem(
+        friction=Friction(0.5, 1, 5), delta=1e-3, delta_start=1e-2, guess=ellipse(0.5, 0.12, 0.12), mesh_tolerance=3e-5
+    )
     solution = maximise_efficiency(stated)
     assert solution.status == SOLVED
     assert on_speed_floor(stated, solution.gait)
