@@ -1,25 +1,20 @@
 """Where the time of a solve goes, as shares: python -m benchmarks --only cost
 
-Every problem is solved once from its guess in a process of its own, with code compiled before where there is a compiler, and
-the first also without. All is processor time.
+Every problem is solved once from its guess in a process of its own. All is processor time.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from unittest import mock
 
 from benchmarks.tables import markdown_table
 from colloc.gaits.problem_file import read_problem_file
-from colloc.numerics.machine_code import FOLDER, OFF, compiler
 from colloc.results.level import Level
-from colloc.search.compiled_problem import compile_problem
 from colloc.search.reduced_search import Found
 
 PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")
@@ -93,21 +88,16 @@ def import_seconds(module: str) -> float:
     return spent(f"import {module}") - spent("pass")
 
 
-def _anatomy_apart(name: str, code: str) -> dict[str, float]:
-    """`anatomy` in a fresh process that looks for compiled code in the folder `code`."""
+def _anatomy_apart(name: str) -> dict[str, float]:
+    """`anatomy` in a fresh process."""
     command = [sys.executable, "-c", f"import json; from benchmarks.cost import anatomy; print(json.dumps(anatomy({name!r})))"]
-    environment = {**os.environ, FOLDER: code}
-    output = subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     return json.loads(output.splitlines()[-1])
 
 
 def report(quick: bool, folder: Path) -> str:
     """Shares of the parts of three solves, and import times."""
-    columns = {name: _anatomy_apart(name, OFF) for name in (PROBLEMS[:1] if quick else PROBLEMS)}
-    if compiler() is not None:
-        with tempfile.TemporaryDirectory() as code, mock.patch.dict(os.environ, {FOLDER: code}):
-            compile_problem(read_problem_file(Path("problems") / f"{PROBLEMS[0]}.py").problem)
-            columns[f"{PROBLEMS[0]}, compiled"] = _anatomy_apart(PROBLEMS[0], code)
+    columns = {name: _anatomy_apart(name) for name in (PROBLEMS[:1] if quick else PROBLEMS)}
     names = list(columns)
     parts = [part for part in columns[names[0]] if not part.startswith("(")]
     totals = {name: sum(columns[name][part] for part in parts) for name in names}

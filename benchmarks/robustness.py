@@ -29,11 +29,9 @@ import numpy as np
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.sampling import LATIN_HYPERCUBE, on_speed_floor
-from colloc.numerics.machine_code import compiler
 from colloc.results.archive import Archive, StartName, save_archive
 from colloc.results.distinct_optima import Outcome, basins, counts
 from colloc.results.solution import SOLVED, versions
-from colloc.search.compiled_problem import compile_problem
 from colloc.studies.campaign import process_pool, run_starts
 from colloc.verification.replay import replay
 
@@ -132,7 +130,7 @@ def markdown(rows: list[dict], asked: int, command: str) -> str:
         "",
         f"One harmonic, Latin-hypercube starts (seed 0). Written by `{command}`.",
         "Certified: first-order conditions and an independent fine replay agree. Time: processor time of one start,",
-        "certificate included, derivatives compiled (`numerics.machine_code`), on a core of a busy machine;",
+        "certificate included, on a core of a busy machine;",
         "at the smaller delta that of going on from the result at the larger one. Replay: largest relative difference of the",
         "distinct optima's efficiencies from a second replay, on another grid and from another phase. On the floor: optima",
         "that are as slow as smallest_shape_speed = 0.1 allows; that bound, not mechanics, decides their size.",
@@ -195,9 +193,6 @@ def main() -> None:
     if tuple(options.symmetries) != SYMMETRIES:
         command += f" --symmetries {' '.join(options.symmetries)}"
     turns = [] if options.tables else [*range(TURN, options.starts, TURN), options.starts]
-    if turns and compiler() is not None:
-        for law in LAWS:  # a few starts at a time are too few for `run_starts` to compile
-            compile_problem(case_problem(law, "none", DELTA, 0.1))
     for most in turns:
         for symmetry, law in product(options.symmetries, LAWS):
             advance(law, symmetry, most, options.workers, folder)

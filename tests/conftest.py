@@ -1,6 +1,5 @@
 """Shared results: each problem file is solved once per test run."""
 
-import os
 import signal
 from functools import cache
 from pathlib import Path
@@ -13,8 +12,6 @@ matplotlib.use("Agg")
 # a run in the background of a shell script ignores Ctrl-C, and so would the programs that the tests interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-# no test finds CasADi functions that an earlier run or the user compiled
-os.environ["COLLOC_CODE"] = "balance"
 ROOT = Path(__file__).resolve().parents[1]
 
 

@@ -1,7 +1,7 @@
-"""The three-link problem in colloc: python -m benchmarks.peers.colloc_three_link --starts 20 [--refined] [--compiled]
+"""The three-link problem in colloc: python -m benchmarks.peers.colloc_three_link --starts 20 [--refined]
 
 Without --refined the mesh, scheme and levels are those of the other tools (no refinement); with it, everything is at its
-defaults, and a start counts only with a certificate. With --compiled the derivatives are compiled first; the first start pays.
+defaults, and a start counts only with a certificate.
 """
 
 from __future__ import annotations
@@ -9,16 +9,13 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import tempfile
 
 import numpy as np
 
 from benchmarks.peers.settings import INTERVALS
 from benchmarks.peers.starts import starts
 from colloc import Harmonic, Problem, ellipse, maximise_efficiency
-from colloc.numerics.machine_code import FOLDER, OFF
 from colloc.results.solution import SOLVED
-from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import optimum
 
 
@@ -38,19 +35,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="The three-link problem in colloc; see the top of this file.")
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--refined", action="store_true")
-    parser.add_argument("--compiled", action="store_true")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as code:
-        os.environ[FOLDER] = code if options.compiled else OFF
-        begin = sum(os.times()[:4])  # the compiler's time too
-        if options.compiled:
-            compile_problem(Problem("peer", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral")))
-        for start in starts(options.starts):
-            result = solve(start, options.refined)
-            now = sum(os.times()[:4])
-            result |= {"cpu": now - begin, "start": start.tolist(), "with_build": True}
-            begin = now
-            print(json.dumps(result), flush=True)
+    begin = sum(os.times()[:4])  # the compiler's time too
+    for start in starts(options.starts):
+        result = solve(start, options.refined)
+        now = sum(os.times()[:4])
+        result |= {"cpu": now - begin, "start": start.tolist(), "with_build": True}
+        begin = now
+        print(json.dumps(result), flush=True)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,6 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.link_friction import LinkForce, link_moments
 from colloc.numerics.blocks import LocalFunction, local_function, total_function
-from colloc.numerics.machine_code import machine_code
 
 N_RATE = 2
 """The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
@@ -143,7 +142,7 @@ def balance_steps(body: Chain, friction: Friction) -> ca.Function:
     secant = ca.substitute([slope], frozen, list(moments))[0]
     fixed_point = z - ca.solve(secant, balance)
     outputs = [newton, fixed_point, ca.norm_inf(balance)]
-    return machine_code([ca.Function("balance_steps", [angles, rates, z, delta], outputs, {"cse": True})])[0]
+    return ca.Function("balance_steps", [angles, rates, z, delta], outputs, {"cse": True})
 
 
 def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:

@@ -53,7 +53,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
     parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
     add_bound(parser)
-    parser.add_argument("--compile", action="store_true", help="first compile what solves of this body and friction evaluate")
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
     add_printing(parser)
     return parser
@@ -167,12 +166,6 @@ def _solve(options: argparse.Namespace) -> int:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
-    if options.compile:
-        from colloc.search.compiled_problem import compile_problem
-
-        with StatusLine(enabled=not quiet) as line:
-            line.say("compiling")
-            compile_problem(problem)
     solution = _solved(problem, stated.source, path, options.fresh, quiet)
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")

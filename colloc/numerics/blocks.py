@@ -19,8 +19,6 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.numerics.machine_code import machine_code
-
 
 @dataclass(frozen=True, eq=False)
 class LocalFunction:
@@ -62,7 +60,7 @@ def _packed(
         ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))], options),
         ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))], options),
     )
-    value, jac, hess = machine_code(functions)
+    value, jac, hess = functions
     return LocalFunction(
         local.shape[0],
         out.shape[0],

@@ -11,19 +11,19 @@ from pathlib import Path
 from colloc.system.errors import StoreError
 from colloc.system.replaced_file import replaced_file
 
-FOLDER, OFF, BALANCE_ONLY = "COLLOC_CODE", "off", "balance"
+FOLDER, OFF = "COLLOC_CODE", "off"
 _PATIENCE = 600.0
 
 
 def cache_folder() -> Path | None:
-    """``$COLLOC_CODE``, else (or if that is "balance") ``colloc`` in the user's cache folder.
+    """``$COLLOC_CODE``, else ``colloc`` in the user's cache folder.
 
     None if it is "off", or for a user without a home.
     """
     named = os.environ.get(FOLDER)
     if named == OFF:
         return None
-    if named and named != BALANCE_ONLY:
+    if named:
         return Path(named).absolute()
     try:
         return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "colloc"

@@ -5,24 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import suppress
 from dataclasses import replace
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
-from colloc.numerics.machine_code import compiler
 from colloc.results.checks import Certificate
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.level import Level
 from colloc.results.solution import Solution
-from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import is_trivial, maximise_efficiency
-from colloc.system.errors import CollocError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
-
-_MANY = 8
-"""Starts that are worth compiling for."""
 
 
 class _TimeLimit(Exception):
@@ -96,8 +89,6 @@ def run_starts(
 ) -> Iterator[Outcome]:
     """Outcomes of the given starts, each as soon as it is there.
 
-    For 8 starts or more, what they evaluate is compiled first if there is a C compiler (see `colloc.numerics.machine_code`).
-
     Parameters
     ----------
     problem : Problem
@@ -117,9 +108,6 @@ def run_starts(
         Gaits from which starts of these numbers begin instead of a sample: results of an earlier run to go on from.
     """
     starts = list(starts)
-    if len(starts) >= _MANY and compiler() is not None:
-        with suppress(CollocError):  # whatever is wrong with the problem, its starts will say
-            compile_problem(problem)
     waiting = iter(starts)
 
     def ready() -> Task | None:

@@ -209,7 +209,7 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
 
 def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     gait = Fourier([0.2, -0.4], [[0.8], [-0.5]], [[0.1], [0.6]])  # no symmetry: it turns
-    stated = problem().with_(gait=Harmonic(1, "none"), delta=1e-2)
+    stated = problem().with_(gait=Harmonic(1, "none"), delta=1e-2, intervals=40)
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
     exact = replay(stated.body, stated.friction, path, stated.delta)
     assert abs(exact.rotation) > 0.01
@@ -312,7 +312,7 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
 CLASSES = {"ellipse": Harmonic(1, "bilateral"), "triangle": Polygon(3, "bilateral"), "path": FreePath(4.0, "bilateral")}
 
 
-def in_class(kind, guess=None, intervals=12):
+def in_class(kind, guess=None, intervals=20):
     near = ellipse(0.1, 2.0, 1.0) if guess is None else guess
     return Problem("p", near, gait=CLASSES[kind], delta=1e-3, intervals=intervals)
 
