@@ -304,9 +304,10 @@ class Solution:
             centre = np.where(second, 2 * end[:, None] - centre, centre)
             end = 2 * end
         elif symmetry == "antipodal":
-            mirror = np.array([[1.0], [-1.0], [-1.0]])
+            mirror, x_theta = np.array([[1.0], [-1.0], [-1.0]]), self.last.x[self.layout.theta[0]]
             z = np.where(second, mirror * z, z)
-            theta = np.where(second, -theta, theta)
+            turns = 2 * np.pi * np.round((x_theta[0] + x_theta[-1]) / (2 * np.pi))
+            theta = np.where(second, turns - theta, theta)
             centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
             end = np.array([2 * end[0], 0.0])
         centre = centre + period * end[:, None]
