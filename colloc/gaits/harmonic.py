@@ -119,8 +119,7 @@ class Harmonic:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
 
-    @property
-    def intervals(self) -> int:
+    def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
         return round(self.fraction * (30 + 10 * self.harmonics))
 

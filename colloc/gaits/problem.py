@@ -125,7 +125,7 @@ class Problem:
         if self.delta_start is None:
             object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
         if self.intervals is None:
-            object.__setattr__(self, "intervals", self.gait.intervals)
+            object.__setattr__(self, "intervals", self.gait.intervals(self.body.n_joint))
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):

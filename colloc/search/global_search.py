@@ -82,7 +82,7 @@ def same_gait(problem: Problem, a: Found, b: Found) -> bool:
 
 def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> list[Candidate]:
     """What the starts lead to on a coarse mesh, most efficient first; at least one start is tried."""
-    intervals = min(problem.intervals, max(problem.gait.intervals // 2, _FEWEST))
+    intervals = min(problem.intervals, max(problem.gait.intervals(problem.body.n_joint) // 2, _FEWEST))
     coarse = problem.with_(intervals=intervals)
     deltas = [max(factor * problem.delta_start, problem.delta) for factor in _LEVELS]
     known: list[list[Candidate]] = [[] for _ in deltas]

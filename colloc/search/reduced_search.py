@@ -29,7 +29,9 @@ VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
 """Accuracy of -d/W at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
 STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
 """What the first-order conditions have to keep to then; the efficiency is off by the square of that."""
-_ROUNDS, _AT_REST = 12, 1e-8
+_ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
+_ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
+"""Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
 _ADMISSIBLE = 1e-8
 _MESHES, _SAME_AIM = 8, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
@@ -92,9 +94,9 @@ def settled(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accu
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
     space.move_checks(v)
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS[accuracy]):
         before = v
-        result = minimised(program, v, radius, accuracy)
+        result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy])
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = space.move_checks(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
