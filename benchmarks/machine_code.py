@@ -22,7 +22,7 @@ from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.collocation.point_equations import balance_steps, point_function
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.problem import CONDENSED
+from colloc.gaits.problem import IMPLICIT
 from colloc.numerics.machine_code import FOLDER, OFF, compiler
 from colloc.results.solution import SOLVED
 from colloc.search.compiled_problem import compile_problem
@@ -41,7 +41,7 @@ def evaluations(links: int, compiled: bool) -> dict[str, float]:
         guess = ellipse(0.3, 1.0, 0.5) if n == 2 else Fourier(np.zeros(n), np.eye(n)[:, :1] + 0.1, np.full((n, 1), 0.2))
         compile_problem(Problem("any", body=body, friction=LAW, gait=Harmonic(1), guess=guess))
     end = os.times()
-    point = point_function(CONDENSED, body, LAW)
+    point = point_function(IMPLICIT, body, LAW)
     rng, n_joint = np.random.default_rng(0), links - 1
     local, z = rng.normal(size=(4 + 2 * n_joint, POINTS)), rng.normal(size=(3, POINTS))
     deltas, weights = np.full((1, POINTS), 1e-3), rng.normal(size=(5, POINTS))

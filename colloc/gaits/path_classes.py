@@ -18,7 +18,6 @@ from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, SYMMETRIES, fraction
 from colloc.system.errors import ProblemError
 
-
 _ARCS, _PARAMETERS = 120, 250
 """Arcs of a free path over a period, and at most so many parameters in them all."""
 

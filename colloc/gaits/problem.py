@@ -23,6 +23,11 @@ from colloc.system.errors import ProblemError
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
 FULL, IMPLICIT = "full", "implicit velocity"
 FORMULATIONS = (FULL, IMPLICIT)
+_PATH_CLASSES = (FreePath, Polygon)
+SMALLEST_DELTA = 1e-14
+"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
+LONGEST_NAME = 200
+"""File systems allow 255 bytes, and results of a problem add endings to its name."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
@@ -56,7 +61,7 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``.
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200.
     guess : Fourier, ArcPath or Corners, optional
         An admissible gait to start from, of any class; it is projected onto the class `gait`. By default a travelling wave
         (`colloc.gaits.guesses`).
@@ -111,6 +116,10 @@ class Problem:
     def _check_types(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        if len(self.name) > LONGEST_NAME:
+            raise ProblemError(
+                f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
+            )
         for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
             if not isinstance(getattr(self, field), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)
@@ -119,7 +128,7 @@ class Problem:
     @property
     def has_path(self) -> bool:
         """Whether the class bounds the path itself (free paths, polygons) rather than its harmonics."""
-        return isinstance(self.gait, (FreePath, Polygon))
+        return isinstance(self.gait, _PATH_CLASSES)
 
     def _check_numbers(self) -> None:
         if self.delta_start is None:
@@ -132,6 +141,11 @@ class Problem:
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
         if self.delta <= 0:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
+        if self.delta < SMALLEST_DELTA:
+            raise ProblemError(
+                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that order are lost in rounding. "
+                "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
+            )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
         if not 0 < self.joint_limit <= np.pi + 1e-12:
@@ -209,12 +223,16 @@ class Problem:
             raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def with_(self, **changes: object) -> Problem:
-        """A copy with some fields changed, validated anew."""
+        """A copy with some fields changed, validated anew. A class without formulations drops the one there was."""
+        if isinstance(changes.get("gait"), _PATH_CLASSES):
+            changes.setdefault("formulation", None)
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
     def to_dict(self) -> dict:
-        """All fields as plain numbers, strings and lists (JSON)."""
+        """All fields that say something as plain numbers, strings and lists (JSON)."""
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        if self.has_path:
+            del stated["formulation"]
         for name in ("guess", "gait"):
             stated[name] = fields(stated[name])
         for name in ("body", "friction"):
@@ -236,6 +254,8 @@ class Problem:
             stated["body"] = Chain(tuple(stated["body"]["lengths"]))
             stated["friction"] = Friction(**stated["friction"])
             stated["gait"] = class_from(stated["gait"])
+            if isinstance(stated["gait"], _PATH_CLASSES):
+                stated.pop("formulation", None)  # earlier files name one, without effect
             return cls(**stated)
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
@@ -243,8 +263,12 @@ class Problem:
     @property
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
-        text = json.dumps(self.to_dict(), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return statement_hash(self.to_dict())
+
+
+def statement_hash(stated: dict) -> str:
+    """SHA-256 of what `Problem.to_dict` gave."""
+    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
 
 
 _NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

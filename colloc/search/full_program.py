@@ -15,7 +15,7 @@ from colloc.collocation.layout import problem_layout
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
 from colloc.reduced.spaces import heading, transcribed
-from colloc.results.solution import REDUCED, Level
+from colloc.results.level import REDUCED, Level
 from colloc.search.diagnosis import explanation
 from colloc.search.nlp import NlpResult, Solver
 from colloc.search.reduced_search import Found

@@ -13,6 +13,7 @@ from scipy import sparse
 from colloc.collocation.program import Program
 from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.search.stop_request import StopRequest
 from colloc.system.interruption import interruptible
 
 IPOPT_OPTIONS: dict[str, object] = {
@@ -115,7 +116,9 @@ class Solver(Generic[AnyProgram]):
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
-        self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, {**settings, **self.oracles.options})
+        self._stop = StopRequest(self.oracles.nlp)  # held here: CasADi does not keep it alive
+        settings |= {**self.oracles.options, "iteration_callback": self._stop}
+        self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
 
     def solve(
         self,

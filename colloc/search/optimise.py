@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
-from colloc.results.solution import Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Solution
+from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.reduced_search import Found, descended, refined, searched
@@ -53,21 +56,22 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
         Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
     """
     begin, levels = time.perf_counter(), list(before)
+    scaled, unit = in_friction_units(problem)
 
     def report(level: Level) -> None:
-        levels.append(level)
+        levels.append(restated(level, unit))
         if on_level is not None:
-            on_level(level)
+            on_level(levels[-1])
 
     def ended(found: Found) -> None:
         report(level_found(found))
 
     if before:
         done = Solution(problem, before)
-        space, v = space_near(problem, done.gait, done.last.edges, done.last.scheme)
-        found, lacks = refined(descended(Found.at(space, v, done.last.delta), problem, ended), ended)
+        space, v = space_near(scaled, done.gait, done.last.edges, done.last.scheme)
+        found, lacks = refined(descended(Found.at(space, v, done.last.delta), scaled, ended), ended)
     else:
-        found, lacks = searched(problem, problem.guess, ended)
+        found, lacks = searched(scaled, scaled.guess, ended)
     level, fails = answer(found)
     report(level)
     message = " ".join(part for part in (fails, lacks) if part)
@@ -133,13 +137,15 @@ def best_gait(
     if starts == 1 or before:
         return maximise_efficiency(problem, on_level, before)
     begin = time.perf_counter()
-    chosen = best_of(problem, starts, seconds)
-    levels = [level_found(found) for found in chosen.levels]
+    scaled, unit = in_friction_units(problem)
+    chosen = best_of(scaled, starts, seconds)
+    levels = [restated(level_found(found), unit) for found in chosen.levels]
     for level in levels:
         if on_level is not None:
             on_level(level)
     solution = maximise_efficiency(problem, on_level, levels)
-    solution.starts, solution.others = chosen.starts, chosen.others
+    solution.starts = chosen.starts
+    solution.others = tuple(replace(other, efficiency=other.efficiency / unit) for other in chosen.others)
     solution.seconds = time.perf_counter() - begin
     return solution
 
