@@ -229,10 +229,8 @@ class Problem:
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
     def to_dict(self) -> dict:
-        """All fields that say something as plain numbers, strings and lists (JSON)."""
+        """All fields as plain numbers, strings and lists (JSON)."""
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        if self.has_path:
-            del stated["formulation"]
         for name in ("guess", "gait"):
             stated[name] = fields(stated[name])
         for name in ("body", "friction"):
@@ -254,8 +252,7 @@ class Problem:
             stated["body"] = Chain(tuple(stated["body"]["lengths"]))
             stated["friction"] = Friction(**stated["friction"])
             stated["gait"] = class_from(stated["gait"])
-            if isinstance(stated["gait"], _PATH_CLASSES):
-                stated.pop("formulation", None)  # earlier files name one, without effect
+            stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
             return cls(**stated)
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
@@ -264,6 +261,10 @@ class Problem:
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
         return statement_hash(self.to_dict())
+
+
+_EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
+"""What earlier files call the formulations; those of paths name none."""
 
 
 def statement_hash(stated: dict) -> str:

@@ -1,4 +1,4 @@
-"""The gait of a class nearest to a given one that does not turn the body: what a known gait is under another law of friction."""
+"""The gait of a class nearest to a given one that does not turn the body, whatever the law of friction."""
 
 from __future__ import annotations
 

@@ -17,6 +17,7 @@ from colloc.results.solution import Solution
 from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
+from colloc.search.literal_search import literal_optimum
 from colloc.search.reduced_search import Found, descended, refined, searched
 from colloc.system.errors import NotConvergedError
 
@@ -78,7 +79,9 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
     return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)
 
 
-def maximise_efficiency(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
+def maximise_efficiency(
+    problem: Problem, on_level: Report | None = None, before: Sequence[Level] = (), *, literal: bool = False
+) -> Solution:
     """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
 
     Parameters
@@ -88,6 +91,8 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
         Called with every `colloc.results.solution.Level` as it ends.
     before : sequence of Level
         Levels of an interrupted run of the same problem; it goes on from the last one.
+    literal : bool
+        Whether IPOPT searches on the full program from the guess alone (`colloc.search.literal_search`).
 
     Returns
     -------
@@ -95,7 +100,7 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
         With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
     """
     begin = time.perf_counter()
-    solution = optimum(problem, on_level, before)
+    solution = literal_optimum(problem, on_level) if literal else optimum(problem, on_level, before)
     if is_trivial(solution):
         solution.message = (
             "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
