@@ -186,6 +186,16 @@ class Harmonic:
         rates = self.rate_matrix(np.arange(n_time) / n_time, n_joint)
         return np.einsum("tjp,tjq->pq", rates, rates) / n_time
 
+    def enclosed_area(self, n_joint: int) -> np.ndarray:
+        """``(n_parameter, n_parameter)``: the area ``integral of sum_(i<j) (q_i dq_j - q_j dq_i) / 2`` that a path encloses in
+        the planes of its joints [rad^2], as a quadratic form of the parameters; 0 for retraced paths."""
+        n_time = 4 * self.harmonics + 4
+        t = np.arange(n_time) / n_time
+        angles, rates = self.angle_matrix(t, n_joint), self.rate_matrix(t, n_joint)
+        sign = np.triu(np.ones((n_joint, n_joint)), 1)
+        form = 0.5 * np.einsum("tip,ij,tjq->pq", angles, sign - sign.T, rates) / n_time
+        return 0.5 * (form + form.T)
+
     def _combined(self, constant: np.ndarray, cos: np.ndarray, sin: np.ndarray, n_joint: int) -> np.ndarray:
         waves = np.empty((2 * self.harmonics + 1, constant.shape[1]))
         waves[:1], waves[1::2], waves[2::2] = constant, cos, sin

@@ -16,35 +16,12 @@ from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.results.alternative import Alternative
 from colloc.results.level import Level
 from colloc.results.solution_card import solution_card
 from colloc.system.errors import ProblemError
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """A gait that a search over many starts met.
-
-    Attributes
-    ----------
-    efficiency : float
-        As collocation sees it on a first mesh.
-    delta : float
-        To which it was followed.
-    starts : int
-        How many led to it.
-    on_speed_floor : bool
-        Whether the bound on the shape speed decided its size.
-    gait : AnyGait
-    """
-
-    efficiency: float
-    delta: float
-    starts: int
-    on_speed_floor: bool
-    gait: AnyGait
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,9 @@ import numpy as np
 
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.gaits.problem import Problem, statement_hash
+from colloc.results.alternative import Alternative
 from colloc.results.level import Level
-from colloc.results.solution import UNCERTIFIED, Alternative, Certificate, Check, Solution
+from colloc.results.solution import UNCERTIFIED, Certificate, Check, Solution
 from colloc.system.errors import ChangedFileWarning, StoreError
 from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text, was_changed
 

@@ -23,8 +23,9 @@ from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor, seed_class
 from colloc.mechanics.body import Chain
+from colloc.reduced.closure import closed_gait
 from colloc.reduced.spaces import space_near
-from colloc.results.solution import Alternative
+from colloc.results.alternative import Alternative
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, descended, settled_apart
 from colloc.system.errors import CollocError, NotConvergedError
 
@@ -97,7 +98,7 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> lis
 
 def _follow(problem: Problem, gait: AnyGait, start: int, deltas: list[float], known: list[list[Candidate]]) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
-    space, v = space_near(problem, gait)
+    space, v = space_near(problem, closed_gait(problem, gait, deltas[0]))
     before, radius = None, FIRST_RADIUS
     for delta, here in zip(deltas, known, strict=True):
         found = settled_apart(space, v, delta, radius, VERY_ROUGH)

@@ -16,6 +16,7 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.numerics.sqp import Stationarity, minimised, stationarity
+from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
@@ -164,7 +165,7 @@ def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
 
 def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:
     """An optimum of a problem from a start, on a mesh that meets its tolerance; the second is what is missing, or ""."""
-    space, v = space_near(problem, start)
+    space, v = space_near(problem, closed_gait(problem, start, problem.delta_start))
     found = settled_apart(space, v, problem.delta_start, FIRST_RADIUS, ROUGH)
     report(found)
     return refined(descended(found, problem, report), report)

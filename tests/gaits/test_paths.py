@@ -198,8 +198,6 @@ def test_delta_keeps_its_meaning_from_class_to_class():
 @pytest.mark.parametrize(
     ("gait", "changes", "words"),
     [
-        (FreePath(4.0), {"formulation": "lifted"}, "has no formulation"),
-        (Polygon(4), {"formulation": "condensed"}, "has no formulation"),
         (FreePath(4.0), {"scheme": "trapezoid"}, "gauss-N or radau-N"),
         (FreePath(4.0), {"intervals": 2}, "mesh is too small"),
         (Polygon(6), {"intervals": 8}, "mesh is too small"),
