@@ -223,9 +223,7 @@ class Problem:
             raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def with_(self, **changes: object) -> Problem:
-        """A copy with some fields changed, validated anew. A class without formulations drops the one there was."""
-        if isinstance(changes.get("gait"), _PATH_CLASSES):
-            changes.setdefault("formulation", None)
+        """A copy with some fields changed, validated anew."""
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
     def to_dict(self) -> dict:

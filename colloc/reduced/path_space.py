@@ -29,9 +29,9 @@ from colloc.system.errors import NotConvergedError
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
 """Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
 
-_EXACT, _SETTLED, _ROUNDS = 1e-7, 1e-5, 12
-"""Violation at which a gait is a member; that of a start, where the worst instant of a cell swings between two; and rounds of
-moving the checks to the worst instants: two joints need 2 or 3, three joints up to 8."""
+_EXACT, _FITTED, _SETTLED, _ROUNDS = 1e-7, 1e-10, 1e-5, 12
+"""Violation at which a gait is a member; accuracy of the squared distance of a new one; violation of a start, where the worst
+instant of a cell swings between two; rounds of moving the checks to the worst instants: three joints need up to 8."""
 
 
 class PathSpace:
@@ -158,14 +158,14 @@ class PathSpace:
         """
         near, _ = path_through(self.problem, gait, self.mesh.edges)
         laid = self.problem.gait.parameters(near)
-        v = laid[self.own]
+        v, fitted = laid[self.own], False
         for _ in range(_ROUNDS):
             excess = self.move_checks(v)
             values = self.rows(v)
             outside = max((self.row_lower - values).max(), (values - self.row_upper).max(), excess)
-            if outside < _EXACT:
+            if outside < _EXACT and (fitted or np.abs(self.full_parameters(v) - laid).max() < _EXACT):
                 return v
-            v = minimised(_Nearest(self, laid), v, np.inf, _EXACT**2).v
+            v, fitted = minimised(_Nearest(self, laid), v, np.inf, _FITTED).v, True
         if outside < _SETTLED:
             return v
         bound = f"; allow more curvature than {self.problem.gait.curvature:g}" if self._arcs else ""

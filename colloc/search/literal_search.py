@@ -9,12 +9,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+import numpy as np
+
+from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, nearest_parameters, transcribed
 from colloc.results.level import Level
 from colloc.results.solution import Solution
-from colloc.search.diagnosis import explanation
+from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import level_of
 from colloc.search.nlp import NlpResult, Solver
@@ -41,11 +44,12 @@ def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None =
     def solved(delta: float) -> NlpResult:
         nonlocal message
         x = feasible_point(program, parameters, delta)
-        result = Solver(heading(program, x)).solve(x, delta, None, radius)
+        solver = Solver(heading(program, x))
+        result = solver.solve(x, delta, None, radius)
         levels.append(restated(level_of(program, result, delta, problem.formulation), unit))
         if on_level is not None:
             on_level(levels[-1])
-        message = "" if result.optimal else explanation(program, result, delta)
+        message = "" if result.optimal else _why(solver, x, result, delta)
         return result
 
     for delta in deltas(problem, problem.delta_start):
@@ -66,3 +70,11 @@ def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None =
             break
         parameters = result.x[program.layout.parameters[:, 0]]
     return Solution(stated, levels, seconds=time.perf_counter() - begin, message=message)
+
+
+def _why(solver: Solver[GaitProgram], x: np.ndarray, result: NlpResult, delta: float) -> str:
+    """What failed, and whether the equations were to blame from the start."""
+    redundant, text = redundant_equations(solver, x, delta), explanation(solver.transcription, result, delta)
+    if redundant:
+        text += f" Before the first solve the equations were rank deficient, which no optimiser bears: {', '.join(redundant)}."
+    return text

@@ -143,7 +143,10 @@ def best_gait(
         return maximise_efficiency(problem, on_level, before)
     begin = time.perf_counter()
     scaled, unit = in_friction_units(problem)
-    chosen = best_of(scaled, starts, seconds)
+    try:
+        chosen = best_of(scaled, starts, seconds)
+    except NotConvergedError:  # what fails with the guess alone is said in detail
+        return maximise_efficiency(problem, on_level)
     levels = [restated(level_found(found), unit) for found in chosen.levels]
     for level in levels:
         if on_level is not None:
