@@ -28,7 +28,6 @@ ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
     "self-contact": "another guess or a smaller joint_limit",
     "delta influence": "a smaller delta",
-    "delta step": "a smaller delta",
 }
 """What helps against a check that failed; anything else is a matter of the mesh."""
 

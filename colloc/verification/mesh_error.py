@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import crossing_bounds, crossing_depth, far_pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
@@ -48,6 +49,9 @@ class MeshError:
         Relative error of the collocated efficiency as a whole: all contributions, not linearised.
     unresolved : float
         What the panels that measured all this may have missed, relative to the efficiency.
+    turning : float
+        Rotation that collocation misses over a whole period, times the body's reach (half a length) over the distance; 0 where
+        a symmetry closes the rotation. It is what makes the distance of a closed gait ambiguous.
     """
 
     rotation: np.ndarray
@@ -58,6 +62,7 @@ class MeshError:
     violation: np.ndarray
     total: float
     unresolved: float
+    turning: float
 
     @property
     def estimate(self) -> float:
@@ -105,6 +110,7 @@ def mesh_error(
         constraint_violation(problem, mesh, gait),
         _efficiency(problem, *own.increments) / _fine_efficiency(problem, fine) - 1,
         float(fine.unresolved.sum()),
+        0.5 * abs(float(own.rotation.sum())) / float(abs(fine.path[-1])) if problem.gait.symmetry == NONE else 0.0,
     )
 
 

@@ -29,6 +29,10 @@ from colloc.verification.mesh_error import FINER, MeshError, efficiency_shares, 
 
 VIOLATION = 5e-7
 """Largest violation of a joint limit or of self-contact between nodes that needs no refinement [rad, body lengths]."""
+TURNING = 5e-5
+"""Largest rotation that collocation may miss, times the body's reach over the distance: half of what a certificate allows."""
+_STRICTER = 0.1
+"""Least share of the request that is planned for the sake of the rotation; what is missing then is left to the next plan."""
 MOST_POINTS = 12_000
 AIM = 0.4
 """The planned error is this fraction of the request: the gait, and its kinks with it, will still move."""
@@ -137,6 +141,8 @@ def planned_mesh(
     """
     fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
     error = mesh_error(problem, mesh, gait, delta, tolerance, fine)
+    if error.turning > TURNING:
+        tolerance = max(min(tolerance, error.estimate * TURNING / error.turning), _STRICTER * tolerance)
     if error.estimate <= tolerance and error.violation.max() <= VIOLATION:
         return None
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
