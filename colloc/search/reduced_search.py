@@ -20,7 +20,7 @@ from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
-from colloc.verification.refinement import AIM, MeshPlan, planned_mesh
+from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
 FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
@@ -30,14 +30,16 @@ VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
 """Accuracy of -d/W at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
 STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
 """What the first-order conditions have to keep to then; the efficiency is off by the square of that."""
+_GROWTH, _FEW_POINTS = 3, 300
+"""A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
 _DRIER, _LOST = 0.1, 0.5
 _ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
 _ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
 """Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
 _ADMISSIBLE = 1e-8
-_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 3
+_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
-half, then a quarter, then an eighth of it."""
+half, then a quarter of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +163,8 @@ def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
     """A mesh on which the gait is accurate enough; None if its own will do."""
     problem, gait, aim = found.space.problem, found.gait, AIM * 0.5 ** min(max(0, count - _SAME_AIM), _HALVINGS)
     mesh, delta = found.space.phase_mesh(gait), found.delta * gait.delta_unit
-    return planned_mesh(problem, mesh, gait, delta, problem.mesh_tolerance, kept=kept, aim=aim)
+    points = min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS)
+    return planned_mesh(problem, mesh, gait, delta, problem.mesh_tolerance, kept=kept, aim=aim, most_points=points)
 
 
 def is_viscous(found: Found) -> bool:

@@ -110,15 +110,17 @@ def mesh_error(
         constraint_violation(problem, mesh, gait),
         _efficiency(problem, *own.increments) / _fine_efficiency(problem, fine) - 1,
         float(fine.unresolved.sum()),
-        0.5 * abs(float(own.rotation.sum())) / float(abs(fine.path[-1])) if problem.gait.symmetry == NONE else 0.0,
+        abs(float(_turning(problem, own, fine).sum())),
     )
 
 
-def efficiency_shares(
+def interval_shares(
     problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
 ) -> np.ndarray:
-    """Relative efficiency error that collocating on each of the intervals from left to right adds, signed, ``(n,)``."""
-    return _collocated_intervals(problem, rule, left, right, gait, delta, fine).efficiency
+    """What collocating on each of the intervals from left to right adds to the relative efficiency error and to the rotation
+    that is missed (as `MeshError.turning`), magnitudes, ``(n,)``."""
+    own = _collocated_intervals(problem, rule, left, right, gait, delta, fine)
+    return np.abs(own.efficiency) + np.abs(_turning(problem, own, fine))
 
 
 class _Own(NamedTuple):
@@ -149,6 +151,11 @@ def _collocated_intervals(
     distance = float((fine.path[-1] * np.conj(direction)).real)
     efficiency = (pull * np.conj(direction)).real / distance - energy / fine.work[-1]
     return _Own(rotation, displacement, energy, efficiency, rates, (turned, moved, spent))
+
+
+def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
+    """Rotation missed by intervals, times the body's reach over the distance, ``(n,)``."""
+    return own.rotation * (0.5 / abs(fine.path[-1]) if problem.gait.symmetry == NONE else 0.0)
 
 
 def _fine_efficiency(problem: Problem, fine: FineMotion) -> float:
