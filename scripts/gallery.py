@@ -23,8 +23,9 @@ from colloc.gaits.problem import Problem, Reference
 from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import STYLE, draw_filmstrip, draw_shape_path
 from colloc.results.solution import Solution, versions
+from colloc.search.global_search import STARTS
 from colloc.search.modal_optimum import ModalOptimum, optimise_modal
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.optimise import best_gait
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_problem import ModalProblem
 from colloc.smooth.motion import Motion
@@ -156,7 +157,7 @@ def main() -> None:
         if names and example.name not in names:
             continue
         begin = time.process_time()
-        solution = maximise_efficiency(example.stated["PROBLEM"]) if example.optimised else None
+        solution = best_gait(example.stated["PROBLEM"], example.stated.get("STARTS", STARTS)) if example.optimised else None
         row = solved_row(solution) if solution is not None else prescribed_row(example)
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row

@@ -18,10 +18,11 @@ ROOT = Path(__file__).resolve().parents[1]
 @cache
 def solved_problem(name):
     from colloc.gaits.problem_file import read_problem_file
-    from colloc.search.optimise import maximise_efficiency
+    from colloc.search.global_search import STARTS
+    from colloc.search.optimise import best_gait
 
     stated = read_problem_file(ROOT / "problems" / f"{name}.py")
-    solution = maximise_efficiency(stated.problem)
+    solution = best_gait(stated.problem, stated.starts or STARTS)
     solution.source = stated.source
     return solution, stated.reference
 

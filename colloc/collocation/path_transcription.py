@@ -9,7 +9,7 @@ along a fixed direction and the first orientation is free.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -48,6 +48,10 @@ class PathTranscription:
     constraint_upper: np.ndarray
     groups: dict[str, slice]
     velocity: VelocityMap | None
+
+    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> PathTranscription:
+        """The program with other bounds of its rows."""
+        return replace(self, constraint_lower=lower, constraint_upper=upper)
 
     @property
     def lifted(self) -> bool:

@@ -12,7 +12,7 @@ turns the motion into that direction; nothing is imposed on the sideways displac
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -72,6 +72,10 @@ class Transcription:
     groups: dict[str, slice]
     checks: list[ShapeCheck]
     velocity: VelocityMap
+
+    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> Transcription:
+        """The program with other bounds of its rows."""
+        return replace(self, constraint_lower=lower, constraint_upper=upper)
 
     @property
     def lifted(self) -> bool:

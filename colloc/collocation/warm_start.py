@@ -75,7 +75,10 @@ def balanced_variables(
         theta -= np.arctan2(dy.sum(), dx.sum())
     c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
     _, quadrature = mesh.quadrature()
-    x[layout.distance[0, 1:]] = np.cumsum(unit * (quadrature @ (c * cx[0] - s * cy[0])))
+    distance = np.cumsum(unit * (quadrature @ (c * cx[0] - s * cy[0])))
+    if distance[-1] < 0:  # an antipodal gait that travels the other way along its axis
+        theta, distance = theta + np.pi, -distance
+    x[layout.distance[0, 1:]] = distance
     x[layout.work[0, 1:]] = np.cumsum(unit * (quadrature @ total_power(now.velocity, now.force)[0]))
     x[layout.theta[0]] = theta
     if layout.z.size:

@@ -23,6 +23,7 @@ from colloc.system.errors import ProblemError
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
 FULL, IMPLICIT = "full", "implicit velocity"
 FORMULATIONS = (FULL, IMPLICIT)
+_PATH_CLASSES = (FreePath, Polygon)
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 LONGEST_NAME = 200
@@ -127,13 +128,13 @@ class Problem:
     @property
     def has_path(self) -> bool:
         """Whether the class bounds the path itself (free paths, polygons) rather than its harmonics."""
-        return isinstance(self.gait, (FreePath, Polygon))
+        return isinstance(self.gait, _PATH_CLASSES)
 
     def _check_numbers(self) -> None:
         if self.delta_start is None:
             object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
         if self.intervals is None:
-            object.__setattr__(self, "intervals", self.gait.intervals)
+            object.__setattr__(self, "intervals", self.gait.intervals(self.body.n_joint))
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
@@ -249,6 +250,7 @@ class Problem:
             stated["body"] = Chain(tuple(stated["body"]["lengths"]))
             stated["friction"] = Friction(**stated["friction"])
             stated["gait"] = class_from(stated["gait"])
+            stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
             return cls(**stated)
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
@@ -257,6 +259,10 @@ class Problem:
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
         return statement_hash(self.to_dict())
+
+
+_EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
+"""What earlier files call the formulations; those of paths name none."""
 
 
 def statement_hash(stated: dict) -> str:

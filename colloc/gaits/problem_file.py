@@ -23,11 +23,14 @@ class ProblemFile:
     reference : Reference or None
     source : str
         Its text.
+    starts : int or None
+        ``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess leads to.
     """
 
     problem: Problem
     reference: Reference | None
     source: str
+    starts: int | None = None
 
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
@@ -46,7 +49,10 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
         raise ProblemError(f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}.")
     if reference is not None and not isinstance(reference, Reference):
         raise ProblemError(f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}.")
-    return ProblemFile(problem, reference, source)
+    starts = names.get("STARTS")
+    if starts is not None and (isinstance(starts, bool) or not isinstance(starts, int) or starts < 1):
+        raise ProblemError(f"{path}: STARTS must be a whole number of at least 1, not {starts!r}.")
+    return ProblemFile(problem, reference, source, starts)
 
 
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:

@@ -18,7 +18,6 @@ from colloc.system.interruption import interruptible
 Value = TypeVar("Value")
 _NOWHERE = 1e3
 """Objective where the balance cannot be solved: a line search steps back from it."""
-_EVALUATIONS = 150
 _ACTIVE = 1e-6
 """Slack below which an inequality may carry a multiplier; its product with the slack is measured too."""
 _EDGE = 1e-9
@@ -117,9 +116,7 @@ class SqpResult:
     on_edge: bool
 
 
-def minimised(
-    program: ReducedProgram, v: np.ndarray, radius: float, accuracy: float, iterations: int = _EVALUATIONS
-) -> SqpResult:
+def minimised(program: ReducedProgram, v: np.ndarray, radius: float, accuracy: float, iterations: int = 150) -> SqpResult:
     """Minimise from v within a box of the given radius round it.
 
     Parameters

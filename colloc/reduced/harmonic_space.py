@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.collocation.layout import problem_mesh
-from colloc.collocation.shape_checks import shape_checks
-from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.collocation.shape_checks import ShapeCheck, shape_checks
+from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.path_samples import fourier_through
@@ -18,7 +18,7 @@ from colloc.numerics.mesh import Mesh
 class HarmonicSpace:
     """Members of a class of harmonics by their parameters v, in which angles and rates are linear.
 
-    Rows: every shape check at its worst instant in every mesh cell, then the mean square shape speed.
+    Rows: shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed.
 
     Parameters
     ----------
@@ -43,13 +43,8 @@ class HarmonicSpace:
         # a function bounded by L has Fourier coefficients of at most 4 L / pi
         self.upper = np.full(self.n, 4 * limit / np.pi)
         self.lower = -self.upper
-        bounds = [(-limit, limit) if check.on_joint else (-np.inf, 0.0) for check in self.checks]
-        low, high = np.repeat(bounds, self.mesh.n, axis=0).T
-        self.row_lower = np.append(low, problem.smallest_shape_speed**2)
-        self.row_upper = np.append(high, np.inf)
-        names, ends = [*(check.name for check in self.checks), "shape speed"], self.mesh.n * np.arange(len(self.checks) + 1)
-        self.groups = {name: slice(a, b) for name, a, b in zip(names, ends, [*ends[1:], ends[-1] + 1], strict=True)}
         self.own = np.arange(self.n)
+        self.move_checks(np.zeros(self.n))
 
     def member(self, v: np.ndarray) -> Fourier:
         """The gait of parameters v."""
@@ -86,23 +81,42 @@ class HarmonicSpace:
         return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
 
     def move_checks(self, v: np.ndarray) -> float:
-        """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
-        gait, n_joint = self.member(v), self.problem.body.n_joint
-        times = worst_instants(gait, self.mesh, self.checks)
-        placed = zip(self.checks, times, strict=True)
-        self._placed = [(c, held_shares(c, gait, t), self.problem.gait.angle_matrix(t, n_joint)) for c, t in placed]
-        values = np.concatenate([check_values(c, gait, t) for c, t in zip(self.checks, times, strict=True)])
-        return float(max((values - self.row_upper[:-1]).max(), (self.row_lower[:-1] - values).max()))
+        """Place the checks at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+        gait, n_joint, limit = self.member(v), self.problem.body.n_joint, self.problem.joint_limit
+        self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
+        for check, (cells, times) in zip(self.checks, peaks(gait, self.mesh, self.checks, limit), strict=True):
+            self.watched[check.name] = cells
+            if not cells.size:
+                continue
+            values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
+            self._placed.append((check, held_shares(check, gait, times), matrix))
+            excess = max(excess, float((np.abs(values) - limit if check.on_joint else values).max()))
+            # of the two bounds on a joint the nearer one
+            below = check.on_joint & (values < 0)
+            low.append(np.where(below, -limit, -np.inf))
+            high.append(np.where(below, np.inf, limit if check.on_joint else 0.0))
+        self.watched["shape speed"] = np.zeros(1, dtype=int)
+        self.row_lower = np.concatenate([*low, [self.problem.smallest_shape_speed**2]])
+        self.row_upper = np.concatenate([*high, [np.inf]])
+        return excess
 
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""
-        values = [check.cut((matrix @ v).T, shares[None]).full().ravel() for check, shares, matrix in self._placed]
-        return np.append(np.concatenate(values), v @ self._square @ v)
+        values = [self._value(v, *placed) for placed in self._placed]
+        return np.concatenate([*values, [v @ self._square @ v]])
+
+    @staticmethod
+    def _value(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        if check.on_joint:
+            return matrix[:, check.joint] @ v
+        return check.cut((matrix @ v).T, shares[None]).full().ravel()
+
+    @staticmethod
+    def _slope(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        if check.on_joint:
+            return matrix[:, check.joint]
+        return np.einsum("jt,tjp->tp", check.slope((matrix @ v).T, shares[None]).full(), matrix)
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        slopes = [
-            np.einsum("jt,tjp->tp", check.slope((matrix @ v).T, shares[None]).full(), matrix)
-            for check, shares, matrix in self._placed
-        ]
-        return np.vstack([*slopes, 2 * self._square @ v])
+        return np.vstack([*(self._slope(v, *placed) for placed in self._placed), 2 * self._square @ v])

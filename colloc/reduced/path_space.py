@@ -13,6 +13,7 @@ import numpy as np
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.path_equations import chord
 from colloc.collocation.path_transcription import path_through, transcribe_fit
+from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.paths import ArcPath, Corners
@@ -28,9 +29,9 @@ from colloc.system.errors import NotConvergedError
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
 """Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
 
-_EXACT, _SETTLED, _ROUNDS = 1e-7, 1e-5, 12
-"""Violation at which a gait is a member; that of a start, where the worst instant of a cell swings between two; and rounds of
-moving the checks to the worst instants: two joints need 2 or 3, three joints up to 8."""
+_EXACT, _FITTED, _SETTLED, _ROUNDS = 1e-7, 1e-10, 1e-5, 12
+"""Violation at which a gait is a member; accuracy of the squared distance of a new one; violation of a start, where the worst
+instant of a cell swings between two; rounds of moving the checks to the worst instants: three joints need up to 8."""
 
 
 class PathSpace:
@@ -74,12 +75,13 @@ class PathSpace:
         self.n = self.own.size
         self.lower, self.upper = fit.lower[self.own], fit.upper[self.own]
         dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
-        kept = {name: np.arange(rows.start, rows.stop) for name, rows in fit.groups.items() if name not in dropped}
-        self._kept, ends = np.concatenate(list(kept.values())), np.cumsum([0, *(rows.size for rows in kept.values())])
-        self.groups = {name: slice(int(a), int(b)) for name, a, b in zip(kept, ends, ends[1:], strict=False)}
-        self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
+        checked = [check.name for check in fit.checks]
+        self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in fit.groups.items() if n not in (*dropped, *checked)}
+        self._kept = np.empty(0, dtype=int)
         self._place()
         self._followed, self._framed = remembered(self._follow), remembered(self._frame)
+        laid = problem.gait.parameters(path_through(problem, near, self.mesh.edges)[0])
+        self.move_checks(laid[self.own])
 
     def _place(self) -> None:
         """Where the collocation points lie, as functions of the parameters."""
@@ -156,14 +158,14 @@ class PathSpace:
         """
         near, _ = path_through(self.problem, gait, self.mesh.edges)
         laid = self.problem.gait.parameters(near)
-        v, nearest = laid[self.own], _Nearest(self, laid)
+        v, fitted = laid[self.own], False
         for _ in range(_ROUNDS):
             excess = self.move_checks(v)
             values = self.rows(v)
             outside = max((self.row_lower - values).max(), (values - self.row_upper).max(), excess)
-            if outside < _EXACT:
+            if outside < _EXACT and (fitted or np.abs(self.full_parameters(v) - laid).max() < _EXACT):
                 return v
-            v = minimised(nearest, v, np.inf, _EXACT**2).v
+            v, fitted = minimised(_Nearest(self, laid), v, np.inf, _FITTED).v, True
         if outside < _SETTLED:
             return v
         bound = f"; allow more curvature than {self.problem.gait.curvature:g}" if self._arcs else ""
@@ -196,10 +198,25 @@ class PathSpace:
         return (on_local.reshape(on_local.shape[0], -1) @ self._scatter) @ frame
 
     def move_checks(self, v: np.ndarray) -> float:
-        """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
-        p = self.full_parameters(v)
-        self._moved = self._oracles.parameter_vector(1.0, self._fit.block_parameters(p))
-        return self._fit.check_excess(p)
+        """Place the checks at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+        p, fit = self.full_parameters(v), self._fit
+        gait, limit = fit.member(p), self.problem.joint_limit
+        mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
+        given = {name: block.parameters.copy() for name, block in zip(self._geometry.blocks, fit.assembly.blocks, strict=True)}
+        for check, (cells, times) in zip(fit.checks, peaks(gait, mesh, fit.checks, limit), strict=True):
+            self.watched[check.name] = cells
+            if not cells.size:
+                continue
+            tau, values = np.full(mesh.n, 0.5), check_values(check, gait, times)
+            tau[cells] = np.clip((times - mesh.edges[cells]) / mesh.h[cells], 0.0, 1.0)
+            given[check.name][:-1] = self._geometry.given(tau)
+            given[check.name][-1, cells] = held_shares(check, gait, times)
+            excess = max(excess, float((np.abs(values) - limit if check.on_joint else values).max()))
+        self._kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
+        self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
+        objective = fit.assembly.objective.parameters
+        self._moved = self._oracles.parameter_vector(1.0, [objective, *given.values()])
+        return excess
 
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""

@@ -24,8 +24,8 @@ class SearchSpace(Shapes, Protocol):
     upper: np.ndarray
     row_lower: np.ndarray
     row_upper: np.ndarray
-    groups: dict[str, slice]
-    """Names of the rows, as the full program has them."""
+    watched: dict[str, np.ndarray]
+    """The rows in order: of each kind, those of the full program's rows of that name that are among them."""
     own: np.ndarray
     """``(n,)``: which of the full program's gait parameters are v."""
 
@@ -61,7 +61,6 @@ class ReducedProgram:
     Attributes
     ----------
     lower, upper : (n,)
-    row_lower, row_upper : (n_row,)
     delta : float
         In the units of the class; may be changed.
     """
@@ -72,9 +71,17 @@ class ReducedProgram:
         self.motion = ReducedMotion(problem.body, problem.friction, problem.gait.symmetry, space.mesh, space)
         self._closes = problem.gait.symmetry == NONE
         self.lower, self.upper = space.lower, space.upper
-        none = np.zeros(int(self._closes))
-        self.row_lower, self.row_upper = (np.concatenate([none, rows]) for rows in (space.row_lower, space.row_upper))
         self._gradients: tuple[bytes, float, np.ndarray] | None = None
+
+    @property
+    def row_lower(self) -> np.ndarray:
+        """Lower bounds of the rows; they change as the checks move."""
+        return np.append(0.0, self.space.row_lower) if self._closes else self.space.row_lower
+
+    @property
+    def row_upper(self) -> np.ndarray:
+        """Upper bounds of the rows."""
+        return np.append(0.0, self.space.row_upper) if self._closes else self.space.row_upper
 
     def objective(self, v: np.ndarray) -> float:
         """-d/W."""

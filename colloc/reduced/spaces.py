@@ -9,6 +9,7 @@ from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.path_space import PathSpace
@@ -23,6 +24,19 @@ def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray
     if problem.has_path:
         return transcribe_path(problem, problem.guess if gait is None else gait, edges, far)
     return transcribe(problem, edges, far)
+
+
+def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
+    """The program with the net rotation closed as variables x close it.
+
+    The first orientation of an antipodal gait is minus the last, or, where it travels the other way along its axis, pi more:
+    their sum is a whole number of turns.
+    """
+    if program.problem.gait.symmetry != ANTIPODAL:
+        return program
+    theta, rows = x[program.layout.theta[0]], np.zeros(program.constraint_lower.size)
+    rows[program.groups["rotation"]] = 2 * np.pi * np.round((theta[0] + theta[-1]) / (2 * np.pi))
+    return program.with_rows(program.constraint_lower + rows, program.constraint_upper + rows)
 
 
 def space_near(

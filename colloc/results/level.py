@@ -59,8 +59,3 @@ class Level:
     evaluation_seconds: float
     scheme: str = ""
     program: str = REDUCED
-
-    @property
-    def full(self) -> bool:
-        """Whether IPOPT solved the problem's own formulation, and no reduced one was searched."""
-        return self.program != REDUCED

@@ -16,36 +16,13 @@ from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.level import Level
 from colloc.results.solution_card import solution_card
 from colloc.system.errors import ProblemError
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """A gait that a search over many starts met.
-
-    Attributes
-    ----------
-    efficiency : float
-        As collocation sees it on a first mesh.
-    delta : float
-        To which it was followed.
-    starts : int
-        How many led to it.
-    on_speed_floor : bool
-        Whether the bound on the shape speed decided its size.
-    gait : AnyGait
-    """
-
-    efficiency: float
-    delta: float
-    starts: int
-    on_speed_floor: bool
-    gait: AnyGait
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +69,12 @@ class Solution:
     message : str
         What went wrong and what to try, if something did.
     versions : dict
+    changed : bool
+        Whether another program changed the file that the result was loaded from; `colloc verify` decides what it is worth.
     starts : int
         How many the gait is the best of.
     others : tuple of Alternative
         Distinct gaits they led to, the one of this solution first; empty for a single start.
-    changed : bool
-        Whether another program changed the file that the result was loaded from; `colloc verify` decides what it is worth.
     """
 
     problem: Problem
@@ -107,9 +84,9 @@ class Solution:
     source: str = ""
     message: str = ""
     versions: dict[str, str] = field(default_factory=lambda: versions())
+    changed: bool = False
     starts: int = 1
     others: tuple[Alternative, ...] = ()
-    changed: bool = False
 
     def __repr__(self) -> str:
         facts = [self.problem.name, self.status]
@@ -221,9 +198,10 @@ class Solution:
             centre = np.where(second, 2 * end[:, None] - centre, centre)
             end = 2 * end
         elif symmetry == "antipodal":
-            mirror = np.array([[1.0], [-1.0], [-1.0]])
+            mirror, x_theta = np.array([[1.0], [-1.0], [-1.0]]), self.last.x[self.layout.theta[0]]
             z = np.where(second, mirror * z, z)
-            theta = np.where(second, -theta, theta)
+            turns = 2 * np.pi * np.round((x_theta[0] + x_theta[-1]) / (2 * np.pi))
+            theta = np.where(second, turns - theta, theta)
             centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
             end = np.array([2 * end[0], 0.0])
         centre = centre + period * end[:, None]

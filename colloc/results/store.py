@@ -21,8 +21,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.gaits.gait_fields import fields
+from colloc.gaits.gait_fields import fields, gait_from
 from colloc.gaits.problem import Problem, statement_hash
+from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.level import Level
 from colloc.results.solution import Solution
@@ -99,6 +100,9 @@ def _write(file: h5py.File, solution: Solution) -> None:
     put(file, "problem", json.dumps(solution.problem.to_dict()))
     put(file, "source", solution.source)
     put(file, "versions", json.dumps(solution.versions))
+    put_attribute(file, "starts", solution.starts)
+    others = [{**dataclasses.asdict(other), "gait": fields(other.gait)} for other in solution.others]
+    put(file, "others", json.dumps(others))
     for index, level in enumerate(solution.levels):
         group = file.create_group(f"levels/{index:03d}")
         for name, units in _LEVEL_ARRAYS.items():
@@ -150,7 +154,8 @@ def _read(file: h5py.File) -> Solution:
     for name in sorted(found):
         group = child(found, name)
         arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
-        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Level) if f.name not in _LEVEL_ARRAYS}
+        there = [f.name for f in dataclasses.fields(Level) if f.default is dataclasses.MISSING or f.name in group.attrs]
+        rest = {name: attribute(group, name) for name in there if name not in _LEVEL_ARRAYS}
         levels.append(Level(**arrays, **rest))
     certificate = UNCERTIFIED
     if "certificate" in file:
@@ -169,6 +174,9 @@ def _read(file: h5py.File) -> Solution:
         str(attribute(file, "message")),
         json.loads(text(file, "versions")),
     )
+    if "others" in file:
+        others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(text(file, "others"))]
+        solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
     if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
         raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     return solution

@@ -14,7 +14,7 @@ import numpy as np
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
-from colloc.reduced.spaces import transcribed
+from colloc.reduced.spaces import heading, transcribed
 from colloc.results.level import REDUCED, Level
 from colloc.search.diagnosis import explanation
 from colloc.search.nlp import NlpResult, Solver
@@ -95,8 +95,9 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     space, delta = found.space, found.delta
     problem = space.problem.with_(scheme=space.mesh.scheme.name)
     program = transcribed(problem, found.gait, space.mesh.edges, space.far)
-    solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
     x = feasible_point(program, space.full_parameters(found.v), delta)
+    program = heading(program, x)
+    solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
     before = solver.measured(x, delta, *_multipliers(found, program))
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     if result.optimal:
@@ -114,8 +115,9 @@ def _multipliers(found: Found, program: GaitProgram) -> tuple[np.ndarray, np.nda
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
     conditions, space = found.conditions, found.space
-    on_rows = conditions.on_rows[-space.row_lower.size :]
-    for name, rows in space.groups.items():
-        lam_g[program.groups[name]] = on_rows[rows]
+    on_rows, at = conditions.on_rows[-space.row_lower.size :], 0
+    for name, rows in space.watched.items():
+        lam_g[program.groups[name].start + rows] = on_rows[at : at + rows.size]
+        at += rows.size
     lam_x[program.layout.parameters[space.own, 0]] = conditions.on_bounds
     return lam_x, lam_g

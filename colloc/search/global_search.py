@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import chain, islice
 
 import numpy as np
 
@@ -23,13 +24,22 @@ from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor, seed_class
 from colloc.mechanics.body import Chain
-from colloc.reduced.closure import start_near
+from colloc.reduced.closure import closed_gait
 from colloc.reduced.spaces import space_near
-from colloc.results.solution import Alternative
-from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, descended, settled_apart
+from colloc.results.alternative import Alternative
+from colloc.search.reduced_search import (
+    FIRST_RADIUS,
+    NEXT_RADIUS,
+    ROUGH,
+    VERY_ROUGH,
+    Found,
+    descended,
+    is_viscous,
+    settled_apart,
+)
 from colloc.system.errors import CollocError, NotConvergedError
 
-STARTS = 8
+STARTS = 16
 _FEWEST = 12
 """Intervals of a coarse mesh, at least; else half of what the class asks for."""
 _LEVELS = (1.0, 0.2)
@@ -65,12 +75,10 @@ def starting_gaits(problem: Problem, count: int, seed: int = 0) -> Iterator[AnyG
     waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
     own = seed_class(problem)
     first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in (*known, *waves))]
-    for k in range(count):
-        # known gaits and seeds take turns: neither is always better
-        if k % 2 == 0 and k // 2 < len(first):
-            yield first[k // 2]
-        else:
-            yield latin_hypercube_gait(problem, seed, k // 2)
+    # known gaits and seeds take turns: neither are always better
+    seeds = (latin_hypercube_gait(problem, seed, k) for k in range(count))
+    turns = chain.from_iterable(zip(first, seeds, strict=False))
+    return islice(chain(turns, seeds), count)
 
 
 def same_gait(problem: Problem, a: Found, b: Found) -> bool:
@@ -81,27 +89,31 @@ def same_gait(problem: Problem, a: Found, b: Found) -> bool:
     return distance(one, other, problem.body, problem.friction) < _SAME_GAIT
 
 
-def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> list[Candidate]:
-    """What the starts lead to on a coarse mesh, most efficient first; at least one start is tried."""
-    intervals = min(problem.intervals, max(problem.gait.intervals // 2, _FEWEST))
+def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
+    """What the starts lead to on a coarse mesh, most efficient first, and how many were tried, at least one."""
+    intervals = min(problem.intervals, max(problem.gait.intervals(problem.body.n_joint) // 2, _FEWEST))
     coarse = problem.with_(intervals=intervals)
     deltas = [max(factor * problem.delta_start, problem.delta) for factor in _LEVELS]
     known: list[list[Candidate]] = [[] for _ in deltas]
+    tried = 0
     for start, gait in enumerate(starting_gaits(problem, count)):
         if start > 0 and not goes_on():
             break
+        tried += 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
             _follow(coarse, gait, start, deltas, known)
-    return sorted(known[-1], key=lambda c: c.found.objective)
+    return sorted(known[-1], key=lambda c: c.found.objective), tried
 
 
 def _follow(problem: Problem, gait: AnyGait, start: int, deltas: list[float], known: list[list[Candidate]]) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
-    space, v = start_near(problem, gait, deltas[0])
+    space, v = space_near(problem, closed_gait(problem, gait, deltas[0]))
     before, radius = None, FIRST_RADIUS
     for delta, here in zip(deltas, known, strict=True):
         found = settled_apart(space, v, delta, radius, VERY_ROUGH)
+        if is_viscous(found):
+            continue  # as far as this delta goes, the start is as it was
         space, v, radius = found.space, found.v, NEXT_RADIUS
         at = next((c for c in here if same_gait(problem, c.found, found)), None)
         new = at is None
@@ -157,7 +169,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     def goes_on() -> bool:
         return time.perf_counter() - begin < seconds
 
-    known = candidates(problem, count, goes_on)
+    known, tried = candidates(problem, count, goes_on)
     if not known:
         raise NotConvergedError("no start led to any gait of the class; give a guess.")
     ends: list[tuple[Candidate, list[Found]]] = []
@@ -175,7 +187,6 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     ends.sort(key=lambda end: end[1][-1].objective)
     followed = [_alternative(problem, levels[-1], c.starts) for c, levels in ends]
     dropped = [_alternative(problem, c.found, c.starts) for c in known if not any(c is done for done, _ in ends)]
-    tried = sum(len(c.starts) for c in known)
     return Chosen(ends[0][1][-1], ends[0][1], tried, (*followed, *dropped))
 
 

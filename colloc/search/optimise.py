@@ -17,6 +17,7 @@ from colloc.results.solution import Solution
 from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
+from colloc.search.literal_search import literal_optimum
 from colloc.search.reduced_search import Found, descended, refined, searched
 from colloc.system.errors import NotConvergedError
 
@@ -27,7 +28,6 @@ ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
     "self-contact": "another guess or a smaller joint_limit",
     "delta influence": "a smaller delta",
-    "delta step": "a smaller delta",
 }
 """What helps against a check that failed; anything else is a matter of the mesh."""
 
@@ -56,7 +56,7 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
         Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
     """
     begin, levels = time.perf_counter(), list(before)
-    stated, (problem, unit) = problem, in_friction_units(problem)
+    scaled, unit = in_friction_units(problem)
 
     def report(level: Level) -> None:
         levels.append(restated(level, unit))
@@ -68,17 +68,19 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
 
     if before:
         done = Solution(problem, before)
-        space, v = space_near(problem, done.gait, done.last.edges, done.last.scheme)
-        found, lacks = refined(descended(Found.at(space, v, done.last.delta), problem, ended), ended)
+        space, v = space_near(scaled, done.gait, done.last.edges, done.last.scheme)
+        found, lacks = refined(descended(Found.at(space, v, done.last.delta), scaled, ended), ended)
     else:
-        found, lacks = searched(problem, problem.guess, ended)
+        found, lacks = searched(scaled, scaled.guess, ended)
     level, fails = answer(found)
     report(level)
     message = " ".join(part for part in (fails, lacks) if part)
-    return Solution(stated, levels, seconds=time.perf_counter() - begin, message=message)
+    return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)
 
 
-def maximise_efficiency(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
+def maximise_efficiency(
+    problem: Problem, on_level: Report | None = None, before: Sequence[Level] = (), *, literal: bool = False
+) -> Solution:
     """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
 
     Parameters
@@ -88,6 +90,8 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
         Called with every `colloc.results.solution.Level` as it ends.
     before : sequence of Level
         Levels of an interrupted run of the same problem; it goes on from the last one.
+    literal : bool
+        Whether IPOPT searches on the full program from the guess alone (`colloc.search.literal_search`).
 
     Returns
     -------
@@ -95,7 +99,7 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
         With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
     """
     begin = time.perf_counter()
-    solution = optimum(problem, on_level, before)
+    solution = literal_optimum(problem, on_level) if literal else optimum(problem, on_level, before)
     if is_trivial(solution):
         solution.message = (
             "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
@@ -137,8 +141,11 @@ def best_gait(
     if starts == 1 or before:
         return maximise_efficiency(problem, on_level, before)
     begin = time.perf_counter()
-    own, unit = in_friction_units(problem)
-    chosen = best_of(own, starts, seconds)
+    scaled, unit = in_friction_units(problem)
+    try:
+        chosen = best_of(scaled, starts, seconds)
+    except NotConvergedError:  # what fails with the guess alone is said in detail
+        return maximise_efficiency(problem, on_level)
     levels = [restated(level_found(found), unit) for found in chosen.levels]
     for level in levels:
         if on_level is not None:

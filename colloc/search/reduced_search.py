@@ -16,10 +16,11 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.numerics.sqp import Stationarity, minimised, stationarity
-from colloc.reduced.closure import start_near
+from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
+from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
-from colloc.verification.refinement import AIM, MeshPlan, planned_mesh
+from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
 FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
@@ -29,9 +30,14 @@ VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
 """Accuracy of -d/W at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
 STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
 """What the first-order conditions have to keep to then; the efficiency is off by the square of that."""
-_ROUNDS, _AT_REST = 12, 1e-8
+_GROWTH, _FEW_POINTS = 3, 300
+"""A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
+_DRIER, _LOST = 0.1, 0.5
+_ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
+_ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
+"""Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
 _ADMISSIBLE = 1e-8
-_MESHES, _SAME_AIM = 8, 2
+_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
 half, then a quarter of it."""
 
@@ -92,9 +98,9 @@ def settled(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accu
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
     space.move_checks(v)
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS[accuracy]):
         before = v
-        result = minimised(program, v, radius, accuracy)
+        result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy])
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = space.move_checks(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
@@ -155,14 +161,30 @@ def refined(found: Found, report: Report) -> tuple[Found, str]:
 
 def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
     """A mesh on which the gait is accurate enough; None if its own will do."""
-    problem, gait, aim = found.space.problem, found.gait, AIM * 0.5 ** max(0, count - _SAME_AIM)
+    problem, gait, aim = found.space.problem, found.gait, AIM * 0.5 ** min(max(0, count - _SAME_AIM), _HALVINGS)
     mesh, delta = found.space.phase_mesh(gait), found.delta * gait.delta_unit
-    return planned_mesh(problem, mesh, gait, delta, problem.mesh_tolerance, kept=kept, aim=aim)
+    points = min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS)
+    return planned_mesh(problem, mesh, gait, delta, problem.mesh_tolerance, kept=kept, aim=aim, most_points=points)
+
+
+def is_viscous(found: Found) -> bool:
+    """Whether the gait owes its efficiency to delta: at a tenth of it half is lost. Slow parts of a retraced gait do that."""
+    dry = ReducedProgram(found.space, _DRIER * found.delta).objective(found.v)
+    return not dry <= _LOST * found.objective
+
+
+def begun(space: SearchSpace, v: np.ndarray, levels: list[float], accuracy: float) -> Found:
+    """The gait of the first level; where that is a viscous one, the start is tried at the next delta."""
+    for delta in levels:
+        found = settled_apart(space, v, delta, FIRST_RADIUS, accuracy)
+        if not is_viscous(found):
+            break
+    return found
 
 
 def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:
     """An optimum of a problem from a start, on a mesh that meets its tolerance; the second is what is missing, or ""."""
-    space, v = start_near(problem, start, problem.delta_start)
-    found = settled_apart(space, v, problem.delta_start, FIRST_RADIUS, ROUGH)
+    space, v = space_near(problem, closed_gait(problem, start, problem.delta_start))
+    found = begun(space, v, deltas(problem, problem.delta_start), ROUGH)
     report(found)
     return refined(descended(found, problem, report), report)

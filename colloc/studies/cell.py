@@ -15,7 +15,8 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.laid_gaits import laid_into
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
-from colloc.reduced.closure import start_near
+from colloc.reduced.closure import closed_gait
+from colloc.reduced.spaces import space_near
 from colloc.results.certificate import corner_phases
 from colloc.results.distinct_optima import ERROR, Outcome, fourier_series
 from colloc.results.solution import SOLVED
@@ -122,7 +123,7 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
         return None
     try:
         near = laid_into(kind, gait, body, problem.joint_limit, problem.smallest_shape_speed)
-        space, v = start_near(problem, near, problem.delta)
+        space, v = space_near(problem, closed_gait(problem, near))
         projected = space.member(v)
         problem.with_(guess=projected)
     except CollocError:

@@ -155,17 +155,6 @@ def test_influence_of_delta(failures, replays, sign):
     judged("delta influence", run)
 
 
-def test_step_of_delta(failures, three_link):
-    before = three_link.levels[-2]
-    allowed = 1e-2 * before.delta / three_link.last.delta
-
-    def run(f):
-        other = replace(before, efficiency=three_link.efficiency / (1 + f * allowed))
-        return failures(Solution(three_link.problem, [*three_link.levels[:-2], other, three_link.last]))
-
-    judged("delta step", run)
-
-
 def circle(radius):
     """A path of eight arcs."""
     turn = 2 * np.pi * np.arange(9) / 8

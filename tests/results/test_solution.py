@@ -134,7 +134,7 @@ def test_a_solution_is_shown_in_a_line(three_link):
     assert re.fullmatch(r"<Solution three_link, solved, d/W = 0\.26003 \+- \de-\d\d at delta = 1.0e-04>", repr(three_link))
     failed = Solution(three_link.problem, three_link.levels[:1])
     assert "three_link, not converged" in repr(failed)
-    assert "(not replayed) at delta = 1.0e-01" in repr(failed)
+    assert "(not replayed) at delta = 2.0e-02" in repr(failed)
     assert repr(Solution(three_link.problem, [])) == "<Solution three_link, not converged>"
 
 

@@ -79,7 +79,7 @@ def test_a_bilateral_triangle_shrinks_to_the_certified_two_fifths(solved):
     corners = solution.gait.corners
     np.testing.assert_allclose(corners[0, [0, 2]], -corners[1, [0, 2]], atol=1e-9)
     # one joint moves along each side but the last, and both move alike along that
-    assert abs(corners[1, 1] - corners[1, 0]) < 1e-2
+    assert np.abs(corners[:, 1] - corners[:, 0]).min() < 1e-2
     motion = solution.sample(np.array([0.0, 0.25, 1.0, 1.25]))
     np.testing.assert_allclose(motion.centre[0, 2] - motion.centre[0, 0], solution.distance, rtol=1e-9)
     np.testing.assert_allclose(motion.centre[:, 3] - motion.centre[:, 1], [solution.distance, 0], atol=1e-9)
@@ -150,7 +150,7 @@ def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
     checks = {check.name: check for check in certificate.checks}
     assert checks["self-contact"].passed
     assert abs(checks["replay gap"].value) < 1e-3
-    assert {check.name for check in certificate.failures} <= {"replay gap", "delta influence", "delta step"}
+    assert {check.name for check in certificate.failures} <= {"replay gap", "delta influence"}
 
 
 @pytest.mark.slow

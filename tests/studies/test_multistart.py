@@ -135,16 +135,15 @@ def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
 
 
 def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
-    # where friction resists backwards sliding five times as much, small gaits beat large ones
-    stated = problem(
-        friction=Friction(0.5, 1, 5), delta=1e-3, delta_start=1e-2, guess=ellipse(0.5, 0.12, 0.12), mesh_tolerance=3e-5
-    )
+    # without the bound the best gait has a shape speed of 1.86
+    bounds = {"smallest_shape_speed": 2.0, "delta": 1e-3, "mesh_tolerance": 1e-4}
+    stated = problem(friction=Friction(0.5, 1, 5), guess=ellipse(0, 1.8, 1.2), **bounds)
     solution = maximise_efficiency(stated)
     assert solution.status == SOLVED
     assert on_speed_floor(stated, solution.gait)
-    assert "smallest_shape_speed = 0.1" in solution.message
-    assert not on_speed_floor(stated, ellipse(0.2, 1.2, 0.8))
-    found = [outcome(0, solution.gait), outcome(1)]
+    assert "smallest_shape_speed = 2" in solution.message
+    assert not on_speed_floor(stated, ellipse(0.0, 2.0, 1.2))
+    found = [outcome(0, solution.gait), outcome(1, ellipse(0.0, 2.0, 1.2))]
     lines = multistart.summary_lines(stated, found, basins(stated, found))
     assert sum("on the bound smallest_shape_speed" in line for line in lines) == 1
 
