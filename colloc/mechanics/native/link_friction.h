@@ -1,6 +1,8 @@
 /* Friction on one link in closed form: what colloc/mechanics/link_friction.py states for arrays, for one link at one instant.
    The names are those of that module; the formulas are derived and explained there. */
 
+#pragma once
+
 #include <math.h>
 #include <stdbool.h>
 
