@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import hashlib
+import os
 import platform
 import shutil
 import sys
@@ -94,8 +95,9 @@ def _digest(file: Path) -> str:
 
 
 def _compiled(sources: Path, folder: Path, name: str) -> Path | None:
-    """The library, put in the folder; None without a compiler."""
-    if c_compiler() is None:
+    """The library, put in the folder; None without a compiler, or where nothing can be kept."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if c_compiler() is None or not os.access(folder, os.W_OK):
         return None
     with tempfile.TemporaryDirectory(prefix="colloc-") as scratch:
         made = Path(scratch) / "kernel.so"

@@ -12,12 +12,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_simpson, simpson
 
 from colloc.mechanics.body import Chain
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.numerics.simpson import cumulative_simpson, simpson
 from colloc.system.errors import ProblemError
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -99,11 +99,11 @@ def _integrated(segments: list[_Samples], every: int) -> tuple[float, float, flo
     heading, end, worked, actuated, worst = 0.0, 0j, 0.0, 0.0, 0.0
     for segment in segments:
         s = segment.every(every)
-        theta = heading + cumulative_simpson(s.z[2], x=s.t, initial=0.0)
-        cos, sin = np.cos(theta), np.sin(theta)
-        end += simpson(cos * s.centre_x - sin * s.centre_y, x=s.t) + 1j * simpson(sin * s.centre_x + cos * s.centre_y, x=s.t)
+        step = (s.t[-1] - s.t[0]) / (s.t.size - 1)
+        theta = heading + cumulative_simpson(s.z[2], step)
+        end += complex(simpson(np.exp(1j * theta) * (s.centre_x + 1j * s.centre_y), step))
         heading = float(theta[-1])
-        worked, actuated = worked + float(simpson(s.power, x=s.t)), actuated + float(simpson(s.actuator_power, x=s.t))
+        worked, actuated = worked + float(simpson(s.power, step)), actuated + float(simpson(s.actuator_power, step))
         worst = max(worst, float(s.residual.max()))
     return float(abs(end)), worked, heading, actuated, worst
 
