@@ -68,13 +68,12 @@ def outcome(problem: Problem) -> dict:
     """What the tables need of one solve."""
     begin = time.process_time()
     solution = maximise_efficiency(problem)
-    certificate = solution.certificate
     return {
         "status": solution.status,
         "message": solution.message,
-        "efficiency": solution.efficiency if certificate is None else certificate.efficiency,
-        "distance": solution.distance if certificate is None else certificate.distance,
-        "work": solution.work if certificate is None else certificate.work,
+        "efficiency": solution.measured.efficiency,
+        "distance": solution.measured.distance,
+        "work": solution.measured.work,
         "cpu_seconds": time.process_time() - begin,
         "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "iterations": sum(level.iterations for level in solution.levels),

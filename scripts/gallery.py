@@ -102,7 +102,7 @@ def prescribed_row(example: Example) -> dict[str, Any]:
 def solved_row(solution: Solution) -> dict[str, Any]:
     """Numbers of a solved problem, by its certificate."""
     certificate = solution.certificate
-    if certificate is None:
+    if not certificate.replayed:
         return {"status": solution.status, "delta": solution.last.delta}
     return {
         "status": solution.status,

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
 from colloc.gaits.problem import Problem
+from colloc.system.errors import ChangedFileWarning, CollocError
 
 CACHE = "bounds.json"
 """Where bounds are kept, beside the results."""
 
 
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
-    """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for."""
-    cache = folder / CACHE
-    if compute:
-        return efficiency_bound(problem.body, problem.friction, problem.joint_limit, cache=cache)
-    return known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
+    """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
+
+    A cache that cannot be used is left as it is, with a `ChangedFileWarning`: no result depends on it.
+    """
+    domain, cache = (problem.body, problem.friction, problem.joint_limit), folder / CACHE
+    try:
+        known = known_bound(*domain, cache=cache)
+    except (CollocError, TypeError, AttributeError) as error:  # the last two: entries of another kind
+        reason = str(error) if isinstance(error, CollocError) else f"{cache} holds no bounds; delete it."
+        warnings.warn(f"{reason} No bound is taken from it.", ChangedFileWarning, stacklevel=2)
+        return efficiency_bound(*domain) if compute else None
+    return efficiency_bound(*domain, cache=cache) if compute and known is None else known
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:

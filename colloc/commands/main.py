@@ -7,7 +7,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from colloc.commands.options import BAD_PROBLEM, OK
+from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
 
 SUBCOMMANDS = {
     "solve": ("solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
@@ -46,6 +46,10 @@ def help_text() -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``colloc``; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    return exit_code(lambda: _command(words), as_json="--json" in words)
+
+
+def _command(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help", "help"):
         print(help_text())
         return OK if words else BAD_PROBLEM

@@ -12,17 +12,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.options import (
-    NONE_FOUND,
-    OK,
-    add_bound,
-    add_printing,
-    add_problem,
-    changed,
-    exit_code,
-    new_parser,
-    output_path,
-)
+from colloc.commands.ending import NONE_FOUND, OK, run
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
@@ -115,9 +106,8 @@ def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
     command = " ".join(["colloc multistart", *(sys.argv[1:] if arguments is None else arguments)])
-    return exit_code(lambda: _run(options, command))
+    return run(_parser(), lambda options: _run(options, command), arguments)
 
 
 def _run(options: argparse.Namespace, command: str) -> int:

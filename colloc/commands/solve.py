@@ -16,30 +16,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colloc.commands.options import (
-    FAILED,
-    NONE_FOUND,
-    OK,
-    add_bound,
-    add_printing,
-    add_problem,
-    changed,
-    exit_code,
-    new_parser,
-    output_path,
-)
+from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.paths import ArcPath
 from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import read_problem_file
-from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Level, Solution
-from colloc.system.errors import StoreError
-from colloc.system.progress import StatusLine
+from colloc.results.level import Level
+from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
+from colloc.system.errors import CollocError, StoreError
+from colloc.system.progress import StatusLine, duration
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
 
+_MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
+"""Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
 EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED}
 _EPILOG = """\
 Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
@@ -82,7 +75,7 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
     """What a person wants to know at the end."""
     lines = [f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"]
     certificate = solution.certificate
-    if certificate is not None:
+    if certificate.replayed:
         lines += [
             f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
             f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} for delta -> 0",
@@ -140,7 +133,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
         "versions": solution.versions,
     }
-    if certificate is not None:
+    if certificate.replayed:
         result["certificate"] = {
             "passed": certificate.passed,
             "efficiency": certificate.efficiency,
@@ -156,8 +149,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _solve(options))
+    return run(_parser(), _solve, arguments)
 
 
 def _solve(options: argparse.Namespace) -> int:
@@ -169,6 +161,10 @@ def _solve(options: argparse.Namespace) -> int:
     from colloc.results.store import save
 
     quiet = options.quiet or options.json
+    if not quiet and problem.intervals > _MANY_INTERVALS:
+        seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
+        hint = "mesh_tolerance refines a small mesh where it has to be fine"
+        print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
     if options.compile:
         from colloc.search.compiled_problem import compile_problem
 
@@ -180,20 +176,34 @@ def _solve(options: argparse.Namespace) -> int:
         path = path.with_suffix(".failed.h5")
     save(solution, path)
     _partial(path).unlink(missing_ok=True)
+    bound, saved, complaints = None, str(path), []
     with StatusLine(enabled=not quiet) as line:
-        line.say("computing an upper bound on every gait" if options.bound else "drawing")
-        bound = upper_bound(problem, path.parent, compute=options.bound)
-        if not options.no_figure:
-            from colloc.pictures.figure import save_figure, solution_figure
-
-            save_figure(solution_figure(solution), path)
+        if options.bound:
+            line.say("computing an upper bound on every gait")
+        try:
+            bound = upper_bound(problem, path.parent, compute=options.bound)
+        except CollocError as error:  # what is solved is not lost for it
+            complaints.append(f"no bound: {error}")
     if options.json:
-        print(json.dumps(summary_dict(solution, path, stated.reference, bound)))
+        print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
     else:
-        efficiency = solution.efficiency if solution.certificate is None else solution.certificate.efficiency
-        print("\n".join([*summary_lines(solution, stated.reference), gap_line(problem, efficiency, bound)]))
-        print(f"  saved {path}" + ("" if options.no_figure else f", {path.with_suffix('.png')}"))
-    return EXIT[solution.status]
+        lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
+        print("\n".join(lines), flush=True)
+    if not options.no_figure:
+        from colloc.pictures.figure import save_figure, solution_figure
+
+        with StatusLine(enabled=not quiet) as line:
+            line.say("drawing")
+            try:
+                save_figure(solution_figure(solution), path)
+                saved += f", {path.with_suffix('.png')}"
+            except CollocError as error:
+                complaints.append(f"no figure: {error}")
+    if not options.json:
+        print(f"  saved {saved}")
+    for complaint in complaints:
+        print(f"colloc: {complaint}", file=sys.stderr)
+    return BAD_PROBLEM if complaints else EXIT[solution.status]
 
 
 def _partial(path: Path) -> Path:

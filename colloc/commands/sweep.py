@@ -17,7 +17,8 @@ from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import replace
 from pathlib import Path
 
-from colloc.commands.options import INTERRUPTED, NONE_FOUND, OK, add_printing, exit_code, new_parser
+from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
+from colloc.commands.options import add_printing, new_parser
 from colloc.studies.study import Study, read_study_file
 from colloc.system.errors import ProblemError, StoreError
 
@@ -44,9 +45,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
     command = " ".join(["colloc sweep", *(sys.argv[1:] if arguments is None else arguments)])
-    return exit_code(lambda: _study(options, command))
+    return run(_parser(), lambda options: _study(options, command), arguments)
 
 
 def _study(options: argparse.Namespace, command: str) -> int:

@@ -22,6 +22,10 @@ from colloc.system.errors import ProblemError
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
 CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
 FORMULATIONS = (CONDENSED, MAP, LIFTED)
+SMALLEST_DELTA = 1e-14
+"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
+LONGEST_NAME = 200
+"""File systems allow 255 bytes, and results of a problem add endings to its name."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
@@ -55,7 +59,7 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``.
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200.
     guess : Fourier, ArcPath or Corners
         An admissible gait to start from, of any class; it is projected onto the class `gait`.
     body : Chain
@@ -107,6 +111,10 @@ class Problem:
     def _check_types(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        if len(self.name) > LONGEST_NAME:
+            raise ProblemError(
+                f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
+            )
         for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
             if not isinstance(getattr(self, field), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)
@@ -126,6 +134,11 @@ class Problem:
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
         if self.delta <= 0:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
+        if self.delta < SMALLEST_DELTA:
+            raise ProblemError(
+                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that order are lost in rounding. "
+                "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
+            )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
         if not 0 < self.joint_limit <= np.pi + 1e-12:

@@ -28,6 +28,7 @@ import numpy as np
 
 from colloc.numerics.c_compiler import c_compiler, cache_folder, compile_library
 from colloc.system.errors import StoreError
+from colloc.system.private_folder import is_private, make_private
 from colloc.system.processors import available_threads
 from colloc.system.replaced_file import replaced_file
 
@@ -74,7 +75,8 @@ def library() -> ctypes.CDLL | None:
     try:
         with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
             name = f"kernel-{_fingerprint(sources)}"
-            whole = (found for found in folder.glob(f"{name}-*.so") if found.stem.endswith(_digest(found)))
+            own = (found for found in folder.glob(f"{name}-*.so") if is_private(found))
+            whole = (found for found in own if found.stem.endswith(_digest(found)))
             file = next(whole, None) or _compiled(sources, folder, name)
             return None if file is None else _loaded(file)
     except (OSError, StoreError):
@@ -103,8 +105,9 @@ def _compiled(sources: Path, folder: Path, name: str) -> Path | None:
         made = Path(scratch) / "kernel.so"
         compile_library(sources / _MAIN, _FLAGS, made)
         file = folder / f"{name}-{_digest(made)}.so"
+        make_private(folder)
         with replaced_file(file) as unfinished:
-            shutil.copyfile(made, unfinished)
+            shutil.copy(made, unfinished)  # with its permissions
     return file
 
 

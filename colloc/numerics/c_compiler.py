@@ -62,3 +62,4 @@ def compile_library(source: str | Path, flags: Sequence[str], library: Path) -> 
             failure = f"could not be run: {error.strerror or error}"
         if failure:
             raise StoreError(f"the C compiler {command[0]} failed ({failure}); set CC to another, or do without compiled code.")
+        os.chmod(unfinished, 0o600)  # whoever else could write it could have it run

@@ -3,6 +3,9 @@
 CasADi interprets its expressions; compiled, a Hessian of some ten thousand operations runs about ten times faster, with the
 same operations in the same order, so the same results to the last bit. Compiling takes seconds, so callers ask
 for it where it pays: functions whose code is in the folder are loaded, all others are interpreted, except within `compiling`.
+
+Loading a library runs it. So the folder is made for its user alone, and code is neither loaded from nor put into a place that
+anybody else could have written to (`colloc.system.private_folder`).
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ import numpy as np
 
 from colloc.numerics.c_compiler import BALANCE_ONLY, FOLDER, OFF, c_compiler, cache_folder, compile_library
 from colloc.system.errors import ProblemError, StoreError
+from colloc.system.private_folder import is_private, make_private
 
 _FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """-O2 takes half as long again to compile and gains a few per cent; contracted operations would round differently."""
@@ -77,8 +81,10 @@ def machine_code(functions: Sequence[ca.Function]) -> list[ca.Function]:
         return list(functions)
     content = "\n".join([ca.__version__, platform.machine(), *_FLAGS, *(f.serialize() for f in functions)])
     library = folder / f"{hashlib.sha256(content.encode()).hexdigest()[:32]}.so"
-    loaded = _loaded(functions, library) if os.path.exists(library) else None  # False where one may not look
+    # os.path.exists is False where one may not look
+    loaded = _loaded(functions, library) if os.path.exists(library) and is_private(library) else None
     if loaded is None and _asked.get():
+        make_private(folder)
         _compile(functions, library)
         loaded = _loaded(functions, library)
     return list(functions) if loaded is None else loaded

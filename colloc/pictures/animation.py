@@ -65,10 +65,9 @@ class _Scene:
         axes.grid(color="#e8ecef", lw=0.8)
         axes.tick_params(length=0, labelbottom=False, labelleft=False)
         axes.spines[:].set_visible(False)
-        certificate = solution.certificate
-        value = certificate.efficiency if certificate is not None else solution.efficiency
         verdict = "" if solution.status == "solved" else f"  ({solution.status})"
-        figure.text(0.015, 0.93, f"{solution.problem.name}   efficiency {value:.4f}{verdict}", fontsize=11, weight="bold")
+        title = f"{solution.problem.name}   efficiency {solution.measured.efficiency:.4f}{verdict}"
+        figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
         self.phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
         self.trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, RED)]
         (self.body,) = axes.plot([], [], "-", color="#1d2329", lw=4, solid_capstyle="round", solid_joinstyle="round")

@@ -17,6 +17,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.pictures.motion_frames import link_ends
 from colloc.results.solution import Solution
+from colloc.system.replaced_file import replaced_file
 
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#777777"
 """Okabe-Ito colours, distinguishable with any colour vision."""
@@ -86,6 +87,14 @@ def draw_allowed(axes: Axes, body: Chain, joint_limit: float) -> None:
     axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
 
 
+def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray) -> None:
+    """Joint angles over a period."""
+    for j, joint in enumerate(angles):
+        axes.plot(t, joint, lw=1.4, color=matplotlib.colormaps["viridis"](0.9 * j / max(len(angles) - 1, 1)))
+        axes.annotate(f"{j + 1}", (1.0, joint[-1]), xytext=(3, 0), textcoords="offset points", fontsize=7, va="center")
+    axes.set(xlim=(0, 1), xlabel="phase t", ylabel="joint angle  [rad]")
+
+
 def draw_shape_path(
     axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1, *, legend: bool = True
 ) -> None:
@@ -148,8 +157,12 @@ def solution_figure(solution: Solution) -> Figure:
         draw_lab(lab, solution)
         lab.set_title("in the lab, from t = 0 (grey) to t = 1 (black)")
         plane = figure.add_subplot(grid[1, 2])
-        draw_shape_path(plane, solution.problem, solution.gait.angles(t))
-        plane.set_title("gait in shape space (grey: not allowed)")
+        if solution.problem.body.n_joint == 1:  # there is no plane of two joints
+            draw_angles(plane, t, solution.gait.angles(t))
+            plane.set_title("the joint's angle")
+        else:
+            draw_shape_path(plane, solution.problem, solution.gait.angles(t))
+            plane.set_title("gait in shape space (grey: not allowed)")
         speeds = figure.add_subplot(grid[2, :2])
         draw_speeds(speeds, solution, t)
         speeds.set_title("speeds of the links; near δ they stick")
@@ -169,8 +182,9 @@ def solution_figure(solution: Solution) -> Figure:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Save as PNG and PDF beside each other, whatever suffix `path` has."""
+    """Save as PNG and PDF beside each other, whatever suffix `path` has; raises StoreError if they cannot be written."""
     with matplotlib.rc_context(STYLE):
-        for suffix in (".png", ".pdf"):
-            figure.savefig(path.with_suffix(suffix))
+        for kind in ("png", "pdf"):
+            with replaced_file(path.with_suffix(f".{kind}")) as temporary:
+                figure.savefig(temporary, format=kind)
             figure.set_layout_engine("none")  # what the first saving laid out holds for the second

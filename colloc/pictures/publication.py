@@ -10,20 +10,23 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colloc.pictures.figure import BLUE, RED, STYLE, draw_filmstrip, draw_lab, draw_power, draw_shape_path, draw_speeds
+from colloc.pictures.figure import (
+    BLUE,
+    RED,
+    STYLE,
+    draw_angles,
+    draw_filmstrip,
+    draw_lab,
+    draw_power,
+    draw_shape_path,
+    draw_speeds,
+)
 from colloc.results.solution import Solution
+from colloc.system.replaced_file import replaced_file
 
 COLUMN, PAGE = 3.4, 7.0
 """Widths of a column and of two [inches]."""
 _RESOLUTION = 300
-
-
-def draw_angles(axes: Axes, solution: Solution, t: np.ndarray) -> None:
-    """Joint angles over a period."""
-    for j, joint in enumerate(solution.sample(t).angles):
-        axes.plot(t, joint, lw=1.4, color=matplotlib.colormaps["viridis"](0.9 * j / max(solution.problem.body.n_joint - 1, 1)))
-        axes.annotate(f"{j + 1}", (1.0, joint[-1]), xytext=(3, 0), textcoords="offset points", fontsize=7, va="center")
-    axes.set(xlim=(0, 1), xlabel="phase t", ylabel="joint angle  [rad]")
 
 
 def draw_convergence(axes: Axes, solution: Solution) -> None:
@@ -44,7 +47,7 @@ def panels(solution: Solution) -> dict[str, tuple[float, float, Callable[[Axes],
     found: dict[str, tuple[float, float, Callable[[Axes], None]]] = {
         "filmstrip": (PAGE, 1.9, lambda axes: draw_filmstrip(axes, solution, count=6)),
         "lab": (PAGE, 3.0, lambda axes: draw_lab(axes, solution)),
-        "angles": (COLUMN, 2.2, lambda axes: draw_angles(axes, solution, t)),
+        "angles": (COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles)),
         "speeds": (COLUMN, 2.4, lambda axes: draw_speeds(axes, solution, t)),
         "power": (COLUMN, 2.2, lambda axes: draw_power(axes, solution, t)),
         "convergence": (COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),
@@ -65,7 +68,8 @@ def save_panels(solution: Solution, stem: Path) -> list[Path]:
         for name, (width, height, draw) in panels(solution).items():
             figure = Figure(figsize=(width, height), layout="constrained")
             draw(figure.add_subplot())
-            for suffix in (".png", ".pdf"):
-                figure.savefig(stem.with_name(f"{stem.name}-{name}{suffix}"))
+            for kind in ("png", "pdf"):
+                with replaced_file(stem.with_name(f"{stem.name}-{name}.{kind}")) as temporary:
+                    figure.savefig(temporary, format=kind)
             written.append(stem.with_name(f"{stem.name}-{name}.pdf"))
     return written

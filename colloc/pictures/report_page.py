@@ -66,7 +66,7 @@ def _summary(solution: Solution, reference: Reference | None, gap: str) -> Marku
     good = solution.status == SOLVED
     badge = element("span", "✓ certified" if good else f"✗ {solution.status}", class_=f"badge {'good' if good else 'bad'}")
     facts: list[tuple[str, str]] = []
-    if certificate is not None:
+    if certificate.replayed:
         facts = [
             (f"{certificate.efficiency:.5f}", f"efficiency d/W, ± {certificate.efficiency_error:.0e}, replayed"),
             (f"{certificate.efficiency_at_zero_delta:.5f}", "for δ → 0, same gait"),
@@ -83,7 +83,7 @@ def _summary(solution: Solution, reference: Reference | None, gap: str) -> Marku
     if solution.levels:
         facts.append((f"{solution.last.delta:.0e}", "regularisation δ"))
     lines = [gap.strip()] if gap else []
-    if reference is not None and certificate is not None:
+    if reference is not None and certificate.replayed:
         agree = "agrees with" if abs(certificate.efficiency - reference.efficiency) <= reference.tolerance else "DIFFERS from"
         lines.append(f"{agree} {reference.efficiency:g} ± {reference.tolerance:g}: {reference.source}")
     return element(
@@ -173,7 +173,7 @@ def _animation(shown: Frames) -> Markup:
 
 
 def _certificate(solution: Solution) -> Markup:
-    if solution.certificate is None:
+    if not solution.certificate.replayed:
         return element(
             "section", element("h2", "Certificate"), element("p", "none: the solve did not converge.", class_="message")
         )

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.results.solution import Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 
 RESOLVED = 1e-4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib import metadata
 
 import numpy as np
@@ -16,56 +16,11 @@ from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.results.level import Level
 from colloc.results.solution_card import solution_card
+from colloc.system.errors import ProblemError
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
-
-
-@dataclass(frozen=True, eq=False)
-class Level:
-    """One converged or failed step of the continuation.
-
-    Attributes
-    ----------
-    delta : float
-        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit shape speed.
-    edges : (n_interval + 1,)
-        The mesh, in phases of the gait found.
-    x, lam_x : (n,)
-        Variables (see `colloc.collocation.layout`) and multipliers of their bounds.
-    lam_g : (m,)
-        Multipliers of the constraints.
-    efficiency, distance, work : float
-        Over one whole period, as collocation sees them.
-    kkt_error, violation, complementarity : float
-        Measured first-order conditions, unscaled.
-    status : str
-        The optimiser's own word.
-    optimal : bool
-        Whether the first-order conditions hold.
-    iterations : int
-    seconds, evaluation_seconds : float
-    scheme : str
-        Collocation scheme, which refinement may have raised in order; "" for the problem's.
-    """
-
-    delta: float
-    edges: np.ndarray
-    x: np.ndarray
-    lam_x: np.ndarray
-    lam_g: np.ndarray
-    efficiency: float
-    distance: float
-    work: float
-    kkt_error: float
-    violation: float
-    complementarity: float
-    status: str
-    optimal: bool
-    iterations: int
-    seconds: float
-    evaluation_seconds: float
-    scheme: str = ""
 
 
 @dataclass(frozen=True)
@@ -102,7 +57,7 @@ class Certificate:
     efficiency_at_zero_delta : float
         Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed.
     instants : int
-        Instants of the replay in one period.
+        Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
     """
 
     checks: tuple[Check, ...]
@@ -114,12 +69,25 @@ class Certificate:
     instants: int
 
     @property
+    def replayed(self) -> bool:
+        """Whether there was a replay at all; if not, all numbers are NaN."""
+        return self.instants > 0
+
+    @property
     def passed(self) -> bool:
         return all(check.passed for check in self.checks)
 
     @property
     def failures(self) -> list[Check]:
         return [check for check in self.checks if not check.passed]
+
+
+UNCERTIFIED = Certificate(
+    (Check("replay", np.inf, 0.0, "not made, since the solve did not converge: nothing was checked"),),
+    instants=0,
+    **{each.name: np.nan for each in fields(Certificate) if each.name not in ("checks", "instants")},
+)
+"""Of a solve that did not converge: it fails, and says that nothing was checked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +125,8 @@ class Solution:
     problem : Problem
     levels : list of Level
         In the order they were solved; the last one is the result.
-    certificate : Certificate or None
-        None if no level converged.
+    certificate : Certificate
+        `UNCERTIFIED` if the solve did not converge.
     seconds : float
         Wall time of the whole solve.
     source : str
@@ -166,27 +134,52 @@ class Solution:
     message : str
         What went wrong and what to try, if something did.
     versions : dict
+    changed : bool
+        Whether another program changed the file that the result was loaded from; `colloc verify` decides what it is worth.
     """
 
     problem: Problem
     levels: Sequence[Level]
-    certificate: Certificate | None = None
+    certificate: Certificate = UNCERTIFIED
     seconds: float = 0.0
     source: str = ""
     message: str = ""
     versions: dict[str, str] = field(default_factory=lambda: versions())
+    changed: bool = False
+
+    def __repr__(self) -> str:
+        facts = [self.problem.name, self.status]
+        if self.levels:
+            replayed = "" if self.certificate.replayed else " (not replayed)"
+            error = f" +- {self.certificate.efficiency_error:.0e}" if self.certificate.replayed else ""
+            facts.append(f"d/W = {self.measured.efficiency:.6g}{error}{replayed} at delta = {self.last.delta:.1e}")
+        return f"<Solution {', '.join(facts)}>"
 
     @property
     def status(self) -> str:
         """One of "solved", "not converged", "certificate failed"."""
         reached = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta <= self.problem.delta * (1 + 1e-9)
-        if not reached or self.certificate is None:
+        if not reached or not self.certificate.replayed:
             return NOT_CONVERGED
         return SOLVED if self.certificate.passed else CERTIFICATE_FAILED
 
     @property
     def last(self) -> Level:
+        """The result.
+
+        Raises
+        ------
+        ProblemError
+            If the solve failed before its first level ended.
+        """
+        if not self.levels:
+            raise ProblemError(f"{self.problem.name} holds no gait: its solve failed before the first level.")
         return self.levels[-1]
+
+    @property
+    def measured(self) -> Certificate | Level:
+        """What says efficiency, distance and work best: the replay if there was one, else the last level."""
+        return self.certificate if self.certificate.replayed else self.last
 
     @property
     def efficiency(self) -> float:
@@ -309,7 +302,7 @@ class Solution:
         if not self.levels:
             return []
         certificate = self.certificate
-        if certificate is None:
+        if not certificate.replayed:
             return [("efficiency (not replayed)", f"{self.efficiency:.5f}"), ("δ", f"{self.last.delta:.0e}")]
         return [
             ("efficiency d/W", f"{certificate.efficiency:.5f} ± {certificate.efficiency_error:.0e}"),
@@ -320,7 +313,7 @@ class Solution:
         ]
 
     def _checks(self) -> list[tuple[str, bool, str]]:
-        checks = self.certificate.checks if self.certificate is not None else ()
+        checks = self.certificate.checks if self.certificate.replayed else ()
         return [(check.name, check.passed, f"{check.value:.1e} (≤ {check.threshold:.0e})") for check in checks]
 
     def _thumbnail(self) -> np.ndarray | None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import warnings
 from pathlib import Path
 
 import h5py
@@ -22,9 +23,10 @@ import numpy as np
 
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
-from colloc.results.solution import Certificate, Check, Level, Solution
-from colloc.system.errors import StoreError
-from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text
+from colloc.results.level import Level
+from colloc.results.solution import UNCERTIFIED, Certificate, Check, Solution
+from colloc.system.errors import ChangedFileWarning, StoreError
+from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text, was_changed
 
 FORMAT, FORMAT_VERSION = "colloc solution", 3
 _MOTION_SAMPLES = 401
@@ -64,13 +66,27 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
 def load(path: str | os.PathLike[str]) -> Solution:
     """The solution in a file that `save` wrote.
 
+    A file that another program has opened to write since then is read with a `ChangedFileWarning`, and the solution is marked
+    as ``changed``: `colloc verify` decides what it is worth.
+
     Raises
     ------
     StoreError
         If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
     """
-    with sealed_file(path, FORMAT, FORMAT_VERSION) as file:
-        return _read(file)
+    changed = was_changed(Path(path), FORMAT)
+    try:
+        with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:
+            solution = _read(file)
+    except StoreError as error:
+        if not changed:
+            raise
+        raise StoreError(f"{path} was changed after colloc wrote it, and cannot be read any more: {error}") from None
+    if changed:
+        solution.changed = True
+        message = f"{path} was changed after colloc wrote it; colloc verify {path} says what it is worth."
+        warnings.warn(message, ChangedFileWarning, stacklevel=2)
+    return solution
 
 
 def _write(file: h5py.File, solution: Solution) -> None:
@@ -91,7 +107,7 @@ def _write(file: h5py.File, solution: Solution) -> None:
                 put_attribute(group, field.name, getattr(level, field.name))
     if solution.levels:
         _write_motion(file, solution)
-    if solution.certificate is not None:
+    if solution.certificate.replayed:
         _write_certificate(file.create_group("certificate"), solution.certificate)
 
 
@@ -134,7 +150,7 @@ def _read(file: h5py.File) -> Solution:
         arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
         rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Level) if f.name not in _LEVEL_ARRAYS}
         levels.append(Level(**arrays, **rest))
-    certificate = None
+    certificate = UNCERTIFIED
     if "certificate" in file:
         group = child(file, "certificate")
         columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]

@@ -154,7 +154,7 @@ def found(solution: Solution, certified: bool) -> bool:
 
 def efficiency_of(solution: Solution) -> float:
     """The efficiency of the replay, or that of the mesh where there is no certificate."""
-    return solution.efficiency if solution.certificate is None else solution.certificate.efficiency
+    return solution.measured.efficiency
 
 
 def continue_classes(

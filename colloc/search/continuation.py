@@ -16,7 +16,8 @@ import numpy as np
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.problem import Problem
-from colloc.results.solution import Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Solution
 from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.level_run import LOWER_START, REMESH_RADIUS, SMALLEST_RADIUS, TRIVIAL, Report, Run
 from colloc.search.nlp import NlpResult, Solver

@@ -12,7 +12,7 @@ from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import CONDENSED, Problem
 from colloc.mechanics.contact import Pairs
-from colloc.results.solution import Level
+from colloc.results.level import Level
 from colloc.search.closure import closed_parameters, opened_parameters
 from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.search.nlp import NlpResult, Solver

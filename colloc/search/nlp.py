@@ -16,6 +16,7 @@ from colloc.collocation.transcription import Transcription
 from colloc.gaits.problem import CONDENSED
 from colloc.numerics.blocks import Oracles, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.search.stop_request import StopRequest
 from colloc.system.interruption import interruptible
 
 IPOPT_OPTIONS: dict[str, object] = {
@@ -125,7 +126,9 @@ class Solver(Generic[AnyProgram]):
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
         program = self._reduced or self.oracles
-        self._nlp, self._settings = program.nlp, {**settings, **program.options}
+        self._nlp = program.nlp
+        self._stop = StopRequest(self._nlp)  # held here: CasADi does not keep it alive
+        self._settings = {**settings, **program.options, "iteration_callback": self._stop}
         self._solvers: dict[int | None, ca.Function] = {}
 
     def _solver(self, iterations: int | None) -> ca.Function:

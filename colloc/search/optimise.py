@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
 from colloc.results.certificate import certify
-from colloc.results.solution import Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Solution
 from colloc.search.continuation import continue_delta
 from colloc.search.level_run import TRIVIAL, Report
 from colloc.system.errors import NotConvergedError

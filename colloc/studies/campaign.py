@@ -14,7 +14,8 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, seed_class, start_gait
 from colloc.numerics.machine_code import compiler
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
-from colloc.results.solution import Certificate, Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Certificate, Solution
 from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import is_trivial, maximise_efficiency
 from colloc.system.errors import CollocError
@@ -72,15 +73,16 @@ def run_guess(problem: Problem, start_from: Callable[[], Fourier], start: int, t
 
 def _outcome(start: int, guess: Fourier, solution: Solution) -> Outcome:
     optimal = [level for level in solution.levels if level.optimal]
-    measured: Certificate | Level | None = solution.certificate or (optimal[-1] if optimal else None)
+    certificate = solution.certificate
+    measured: Certificate | Level | None = certificate if certificate.replayed else optimal[-1] if optimal else None
     status = TRIVIAL if is_trivial(solution) else solution.status
     gait = fourier_through(solution.gait, Harmonic(ARCHIVED_HARMONICS, solution.problem.gait.symmetry))
     outcome = Outcome(start, status, solution.message, guess.resized(gait.n_harmonic), gait)
     if measured is not None:
         efficiency, distance, work = measured.efficiency, measured.distance, measured.work
         outcome = replace(outcome, delta=optimal[-1].delta, efficiency=efficiency, distance=distance, work=work)
-    if solution.certificate is not None:
-        outcome = replace(outcome, efficiency_error=solution.certificate.efficiency_error)
+    if certificate.replayed:
+        outcome = replace(outcome, efficiency_error=certificate.efficiency_error)
     return outcome
 
 

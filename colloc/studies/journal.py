@@ -160,7 +160,7 @@ class Journal:
         text = b"".join(map(line_of, records))
         try:
             if self._handle is None:
-                self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+                self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
                 text = FORMAT.encode() + b"\n" + text
             before = os.fstat(self._handle).st_size
             try:

@@ -1,6 +1,8 @@
 """Compiled code computes what CasADi interprets, to the last bit, and whatever is wrong with it costs speed only."""
 
+import os
 import shutil
+import sys
 from pathlib import Path
 
 import casadi as ca
@@ -15,6 +17,7 @@ from colloc.search.compiled_problem import DIFFERENTIATED_ONCE, compile_problem
 from colloc.system.errors import ProblemError, StoreError
 
 needs_compiler = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
+needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
 THIRD = Chain((1 / 3,) * 3)
 
 
@@ -116,6 +119,56 @@ def test_a_damaged_library_is_not_used_and_the_next_compilation_mends_it(folder,
     assert not is_compiled(machine_code([function])[0])
     with compiling():
         assert is_compiled(machine_code([function])[0])
+
+
+@needs_compiler
+@needs_posix
+@pytest.mark.parametrize("part", ["folder", "library"])
+def test_code_that_others_could_have_written_is_not_run(part, folder):
+    function = long_function()
+    with compiling():
+        machine_code([function])
+    (library,) = folder.iterdir()
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert library.stat().st_mode & 0o777 == 0o600
+    path = {"folder": folder, "library": library}[part]
+    for mode in (0o770, 0o707):
+        path.chmod(mode)
+        assert not is_compiled(machine_code([function])[0])
+    path.chmod(0o700)
+    assert is_compiled(machine_code([function])[0])
+
+
+@needs_compiler
+@needs_posix
+def test_no_code_is_put_where_others_can_write(folder):
+    folder.mkdir(mode=0o755)
+    folder.chmod(0o777)
+    with compiling(), pytest.raises(StoreError, match="can be written by others: chmod go-w it"):
+        machine_code([long_function()])
+    assert not list(folder.iterdir())
+
+
+@needs_compiler
+@needs_posix
+@pytest.mark.parametrize("part", ["folder", "library"])
+def test_code_of_another_user_is_not_run(part, folder, monkeypatch):
+    function = long_function()
+    with compiling():
+        machine_code([function])
+    (library,) = folder.iterdir()
+    theirs = {"folder": folder, "library": library}[part]
+    stat = os.stat
+
+    def other(path, **options):
+        found = list(stat(path, **options))
+        return os.stat_result([*found[:4], 4711, *found[5:]]) if Path(path) == theirs else os.stat_result(found)
+
+    monkeypatch.setattr("colloc.system.private_folder.os.stat", other)
+    assert not is_compiled(machine_code([function])[0])
+    if part == "folder":
+        with compiling(), pytest.raises(StoreError, match="belongs to another user"):
+            machine_code([function])
 
 
 def test_without_a_compiler_or_switched_off_the_user_is_told(folder, monkeypatch):

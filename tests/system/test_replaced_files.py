@@ -7,6 +7,7 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,29 @@ def test_a_full_disk_is_a_clear_error_and_keeps_the_old_file(samples, kind, shar
     assert samples.read(kind) != before
 
 
+def test_what_a_journal_says_is_written_is_on_the_disk(tmp_path, monkeypatch):
+    """Each record is flushed to the disk before `append` returns, and an error there is the writer's."""
+    flushed, fsync = [], os.fsync
+
+    def counted(handle):
+        flushed.append(os.fstat(handle).st_size)
+        fsync(handle)
+
+    monkeypatch.setattr("colloc.studies.journal.os.fsync", counted)
+    with Journal(tmp_path) as journal:
+        for k in range(3):
+            journal.append([record(k)])
+            assert flushed[k:] == [journal.path.stat().st_size]
+
+        def broken(_):
+            raise OSError(errno.EIO, "Input/output error")
+
+        monkeypatch.setattr("colloc.studies.journal.os.fsync", broken)
+        with pytest.raises(StoreError, match="Input/output error"):
+            journal.append([record(3)])
+    assert [r.attempts[0].key for r in read_journal(tmp_path).records] == ["key0", "key1", "key2"]
+
+
 def test_a_journal_goes_on_after_a_full_disk_without_a_broken_line(tmp_path):
     with Journal(tmp_path) as journal:
         journal.append([record(0)])
@@ -91,12 +115,26 @@ def in_child(function, *arguments):
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before_any_work(samples, tmp_path):
+@contextlib.contextmanager
+def open_to_others(folder, root):
+    """Others may pass through pytest's own folders: those from `folder` up to, and without, the system's temporary folder."""
+    temporary = Path(tempfile.gettempdir())
+    top = temporary if root.is_relative_to(temporary) else root.parent
+    before = {p: p.stat().st_mode for p in (folder, *folder.parents) if p.is_relative_to(top) and p != top}
+    try:
+        for p, mode in before.items():
+            p.chmod(mode | 0o011)
+        yield
+    finally:
+        for p, mode in before.items():
+            p.chmod(mode)
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(samples, tmp_path, tmp_path_factory):
+    temporary = Path(tempfile.gettempdir()).stat().st_mode
     folder = tmp_path / "locked away"
     folder.mkdir(mode=0o755)
     (tmp_path / "s.py").write_text(STUDY)
-    for name in ("tmp_path", "folder"):
-        os.chmod(tmp_path if name == "tmp_path" else folder, 0o755)
 
     def attempt():
         if os.geteuid() == 0:
@@ -114,12 +152,10 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(samples, tmp
                 refused += "cannot write" in str(error) and str(folder) in str(error)
         return 10 * (refused == len(KINDS))
 
-    # the parent of tmp_path may be closed to others: look there as root, from inside
-    for parent in [tmp_path, *tmp_path.parents][:4]:  # one more with parallel workers
-        with contextlib.suppress(PermissionError):
-            os.chmod(parent, 0o755)
-    assert in_child(attempt) == 10
+    with open_to_others(tmp_path, tmp_path_factory.getbasetemp()):
+        assert in_child(attempt) == 10
     assert list(folder.iterdir()) == []
+    assert Path(tempfile.gettempdir()).stat().st_mode == temporary
 
 
 def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
