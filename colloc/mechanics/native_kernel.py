@@ -98,7 +98,7 @@ def _digest(file: Path) -> str:
 
 def _compiled(sources: Path, folder: Path, name: str) -> Path | None:
     """The library, put in the folder; None without a compiler, or where nothing can be kept."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_private(folder)
     if c_compiler() is None or not os.access(folder, os.W_OK):
         return None
     with tempfile.TemporaryDirectory(prefix="colloc-") as scratch:
