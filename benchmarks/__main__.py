@@ -27,6 +27,7 @@ PARTS = {
     "smooth_panels": "Smooth bodies",
     "map_resolution": "The tabulated velocity map",
     "formulations": "Three formulations, the same starts",
+    "kernel": "The compiled kernel beside NumPy",
     "machine_code": "Compiled derivatives",
     "cost": "Where the time goes",
     "scaling": "Growth with mesh, links and harmonics",

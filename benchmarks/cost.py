@@ -20,7 +20,7 @@ from unittest import mock
 
 from benchmarks.tables import markdown_table
 from colloc.gaits.problem_file import read_problem_file
-from colloc.numerics.machine_code import FOLDER, OFF, compiler
+from colloc.numerics.machine_code import BALANCE_ONLY, FOLDER, compiler
 from colloc.search.compiled_problem import compile_problem
 
 PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")
@@ -140,7 +140,7 @@ def _anatomy_apart(name: str, code: str) -> dict[str, float]:
 
 def report(quick: bool, folder: Path) -> str:
     """Shares of the parts of three solves, and import times."""
-    columns = {name: _anatomy_apart(name, OFF) for name in (PROBLEMS[:1] if quick else PROBLEMS)}
+    columns = {name: _anatomy_apart(name, BALANCE_ONLY) for name in (PROBLEMS[:1] if quick else PROBLEMS)}
     if compiler() is not None:
         with tempfile.TemporaryDirectory() as code, mock.patch.dict(os.environ, {FOLDER: code}):
             compile_problem(read_problem_file(Path("problems") / f"{PROBLEMS[0]}.py").problem)

@@ -23,7 +23,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.collocation.point_equations import balance_steps, point_function
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import CONDENSED
-from colloc.numerics.machine_code import FOLDER, OFF, compiler
+from colloc.numerics.machine_code import BALANCE_ONLY, FOLDER, compiler
 from colloc.results.solution import SOLVED
 from colloc.search.compiled_problem import compile_problem
 from colloc.studies.campaign import run_start
@@ -90,7 +90,7 @@ def report(quick: bool, folder: Path) -> str:
     rows = []
     for links in (3,) if quick else (2, 3, 4, 5):
         with tempfile.TemporaryDirectory() as code:
-            plain, compiled = _apart(f"evaluations({links}, False)", OFF), _apart(f"evaluations({links}, True)", code)
+            plain, compiled = _apart(f"evaluations({links}, False)", BALANCE_ONLY), _apart(f"evaluations({links}, True)", code)
         times = [f"{plain[k]:.2f} / {compiled[k]:.2f} ({plain[k] / compiled[k]:.0f}x)" for k in plain if k != "compile"]
         rows.append([links, f"{compiled['compile']:.1f}", *times])
     names = ["value", "Jacobian", "Hessian", "steps on the balance"]
@@ -101,7 +101,7 @@ def report(quick: bool, folder: Path) -> str:
     count = 4 if quick else 9
     for law in LAWS[:1] if quick else LAWS:
         with tempfile.TemporaryDirectory() as code:
-            plain = _apart(f"starts({law}, {count}, False)", OFF)
+            plain = _apart(f"starts({law}, {count}, False)", BALANCE_ONLY)
             compiled = _apart(f"starts({law}, {count}, True)", code)
         a, b = np.median(plain["seconds"]), np.median(compiled["seconds"])
         same = "yes" if plain["efficiencies"] == compiled["efficiencies"] else "no"

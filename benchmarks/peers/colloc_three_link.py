@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.peers.settings import INTERVALS
 from benchmarks.peers.starts import starts
 from colloc import Harmonic, Problem, ellipse, maximise_efficiency
-from colloc.numerics.machine_code import FOLDER, OFF
+from colloc.numerics.machine_code import BALANCE_ONLY, FOLDER
 from colloc.results.solution import SOLVED
 from colloc.search.compiled_problem import compile_problem
 from colloc.search.continuation import continue_delta
@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--compiled", action="store_true")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as code:
-        os.environ[FOLDER] = code if options.compiled else OFF
+        os.environ[FOLDER] = code if options.compiled else BALANCE_ONLY
         begin = sum(os.times()[:4])  # the compiler's time too
         if options.compiled:
             compile_problem(Problem("peer", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral")))
