@@ -3,7 +3,7 @@
 The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled by the system's compiler
 when first needed, in about half a second, and kept in the user's cache folder under a name made of their content: whoever
 edits, updates or shares an installation never meets an old library. Without a compiler, or a folder to keep the library in,
-everything is done by NumPy, the reference. Numba was no alternative: its import alone takes longer than that, every time.
+everything is done by NumPy, the reference (docs/notes/kernel.md says why C, and why then).
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on
 nothing but its own data, so it is the same in any batch and on any number of threads.
 """
@@ -33,7 +33,7 @@ from colloc.system.processors import available_threads
 from colloc.system.replaced_file import replaced_file
 
 _FLAGS = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
-"""Nothing that reorders arithmetic. -O3 takes four times as long to compile and gains 5 %."""
+"""Nothing that reorders arithmetic. -O3 takes three times as long to compile and gains 5 to 10 %."""
 _MAIN = "kernel.c"
 _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
