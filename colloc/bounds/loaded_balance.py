@@ -53,7 +53,7 @@ def loaded_balance(
 
     Where Newton's method stalls on the creases of the potential, it is run again through falling delta.
     """
-    library = native_kernel()
+    library = native_kernel(body)
     if library is not None:
         return Loaded(*loaded(library, body, _UNIT, angles, rates, load, start, delta, steps))
     state = _newton(body, angles, rates, load, start, delta, steps)
