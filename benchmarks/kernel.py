@@ -59,9 +59,7 @@ def instants(quick: bool) -> str:
     for law in LAWS[: 1 if quick else 2]:
         for delta in (1e-4,) if quick else (1e-2, 1e-4, 1e-8):
             steps = solve_balance(BODY, law, *many, delta).iterations.mean()
-            bare = interleaved_seconds(
-                {"": partial(solve_balance, BODY, law, *many, delta, tolerance=1e300)}
-            )[""]
+            bare = interleaved_seconds({"": partial(solve_balance, BODY, law, *many, delta, tolerance=1e300)})[""]
             for count in (60, 10_000):
                 seconds = by_both(partial(solve_balance, BODY, law, *random_instants(count), delta))
                 each = {name: value / count for name, value in seconds.items()}

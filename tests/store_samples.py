@@ -7,7 +7,7 @@ import numpy as np
 
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
-from colloc.results.archive import Archive, load_archive, save_archive
+from colloc.results.archive import Archive, StartName, load_archive, save_archive
 from colloc.results.distinct_optima import Outcome
 from colloc.results.store import load, save
 from colloc.studies.cell import Attempt
@@ -34,7 +34,7 @@ def outcome(start, efficiency=0.2):
 
 
 def archive(starts=range(3)):
-    return Archive(problem(), "latin-hypercube", 0, "command", {k: outcome(k) for k in starts})
+    return Archive(problem(), "command", {StartName("latin-hypercube", 0, k): outcome(k) for k in starts})
 
 
 def record(k=0):
@@ -96,7 +96,7 @@ class Samples:
             found = load(path)
             return found.seconds, found.problem.hash, found.last.x.tobytes(), found.certificate
         if kind == "archive":
-            return {k: o.efficiency for k, o in load_archive(path).outcomes.items()}
+            return {name: o.efficiency for name, o in load_archive(path).outcomes.items()}
         if kind == "arrays":
             return {k: v.tolist() for k, v in read_arrays(path).items()}
         if kind == "study":

@@ -1,7 +1,8 @@
 """The balance of a body under isotropic friction and a small outside load: the dual certificate of the bound.
 
-The body minimises its dissipation potential less the load's power. The friction forces found are admissible (|f| <= mu), and
-that is all `colloc.bounds.guaranteed` needs: a solve that stops early gives a weaker certificate, not a wrong one.
+The body minimises its dissipation potential less the load's power. The friction forces found are admissible (|f| <= mu) and
+what they leave unbalanced is stated, which is all that `bounds.guaranteed` needs: a solve that stops early gives a weaker
+certificate, not a wrong one.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ class Loaded(NamedTuple):
 
     velocity (3, n): of the middle link. potential (n,): J_delta. power (n,): of the friction forces. forces (n_link, 3, n):
     minus the friction force on each link in its own axes (tangential, normal, couple). residual (2, n): force and torque left.
+    leftover_power (n,): power of what is left, load plus friction, on the motion.
     """
 
     velocity: np.ndarray
@@ -38,6 +40,7 @@ class Loaded(NamedTuple):
     power: np.ndarray
     forces: np.ndarray
     residual: np.ndarray
+    leftover_power: np.ndarray
 
 
 def _turn(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -119,4 +122,5 @@ def _newton(
         total_power(now.velocity, now.force)[0],
         -np.stack([now.force.tangential, now.force.normal, now.force.couple], axis=1),
         np.stack([np.hypot(force[0], force[1]), np.abs(force[2])]),
+        (force * z).sum(axis=0),
     )

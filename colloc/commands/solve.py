@@ -78,7 +78,8 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
     if certificate.replayed:
         lines += [
             f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
-            f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} for delta -> 0",
+            f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} +- "
+            f"{certificate.error_at_zero_delta:.0e} for delta -> 0",
             f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}      "
             f"at delta {solution.last.delta:.0e}",
         ]
@@ -139,6 +140,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
             "efficiency": certificate.efficiency,
             "efficiency_error": certificate.efficiency_error,
             "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
+            "error_at_zero_delta": certificate.error_at_zero_delta,
             "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
         }
     if reference is not None:

@@ -83,7 +83,15 @@ def _verify(options: argparse.Namespace) -> int:
     good = certificate.passed and not complaint and solution.status == "solved"
     if options.json:
         checks = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks}
-        keys = ("efficiency", "efficiency_error", "efficiency_at_zero_delta", "distance", "work", "instants")
+        keys = (
+            "efficiency",
+            "efficiency_error",
+            "efficiency_at_zero_delta",
+            "error_at_zero_delta",
+            "distance",
+            "work",
+            "instants",
+        )
         facts = {"file": options.result, "name": solution.problem.name, "certified": good, "complaint": complaint}
         facts["changed"] = solution.changed
         print(json.dumps({**facts, **{key: getattr(certificate, key) for key in keys}, "checks": checks}))

@@ -22,6 +22,7 @@ from colloc.system.errors import ProblemError
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
 CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
 FORMULATIONS = (CONDENSED, MAP, LIFTED)
+_PATH_CLASSES = (FreePath, Polygon)
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 LONGEST_NAME = 200
@@ -82,8 +83,8 @@ class Problem:
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"condensed", "map", "lifted"}
-        How the balance becomes constraints, see `collocation.point_equations`; "condensed" eliminates them, see
-        `collocation.reduced_space`.
+        How the balance of harmonic gaits becomes constraints, see `collocation.point_equations`; "condensed" (the default)
+        eliminates them, see `collocation.reduced_space`. None for free paths and polygons, whose balance is always eliminated.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """
@@ -99,7 +100,7 @@ class Problem:
     smallest_shape_speed: float = 0.1
     intervals: int = 30
     scheme: str = "gauss-3"
-    formulation: str = CONDENSED
+    formulation: str = None  # type: ignore[assignment]
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
@@ -123,7 +124,7 @@ class Problem:
     @property
     def has_path(self) -> bool:
         """Whether the class bounds the path itself (free paths, polygons) rather than its harmonics."""
-        return isinstance(self.gait, (FreePath, Polygon))
+        return isinstance(self.gait, _PATH_CLASSES)
 
     def _check_numbers(self) -> None:
         if self.delta_start is None:
@@ -147,7 +148,12 @@ class Problem:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
-        if self.formulation not in FORMULATIONS:
+        if self.has_path and self.formulation is not None:
+            kind = type(self.gait).__name__
+            raise ProblemError(f"the class {kind} has no formulation: its balance is always eliminated; leave it out.")
+        if self.formulation is None and not self.has_path:
+            object.__setattr__(self, "formulation", CONDENSED)
+        if not self.has_path and self.formulation not in FORMULATIONS:
             raise ProblemError(f"formulation must be one of {', '.join(FORMULATIONS)}, not {self.formulation!r}.")
         if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
@@ -161,8 +167,6 @@ class Problem:
             per_interval = collocation.s - collocation.left
             fewest, what = max(2, -(-4 * self.gait.harmonics // per_interval)), f"{self.gait.harmonics} harmonics"
         else:
-            if self.formulation == LIFTED:
-                raise ProblemError(f"the class {kind} has no formulation {LIFTED!r}: its balance is always eliminated.")
             if collocation.left:
                 raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
             fewest, what = (2 * self.gait.pieces, "the sides") if isinstance(self.gait, Polygon) else (4, "a path")
@@ -218,12 +222,16 @@ class Problem:
             raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def with_(self, **changes: object) -> Problem:
-        """A copy with some fields changed, validated anew."""
+        """A copy with some fields changed, validated anew. A class without formulations drops the one there was."""
+        if isinstance(changes.get("gait"), _PATH_CLASSES):
+            changes.setdefault("formulation", None)
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
     def to_dict(self) -> dict:
-        """All fields as plain numbers, strings and lists (JSON)."""
+        """All fields that say something as plain numbers, strings and lists (JSON)."""
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        if self.has_path:
+            del stated["formulation"]
         for name in ("guess", "gait"):
             stated[name] = fields(stated[name])
         for name in ("body", "friction"):
@@ -245,6 +253,8 @@ class Problem:
             stated["body"] = Chain(tuple(stated["body"]["lengths"]))
             stated["friction"] = Friction(**stated["friction"])
             stated["gait"] = class_from(stated["gait"])
+            if isinstance(stated["gait"], _PATH_CLASSES):
+                stated.pop("formulation", None)  # earlier files name one, without effect
             return cls(**stated)
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
@@ -252,8 +262,12 @@ class Problem:
     @property
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
-        text = json.dumps(self.to_dict(), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return statement_hash(self.to_dict())
+
+
+def statement_hash(stated: dict) -> str:
+    """SHA-256 of what `Problem.to_dict` gave."""
+    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
 
 
 _NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

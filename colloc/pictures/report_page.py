@@ -69,7 +69,7 @@ def _summary(solution: Solution, reference: Reference | None, gap: str) -> Marku
     if certificate.replayed:
         facts = [
             (f"{certificate.efficiency:.5f}", f"efficiency d/W, ± {certificate.efficiency_error:.0e}, replayed"),
-            (f"{certificate.efficiency_at_zero_delta:.5f}", "for δ → 0, same gait"),
+            (f"{certificate.efficiency_at_zero_delta:.5f}", f"for δ → 0, same gait, ± {certificate.error_at_zero_delta:.0e}"),
             (f"{certificate.distance:.5f}", "distance d a period [body lengths]"),
             (f"{certificate.work:.5f}", "work W a period [weight × length]"),
         ]
@@ -246,10 +246,11 @@ def _problem(solution: Solution) -> Markup:
 
 def _reproduce(solution: Solution) -> Markup:
     p = solution.problem
+    formulation = "" if p.formulation is None else f" --formulation {p.formulation}"
     commands = [
         f"# save the problem source above as {p.name}.py, then",
         f"colloc solve {p.name}.py --delta {p.delta:g} --delta-start {p.delta_start:g} --mesh {p.intervals} "
-        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation {p.formulation}",
+        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme}{formulation}",
         f"colloc verify results/{p.name}.h5",
     ]
     versions = [[name, version] for name, version in solution.versions.items()]

@@ -18,13 +18,14 @@ class Level:
     edges : (n_interval + 1,)
         The mesh, in phases of the gait found.
     x, lam_x : (n,)
-        Variables (see `colloc.collocation.layout`) and multipliers of their bounds.
+        Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces are in units of
+        `colloc.search.friction_unit`.
     lam_g : (m,)
         Multipliers of the constraints.
     efficiency, distance, work : float
         Over one whole period, as collocation sees them.
     kkt_error, violation, complementarity : float
-        Measured first-order conditions, unscaled.
+        Measured first-order conditions, in units of the friction, otherwise unscaled.
     status : str
         The optimiser's own word.
     optimal : bool

@@ -53,11 +53,14 @@ class Certificate:
     efficiency, distance, work : float
         Of the replay, over one period, at the solution's delta.
     efficiency_error : float
-        Estimated error of that efficiency from refining the replay.
+        Error of that efficiency: what refining the replay changes, and what following another point of the body would
+        (net rotation times the body's reach over the distance).
     efficiency_at_zero_delta : float
         Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed.
     instants : int
         Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
+    error_at_zero_delta : float
+        Error of the extrapolation (`colloc.results.delta_limit.extrapolated_limit`); NaN if an older file does not state it.
     """
 
     checks: tuple[Check, ...]
@@ -67,6 +70,7 @@ class Certificate:
     efficiency_error: float
     efficiency_at_zero_delta: float
     instants: int
+    error_at_zero_delta: float = float("nan")
 
     @property
     def replayed(self) -> bool:
@@ -306,7 +310,7 @@ class Solution:
             return [("efficiency (not replayed)", f"{self.efficiency:.5f}"), ("δ", f"{self.last.delta:.0e}")]
         return [
             ("efficiency d/W", f"{certificate.efficiency:.5f} ± {certificate.efficiency_error:.0e}"),
-            ("for δ → 0", f"{certificate.efficiency_at_zero_delta:.5f}"),
+            ("for δ → 0", f"{certificate.efficiency_at_zero_delta:.5f} ± {certificate.error_at_zero_delta:.0e}"),
             ("distance d", f"{certificate.distance:.5f}"),
             ("work W", f"{certificate.work:.5f}"),
             ("δ", f"{self.last.delta:.0e}"),

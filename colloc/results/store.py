@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.problem import Problem
+from colloc.gaits.problem import Problem, statement_hash
 from colloc.results.level import Level
 from colloc.results.solution import UNCERTIFIED, Certificate, Check, Solution
 from colloc.system.errors import ChangedFileWarning, StoreError
@@ -140,8 +140,9 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
 
 
 def _read(file: h5py.File) -> Solution:
-    problem = Problem.from_dict(json.loads(text(file, "problem")))
-    if problem.hash != attribute(file, "problem_hash"):
+    stated = json.loads(text(file, "problem"))
+    problem = Problem.from_dict(stated)
+    if statement_hash(stated) != attribute(file, "problem_hash"):
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
     levels = []
     found = child(file, "levels") if "levels" in file else ()
@@ -155,7 +156,8 @@ def _read(file: h5py.File) -> Solution:
         group = child(file, "certificate")
         columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
         checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+        stated = [f.name for f in dataclasses.fields(Certificate) if f.default is dataclasses.MISSING or f.name in group.attrs]
+        rest = {name: attribute(group, name) for name in stated if name != "checks"}
         certificate = Certificate(checks, **rest)
     solution = Solution(
         problem,

@@ -19,6 +19,7 @@ from colloc.gaits.problem import Problem
 from colloc.results.level import Level
 from colloc.results.solution import Solution
 from colloc.search.diagnosis import explanation, redundant_equations
+from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.level_run import LOWER_START, REMESH_RADIUS, SMALLEST_RADIUS, TRIVIAL, Report, Run
 from colloc.search.nlp import NlpResult, Solver
 from colloc.search.path_start import transcribed
@@ -69,12 +70,15 @@ def continue_delta(
         Without a certificate; the last level is one at ``problem.delta`` only if all went well.
     """
     begin = time.perf_counter()
-    run = Run(problem, solver or _kept_solver(problem), on_level)
-    run.take_over(before)
+    stated, (problem, unit) = problem, in_friction_units(problem)
+    report = None if on_level is None else lambda level: on_level(restated(level, unit))
+    run = Run(problem, solver or _kept_solver(problem), report)
+    run.take_over([restated(level, 1.0 / unit) for level in before])
     first = feasible_point(run.solver.transcription, run.parameters, problem.delta_start)
     redundant = redundant_equations(run.solver, first, problem.delta_start)
     result, shortfall = _refine(run)
-    solution = Solution(problem, run.levels, seconds=time.perf_counter() - begin, message=shortfall)
+    levels = [restated(level, unit) for level in run.levels]
+    solution = Solution(stated, levels, seconds=time.perf_counter() - begin, message=shortfall)
     if not result.optimal:
         delta = run.levels[-1].delta
         solution.message = explanation(run.solver.transcription, result, delta)

@@ -10,6 +10,10 @@ from colloc.numerics.multiplier_estimate import quasi_definite_factors
 from colloc.search.nlp import NlpResult, Solver
 
 _SATISFIED = 1e-8
+SMALLEST_DELTA = 1e-9
+"""Below it the Lagrangian's gradient cannot be told from zero: a link at stick moves at the order of delta, the tail velocity
+that is solved for resolves 1e-16, so the gradient is known to about 1e-16/delta. Measured on one harmonic of three links: a KKT
+error of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9 and 2e-6 at 1e-10, where 1e-6 is allowed."""
 _COMPONENTS = ("force along the tail", "force across the tail", "torque about the tail")
 _LAWS = ("tangential force", "normal force", "couple")
 _PATH = {
@@ -90,6 +94,8 @@ def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> 
     else:
         failed = f"every equation holds, but the efficiency is not stationary (KKT error {result.kkt_error:.1e})"
         advice = "use more intervals, since kinks at stick may be under-resolved, or start from another guess"
+        if delta < SMALLEST_DELTA:
+            advice = f"ask for a delta of at least {SMALLEST_DELTA:.0e}, below which rounding hides the optimum"
     effort = f"not converged at delta = {delta:.1e} after {result.iterations} iterations"
     return f"{effort}: {failed} ({result.status}). Try to {advice}."
 

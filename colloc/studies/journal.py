@@ -18,7 +18,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.gait_fields import fields as gait_fields
+from colloc.gaits.gait_fields import gait_from
 from colloc.results.distinct_optima import STATUSES, Outcome
 from colloc.studies.cell import Attempt
 from colloc.system.errors import CollocError, StoreError
@@ -30,10 +31,11 @@ _NUMBERS = [f.name for f in fields(Outcome) if f.name not in ("guess", "gait", "
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """All attempts of one visit to a cell, and the hash of its problem."""
+    """What one visit to a cell gave, and the hash of its problem; see `colloc.studies.cell.Visit`."""
 
     problem_hash: str
     attempts: tuple[Attempt, ...]
+    scores: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -44,15 +46,11 @@ class JournalText:
     damaged: int = 0
 
 
-def _gait_fields(gait: Fourier) -> dict[str, Any]:
-    return {name: getattr(gait, name).tolist() for name in ("mean", "cos", "sin")}
-
-
 def _attempt_fields(attempt: Attempt) -> dict[str, Any]:
     outcome = attempt.outcome
     entry = {"origin": attempt.origin, "key": attempt.key, "status": outcome.status, "message": outcome.message[:1000]}
     numbers = {name: value if math.isfinite(value := getattr(outcome, name)) else None for name in _NUMBERS}
-    return entry | numbers | {"guess": _gait_fields(outcome.guess), "gait": _gait_fields(outcome.gait)}
+    return entry | numbers | {"guess": gait_fields(outcome.guess), "gait": gait_fields(outcome.gait)}
 
 
 def _attempt_in(entry: dict[str, Any]) -> Attempt:
@@ -62,13 +60,17 @@ def _attempt_in(entry: dict[str, Any]) -> Attempt:
     origin, key, status, message = texts = [entry[name] for name in ("origin", "key", "status", "message")]
     if not all(isinstance(text, str) for text in texts) or status not in STATUSES:
         raise ValueError("not texts")
-    guess, gait = (Fourier(**entry[name]) for name in ("guess", "gait"))
+    guess, gait = (gait_from(entry[name]) for name in ("guess", "gait"))
     return Attempt(origin, key, Outcome(status=status, message=message, guess=guess, gait=gait, **numbers))
 
 
 def line_of(record: Record) -> bytes:
     """A record as a line."""
-    entry = {"problem": record.problem_hash, "attempts": [_attempt_fields(attempt) for attempt in record.attempts]}
+    entry = {
+        "problem": record.problem_hash,
+        "attempts": [_attempt_fields(attempt) for attempt in record.attempts],
+        "scores": {key: score for key, score in record.scores.items() if math.isfinite(score)},
+    }
     text = json.dumps(entry, allow_nan=False).encode()
     return hashlib.sha256(text).hexdigest().encode() + b" " + text + b"\n"
 
@@ -86,8 +88,9 @@ def record_in(line: bytes) -> Record:
         raise ValueError("wrong sum")
     try:
         entry = json.loads(text)
-        return Record(str(entry["problem"]), tuple(_attempt_in(fields) for fields in entry["attempts"]))
-    except (KeyError, TypeError, CollocError, RecursionError) as error:
+        scores = {str(key): float(score) for key, score in entry.get("scores", {}).items()}  # none in earlier journals
+        return Record(str(entry["problem"]), tuple(_attempt_in(fields) for fields in entry["attempts"]), scores)
+    except (KeyError, TypeError, AttributeError, CollocError, RecursionError) as error:
         raise ValueError(f"not a record: {error}") from None
 
 

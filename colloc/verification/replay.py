@@ -1,7 +1,9 @@
 """Independent replay of a gait: from the joint angles alone to distance, work and rotation, by the NumPy solver.
 
 It shares nothing with collocation but the friction law: no scheme, no mesh, no symmetry, no interpolant. Velocities are
-solved for on a uniform grid over the whole period and integrated by Simpson's rule; doubling the grid gives the error.
+solved for at five instants of every panel of the period and integrated by Simpson's rule, once over the panel and once over
+its halves; panels are halved where the two differ. The differences add up as magnitudes: kinks of stick and slip lie anywhere
+between the instants, so those of different panels may well cancel by accident, and a difference of two sums be no error.
 """
 
 from __future__ import annotations
@@ -17,14 +19,20 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.numerics.simpson import cumulative_simpson, simpson
 from colloc.system.errors import ProblemError
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
 
-
 _ONE_SIDED = 1e-12
+_NARROWEST = 1e-10
+_HALF = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24
+"""Integrals from the first of three instants to each of them of the parabola through them, over unit distance of the outer."""
+_WHOLE = np.zeros((5, 5))
+_WHOLE[:3, :3] = 0.5 * _HALF
+_WHOLE[3:] = _WHOLE[2]
+_WHOLE[2:, 2:] += 0.5 * _HALF
+"""The same for five instants, parabola by parabola."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +42,17 @@ class Replay:
     Attributes
     ----------
     distance, work, efficiency : float
+        The distance is that of the centre of mass.
     rotation : float
-        Net rotation over the period [rad]; the distance means something only if it vanishes.
+        Net rotation over the period [rad].
+    lever : float
+        Largest distance of a point of the body from its centre of mass [body lengths].
     actuator_work : float
         Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
     residual : float
-        Largest force or torque left over.
+        Largest force or torque left over, at any instant, in units of the largest friction coefficient.
     error : float
-        Estimated relative error of the efficiency, from the grid of half as many instants.
+        Relative error of the efficiency: what halving the panels changes, summed as magnitudes, and the residual.
     instants : int
     tail : ((n,), (3, n))
         Phases and tail velocities there.
@@ -51,6 +62,7 @@ class Replay:
     work: float
     efficiency: float
     rotation: float
+    lever: float
     actuator_work: float
     residual: float
     error: float
@@ -62,50 +74,65 @@ class Replay:
         known, z = self.tail
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
+    @property
+    def turning(self) -> float:
+        """How much the distance depends on the point of the body that is followed, relative: rotation times lever over it."""
+        return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
 
-class _Samples(NamedTuple):
-    """Of one piece of the period without jumps, each ``(n,)``, tail velocities ``(3, n)``."""
 
-    t: np.ndarray
+class _Panels(NamedTuple):
+    """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
+    of the centre of mass in the body frame (complex), power, power of the joints, residual and lever ``(n, 5)``."""
+
+    left: np.ndarray
+    width: np.ndarray
     z: np.ndarray
-    centre_x: np.ndarray
-    centre_y: np.ndarray
+    centre: np.ndarray
     power: np.ndarray
-    actuator_power: np.ndarray
+    actuator: np.ndarray
     residual: np.ndarray
+    lever: np.ndarray
 
-    def every(self, n: int) -> _Samples:
-        return _Samples(*(a[..., ::n] for a in self))
+    def take(self, chosen: np.ndarray) -> _Panels:
+        return _Panels(*(a[chosen] for a in self))
 
-    def interleaved(self, new: _Samples) -> _Samples:
-        """With the samples `new` in between."""
-        merged = []
-        for a, b in zip(self, new, strict=True):
-            both = np.empty((*a.shape[:-1], a.shape[-1] + b.shape[-1]))
-            both[..., ::2], both[..., 1::2] = a, b
-            merged.append(both)
-        return _Samples(*merged)
+    def joined(self, other: _Panels) -> _Panels:
+        """These and others, in order of time."""
+        both = _Panels(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+        return both.take(np.argsort(both.left))
 
 
-def _sampled(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None) -> _Samples:
-    angles, rates = path(t)
+def _evaluated(
+    body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None
+) -> tuple[np.ndarray, ...]:
+    """The last six of `_Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``."""
+    angles, rates = path(t.ravel())
     solved = solve_balance(body, friction, angles, rates, delta, start=near).require()
     motion = chain_motion(body, friction, angles, rates, delta, solved)
-    return _Samples(t, motion.z, motion.centre[0], motion.centre[1], motion.power, motion.actuator_power, solved.residual)
+    (x, y), (gx, gy) = body.joints(angles), body.centre(body.posture(angles))
+    lever = np.hypot(x - gx, y - gy).max(axis=0)
+    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, solved.residual, lever)
+    return motion.z.T.reshape(*t.shape, 3), *(value.reshape(t.shape) for value in values)
 
 
-def _integrated(segments: list[_Samples], every: int) -> tuple[float, float, float, float, float]:
-    """Distance, work, rotation, actuator work and largest residual, by Simpson's rule on every `every`-th instant."""
-    heading, end, worked, actuated, worst = 0.0, 0j, 0.0, 0.0, 0.0
-    for segment in segments:
-        s = segment.every(every)
-        step = (s.t[-1] - s.t[0]) / (s.t.size - 1)
-        theta = heading + cumulative_simpson(s.z[2], step)
-        end += complex(simpson(np.exp(1j * theta) * (s.centre_x + 1j * s.centre_y), step))
-        heading = float(theta[-1])
-        worked, actuated = worked + float(simpson(s.power, step)), actuated + float(simpson(s.actuator_power, step))
-        worst = max(worst, float(s.residual.max()))
-    return float(abs(end)), worked, heading, actuated, worst
+def _halves(panels: _Panels, new: tuple[np.ndarray, ...]) -> _Panels:
+    """Both halves of panels, from the values at their instants and half way between these ``(n, 4)``."""
+    fields = []
+    for old, between in zip(panels[2:], new, strict=True):
+        merged = np.empty((old.shape[0], 9, *old.shape[2:]), dtype=old.dtype)
+        merged[:, ::2], merged[:, 1::2] = old, between
+        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, *old.shape[1:]))
+    left, width = np.repeat(panels.left, 2), 0.5 * np.repeat(panels.width, 2)
+    left[1::2] += width[1::2]
+    return _Panels(left, width, *fields)
+
+
+def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rotation, displacement in the axes at the panel's begin (complex) and work of panels, on every `every`-th instant."""
+    omega, centre, power = (a[:, ::every] for a in (panels.z[..., 2], panels.centre, panels.power))
+    h, b = panels.width, rule[-1]
+    turn = np.exp(1j * h[:, None] * (omega @ rule.T))
+    return h * (omega @ b), h * ((turn * centre) @ b), h * (power @ b)
 
 
 def replay(
@@ -116,7 +143,7 @@ def replay(
     *,
     instants: int = 1600,
     tolerance: float = 1e-6,
-    most_instants: int = 25600,
+    most_instants: int = 100_000,
     breaks: np.ndarray | tuple[float, ...] = (),
     near: Replay | None = None,
 ) -> Replay:
@@ -130,10 +157,11 @@ def replay(
     delta : float
         Regularisation speed, per period.
     instants : int
-        Grid to begin with (even); it doubles until the estimated error is below `tolerance`.
+        Uniform instants to begin with, about; panels are halved until the error is below `tolerance`.
     tolerance : float
         Relative error of the efficiency.
     most_instants : int
+        No panel is halved once there are so many.
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump (corners); they are integrated up to and from there.
     near : Replay, optional
@@ -149,28 +177,50 @@ def replay(
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
-    segments = []
-    for a, b in pairwise(ends):
-        count = 4 * max(1, round(instants * (b - a) / 4))
-        grid = np.linspace(a, b, count + 1)
-        # one-sided limits at jumps
-        inside = grid.copy()
-        inside[0] += _ONE_SIDED * (b - a) if a > 0 else 0.0
-        inside[-1] -= _ONE_SIDED * (b - a) if b < 1 else 0.0
-        start = None if near is None else near.tail_velocity(grid)
-        segments.append(_sampled(body, friction, path, delta, inside, start)._replace(t=grid))
+    counts = [max(1, round(instants * (b - a) / 4)) for a, b in pairwise(ends)]
+    edges = np.concatenate([np.linspace(a, b, n + 1)[:-1] for (a, b), n in zip(pairwise(ends), counts, strict=True)] + [[1.0]])
+    left, width = edges[:-1], np.diff(edges)
+    t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
+    # one-sided limits at jumps
+    t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
+    t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
+    start = None if near is None else near.tail_velocity(t.ravel())
+    panels = _Panels(left, width, *_evaluated(body, friction, path, delta, t, start))
     while True:
-        fine, coarse = _integrated(segments, 1), _integrated(segments, 2)
-        if not (fine[1] > 0 and coarse[1] > 0):
+        turn, move, spent = _increments(_WHOLE, panels, 1)
+        heading = np.concatenate([[0.0], np.cumsum(turn)])
+        travelled = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
+        distance, work = float(abs(travelled[-1])), float(spent.sum())
+        if not work > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
-        # kinks at stick limit the order to two: the difference over three estimates the finer grid's error
-        efficiency, before = fine[0] / fine[1], coarse[0] / coarse[1]
-        error = abs(efficiency - before) / 3 / max(abs(efficiency), 1e-300)
-        n = sum(segment.t.size - 1 for segment in segments)
-        if error <= tolerance or 2 * n > most_instants:
-            known = np.concatenate([s.t[:-1] for s in segments]), np.concatenate([s.z[:, :-1] for s in segments], axis=1)
-            return Replay(fine[0], fine[1], efficiency, fine[2], fine[3], fine[4], error, n, known)
-        segments = [
-            old.interleaved(_sampled(body, friction, path, delta, *(0.5 * (a[..., 1:] + a[..., :-1]) for a in (old.t, old.z))))
-            for old in segments
-        ]
+        once = _increments(_HALF, panels, 2)
+        # an error of rotation turns all that comes after it
+        reach = np.abs(travelled - travelled[-1]).max()
+        astray = np.abs(move - once[1]) + reach * np.abs(turn - once[0])
+        gap = astray / max(distance, 1e-300) + np.abs(spent - once[2]) / work
+        residual = float(panels.residual.max())
+        order = np.argsort(gap)
+        # finer panels do not make up for what the balance leaves over
+        excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
+        chosen = order[excess & (panels.width[order] > _NARROWEST)]
+        n = 4 * (panels.left.size + chosen.size)
+        if chosen.size == 0 or n > most_instants:
+            break
+        old = panels.take(chosen)
+        between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
+        start = 0.5 * (old.z[:, :-1] + old.z[:, 1:]).reshape(-1, 3).T
+        kept = np.setdiff1d(order, chosen)
+        panels = panels.take(kept).joined(_halves(old, _evaluated(body, friction, path, delta, between, start)))
+    known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
+    return Replay(
+        distance,
+        work,
+        distance / work,
+        float(heading[-1]),
+        float(panels.lever.max()),
+        float(((panels.actuator @ _WHOLE[-1]) * panels.width).sum()),
+        residual,
+        float(gap.sum()) + residual,
+        4 * panels.left.size,
+        (known, panels.z[:, :4].reshape(-1, 3).T),
+    )

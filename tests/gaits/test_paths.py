@@ -198,7 +198,8 @@ def test_delta_keeps_its_meaning_from_class_to_class():
 @pytest.mark.parametrize(
     ("gait", "changes", "words"),
     [
-        (FreePath(4.0), {"formulation": "lifted"}, "formulation"),
+        (FreePath(4.0), {"formulation": "lifted"}, "has no formulation"),
+        (Polygon(4), {"formulation": "condensed"}, "has no formulation"),
         (FreePath(4.0), {"scheme": "trapezoid"}, "gauss-N or radau-N"),
         (FreePath(4.0), {"intervals": 2}, "mesh is too small"),
         (Polygon(6), {"intervals": 8}, "mesh is too small"),
@@ -240,6 +241,17 @@ def test_problems_of_every_class_survive_their_description():
         assert again.hash == problem.hash
         assert again.gait == gait
         assert again.delta_start == 0.01
+
+
+def test_a_path_has_no_formulation_in_its_description_its_hash_or_after_a_change_of_class():
+    harmonic = Problem("p", ellipse(0, 1.5, 1.0), gait=Harmonic(1, "bilateral"), formulation="lifted")
+    path = harmonic.with_(gait=FreePath(4.0, "bilateral"))
+    assert path.formulation is None
+    assert "formulation" not in path.to_dict()
+    assert harmonic.to_dict()["formulation"] == "lifted"
+    # files that were written when a path still recorded one
+    assert Problem.from_dict(path.to_dict() | {"formulation": "condensed"}).hash == path.hash
+    assert path.with_(gait=Harmonic(2, "bilateral")).formulation == "condensed"
 
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)

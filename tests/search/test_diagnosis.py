@@ -1,6 +1,7 @@
 """Failures are named in mechanical words, and redundant equations are found before a solve."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -90,8 +91,6 @@ def test_the_search_for_redundant_equations_takes_time_in_proportion_to_the_mesh
 
 
 def _with_linear(transcription, linear):
-    from dataclasses import replace
-
     return replace(transcription, assembly=replace(transcription.assembly, linear=linear))
 
 
@@ -102,3 +101,14 @@ def test_running_out_of_iterations_says_so():
     text = explanation(solver.transcription, solver.solve(x, 0.05), 0.05)
     assert "after 2 iterations" in text
     assert np.char.find(text, "Maximum_Iterations") >= 0
+
+
+def test_a_delta_that_rounding_hides_is_named():
+    """At delta = 1e-10 the flagship's gradient is noise of 2e-6; at 1e-9 it is still told from zero."""
+    problem = stated()
+    solver = Solver(transcribe(problem), {"max_iter": 0})
+    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 1e-10)
+    result = solver.solve(x, 1e-10)
+    result = replace(result, excess=np.zeros_like(result.excess))
+    assert "at least 1e-09, below which rounding" in explanation(solver.transcription, result, 1e-10)
+    assert "rounding" not in explanation(solver.transcription, result, 1e-9)

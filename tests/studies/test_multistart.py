@@ -11,13 +11,15 @@ import pytest
 from colloc.commands import multistart
 from colloc.gaits.equivalence import distance, images, irreversibility, phase_distance, reversed_in_time
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
+from colloc.gaits.path_classes import Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, shape_speed, start_gait
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
-from colloc.results.archive import Archive, load_archive, save_archive
-from colloc.results.delta_limit import efficiency_at_zero_delta, resolution_warning
+from colloc.results.archive import Archive, StartName, load_archive, save_archive
+from colloc.results.certificate import corner_phases
+from colloc.results.delta_limit import efficiency_at_zero_delta, mesh_errors, resolution_warning
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.results.solution import SOLVED
 from colloc.search import continuation, level_run
@@ -190,14 +192,15 @@ def test_basins_join_images_of_one_gait_and_nothing_else():
 
 
 def test_an_archive_comes_back_as_it_was_written(tmp_path):
-    archive = Archive(problem(), SAMPLERS[0], 7, "command", {k: outcome(k) for k in (4, 1)})
-    assert load_archive(save_archive(Archive(problem(), SAMPLERS[0], 7), tmp_path / "empty.h5")).outcomes == {}
+    names = {k: StartName(SAMPLERS[0], 7, k) for k in (4, 1)}
+    archive = Archive(problem(), "command", {names[k]: outcome(k) for k in names})
+    assert load_archive(save_archive(Archive(problem()), tmp_path / "empty.h5")).outcomes == {}
     back = load_archive(save_archive(archive, tmp_path / "sub" / "a.h5"))
-    assert (back.problem.hash, back.sampler, back.seed, back.command) == (problem().hash, SAMPLERS[0], 7, "command")
-    assert sorted(back.outcomes) == [1, 4]
+    assert (back.problem.hash, back.command) == (problem().hash, "command")
+    assert sorted(back.outcomes) == sorted(names.values())
     for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
-        assert getattr(back.outcomes[4], name) == getattr(archive.outcomes[4], name)
-    np.testing.assert_array_equal(back.outcomes[1].gait.sin, GAIT.sin)
+        assert getattr(back.outcomes[names[4]], name) == getattr(archive.outcomes[names[4]], name)
+    np.testing.assert_array_equal(back.outcomes[names[1]].gait.sin, GAIT.sin)
     assert [p.name for p in (tmp_path / "sub").glob("[!.]*")] == ["a.h5"]
     (tmp_path / "bad.h5").write_bytes(b"not HDF5")
     for name in ("bad.h5", "missing.h5"):
@@ -265,7 +268,7 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     printed = capsys.readouterr().out
     assert "0 starts done already, 2 to go" in printed
     archive = load_archive(out / "quick.starts.h5")
-    assert sorted(archive.outcomes) == [0, 1]
+    assert sorted(archive.of_search(SAMPLERS[0], 0)) == [0, 1]
     asked = []
 
     def run(stated, starts, **settings):
@@ -280,8 +283,36 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert summary["starts"] == 4
     assert sum(summary["counts"].values()) == 4
     assert summary["optima"][0]["efficiency"] >= 0.2 - 1e-12
-    assert multistart.main([str(path), "--starts", "4", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 2
-    assert "another problem, sampler or seed" in capsys.readouterr().err
+    # another seed joins the same archive, and says what else is there
+    assert multistart.main([str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 0
+    assert asked == [2, 3, 0, 1]
+    assert "starts in the file besides: 4; the best of all, 0.200000" in capsys.readouterr().out
+    archive = load_archive(out / "quick.starts.h5")
+    assert sorted(archive.of_search(SAMPLERS[0], 0)) == [0, 1, 2, 3]
+    assert sorted(archive.of_search(SAMPLERS[0], 1)) == [0, 1]
+    # another problem of the same name does not
+    path.write_text(FILE.replace("delta=0.1", "delta=0.2"), encoding="utf-8")
+    assert multistart.main([str(path), "--output", str(out)]) == 2
+    assert "holds starts of another problem" in capsys.readouterr().err
+    assert asked == [2, 3, 0, 1]
+    assert len(load_archive(out / "quick.starts.h5").outcomes) == 6
+
+
+def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the_other(tmp_path):
+    runs = [Archive(problem(), f"seed {seed}") for seed in (0, 1)]
+    for archive in runs:
+        save_archive(archive, tmp_path / "a.h5")
+    for k in range(3):
+        for seed, archive in enumerate(runs):
+            archive.outcomes[StartName(SAMPLERS[0], seed, k)] = outcome(k, efficiency=0.1 * (seed + 1))
+            save_archive(archive, tmp_path / "a.h5")
+    found = load_archive(tmp_path / "a.h5").outcomes
+    assert {name: round(o.efficiency, 9) for name, o in found.items()} == {
+        (SAMPLERS[0], seed, k): 0.1 * (seed + 1) for seed in (0, 1) for k in range(3)
+    }
+    with pytest.raises(StoreError, match="another problem"):
+        save_archive(Archive(problem(delta=0.2)), tmp_path / "a.h5")
+    assert len(load_archive(tmp_path / "a.h5").outcomes) == 6
 
 
 def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
@@ -324,6 +355,16 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
     assert limit.error < 1e-3 * limit.value
     assert abs(limit.value - three_link.certificate.efficiency_at_zero_delta) < 3 * limit.error
     assert resolution_warning(three_link) is None
+
+
+def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
+    stated = Problem("p", ellipse(0.1, 2.0, 1.0), gait=Polygon(3, "bilateral"), delta=1e-2, intervals=24, mesh_tolerance=0.0)
+    solution = continue_delta(stated)
+    gait = solution.gait
+    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
+    exact = replay(stated.body, stated.friction, path, stated.delta * gait.length, breaks=corner_phases(gait), tolerance=1e-8)
+    # at the problem's own number, which is at unit shape speed, it would come out 40 times too large
+    assert mesh_errors(solution).sum() == pytest.approx(abs(solution.efficiency / exact.efficiency - 1), rel=0.2)
 
 
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):

@@ -15,7 +15,7 @@ import pytest
 from store_samples import KINDS, Samples, append, archive, outcome, record
 
 from colloc.commands import sweep as sweep_study
-from colloc.results.archive import load_archive, save_archive
+from colloc.results.archive import StartName, load_archive, save_archive
 from colloc.studies.journal import Journal, read_journal
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.file_lock import locked
@@ -29,7 +29,7 @@ from colloc.studies.study import Axis, Study
 def problem(mu_t):
     return Problem("tiny", ellipse(0, 2.85, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t, 1, 1),
                    delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=0.0)
-STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1, 1.2)),), problem, cold_starts=0, passes=0)
+STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1, 1.2)),), problem, cold_starts=0)
 """
 
 
@@ -175,7 +175,7 @@ def _write_many(kind, folder, who, count):
             save_entry(folder / "c.json", f"{who}-{k}", {"value": k})
         elif kind == "archive":
             mine = archive([])
-            mine.outcomes[1000 * who + k] = outcome(1000 * who + k, 0.1 + 0.001 * k)
+            mine.outcomes[StartName("latin-hypercube", who, k)] = outcome(k, 0.1 + 0.001 * k)
             save_archive(mine, folder / "a.h5")
         else:
             append(folder, [record(1000 * who + k)])
@@ -195,8 +195,8 @@ def test_two_writers_at_once_end_with_both_results(kind, tmp_path):
         assert found == {f"{who}-{k}" for who in (1, 2) for k in range(count)}
     elif kind == "archive":
         outcomes = load_archive(tmp_path / "a.h5").outcomes
-        assert sorted(outcomes) == [1000 * who + k for who in (1, 2) for k in range(count)]
-        assert outcomes[2003].efficiency == 0.1 + 0.001 * 3
+        assert sorted(outcomes) == [("latin-hypercube", who, k) for who in (1, 2) for k in range(count)]
+        assert outcomes["latin-hypercube", 2, 3].efficiency == 0.1 + 0.001 * 3
     else:
         text = read_journal(tmp_path)
         assert text.damaged == 0

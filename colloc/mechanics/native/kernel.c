@@ -124,11 +124,11 @@ int colloc_motion(
 
 /* Chains under unit friction and loads (3, n_time) on the middle link, whose velocity is given to start from and found;
    velocities and loads in the middle link's axes. Then potential and power (n_time), minus the friction on each link in its own
-   axes (n, 3, n_time), force and torque left over (2, n_time). */
+   axes (n, 3, n_time), force and torque left over (2, n_time), and what power these have (n_time). */
 int colloc_loaded(
     int n, const double *length, const double mu[3], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
     const double *rates, const double *load, const double *start, double delta, int steps, double *velocity, double *potential,
-    double *power, double *forces, double *residual)
+    double *power, double *forces, double *residual, double *leftover_power)
 {
     Link *link = malloc((size_t)n * sizeof *link);
     Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
@@ -149,9 +149,11 @@ int colloc_loaded(
             velocity[n_time + t] = c * s.velocity[1] - q * s.velocity[0];
             velocity[2 * n_time + t] = s.velocity[2];
             potential[t] = at.merit;
-            power[t] = 0.0;
-            for (int i = 0; i < 3; ++i)
+            power[t] = leftover_power[t] = 0.0;
+            for (int i = 0; i < 3; ++i) {
                 potential[t] += body_load[i] * s.velocity[i];
+                leftover_power[t] += at.force[i] * s.velocity[i];
+            }
             for (int i = 0; i < n; ++i) {
                 const Sliding *k = &s.now[i];
                 power[t] -= k->fs * k->vs + k->fn * k->vn + k->couple * k->w;
