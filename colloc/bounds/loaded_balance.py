@@ -13,8 +13,10 @@ import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant, net_force, total_power
 from colloc.mechanics.body import Chain
+from colloc.mechanics.compiled_balance import loaded
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.link_friction import link_dissipation
+from colloc.mechanics.native_kernel import native_kernel
 
 _UNIT = Friction()
 _SHRINK = (0.5,) * 3 + (0.1,) * 5
@@ -54,6 +56,9 @@ def loaded_balance(
 
     Where Newton's method stalls on the creases of the potential, it is run again through falling delta.
     """
+    library = native_kernel(body)
+    if library is not None:
+        return Loaded(*loaded(library, body, _UNIT, angles, rates, load, start, delta, steps))
     state = _newton(body, angles, rates, load, start, delta, steps)
     stalled = np.flatnonzero(state.residual.max(axis=0) > _STALLED)
     if stalled.size:

@@ -52,7 +52,7 @@ def balanced_near(
     z = np.zeros((3, n_time)) if start is None else start.copy()
     todo, converged = np.arange(n_time), np.ones(n_time, dtype=bool)
     enough = max(tolerance, _ROUNDING / delta)
-    if start is not None and native_kernel() is None:
+    if start is not None and native_kernel(body) is None:
         steps = balance_steps(body, friction)
         fallback, best = z.copy(), np.full(n_time, np.inf)
         limit = _FAR * np.abs(rates).max(axis=0)

@@ -63,6 +63,11 @@ class Chain:
             raise ProblemError(f"body.lengths must add up to the body length 1, not {sum(lengths):.12g}.")
 
     @property
+    def in_series(self) -> bool:
+        """Every link hangs on the one before it, as the compiled kernel takes for granted; a tree of links says no."""
+        return True
+
+    @property
     def n_link(self) -> int:
         return len(self.lengths)
 
@@ -84,10 +89,14 @@ class Chain:
         full = np.tril(np.ones((self.n_link, self.n_joint)), -1)
         return full if reference is TAIL else full - full[reference]
 
+    def _path(self, reference: int | None) -> np.ndarray:
+        """``(n_link, n_link)``: link vectors to midpoints, relative to the reference point."""
+        full = np.tril(np.ones((self.n_link, self.n_link)), -1) + 0.5 * np.eye(self.n_link)
+        return full if reference is TAIL else full - full[reference]
+
     def weighted_path(self, reference: int | None) -> np.ndarray:
         """``(n_link, n_link)``: directions of links to midpoints, relative to the reference point."""
-        full = np.tril(np.ones((self.n_link, self.n_link)), -1) + 0.5 * np.eye(self.n_link)
-        return (full if reference is TAIL else full - full[reference]) * self.lengths
+        return self._path(reference) * self.lengths
 
     def tangent_angles(self, angles: Array) -> Array:
         """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles ``(n_joint, n_time)``."""

@@ -54,7 +54,7 @@ def chain_motion(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> ChainMotion:
     """The motion at instants that were solved for; arguments as for `colloc.mechanics.fixed_point.solve_balance`."""
-    library, arguments = native_kernel(), (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity)
+    library, arguments = native_kernel(body), (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity)
     values = _numpy_values(*arguments) if library is None else motion(library, *arguments, with_slopes=False)[0]
     return _named(values)
 
@@ -63,7 +63,7 @@ def chain_slopes(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> tuple[ChainMotion, np.ndarray]:
     """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates)."""
-    library, arguments = native_kernel(), (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity)
+    library, arguments = native_kernel(body), (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity)
     if library is None:
         return _named(_numpy_values(*arguments)), _numpy_slopes(*arguments)
     values, slopes = motion(library, *arguments, with_slopes=True)

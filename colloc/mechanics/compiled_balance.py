@@ -76,3 +76,27 @@ def motion(
     after = (*map(address, given[:2]), delta, *map(address, (anchor, given[2], values, slopes)))
     each_piece(n_time, lambda first, last: library.colloc_motion(*before, first, last, *after))
     return values, slopes
+
+
+def loaded(
+    library: ctypes.CDLL,
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    load: np.ndarray,
+    start: np.ndarray,
+    delta: float,
+    steps: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The fields of `colloc.bounds.loaded_balance.Loaded`."""
+    n_time = angles.shape[1]
+    lengths, coefficients = body_arguments(body, friction)
+    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, load, start)]
+    velocity, potential, power = np.empty((3, n_time)), np.empty(n_time), np.empty(n_time)
+    forces, residual, leftover_power = np.empty((body.n_link, 3, n_time)), np.empty((2, n_time)), np.empty(n_time)
+    found = velocity, potential, power, forces, residual, leftover_power
+    before = (body.n_link, address(lengths), address(coefficients), n_time)
+    after = (*map(address, given), delta, steps, *map(address, found))
+    each_piece(n_time, lambda first, last: library.colloc_loaded(*before, first, last, *after))
+    return found

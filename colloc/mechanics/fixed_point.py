@@ -187,7 +187,7 @@ def solve_balance(
         if start.shape != (3, n_time) or not np.isfinite(start).all():
             raise ProblemError(f"start must be finite with shape (3, {n_time}).")
     arguments = (body, friction, angles, rates, float(delta), start, float(tolerance), int(max_iterations), method)
-    library = native_kernel()
+    library = native_kernel(body)
     solved = _numpy_balance(*arguments) if library is None else balance(library, *arguments)
     z, residual, iterations, anchor, velocity = solved
     return BalanceSolution(z, residual, iterations, residual <= tolerance, anchor, velocity)

@@ -3,7 +3,7 @@
 The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled by the system's compiler
 when first needed, in about half a second, and kept in the user's cache folder under a name made of their content: whoever
 edits, updates or shares an installation never meets an old library. Without a compiler, or a folder to keep the library in,
-everything is done by NumPy, the reference. Numba was no alternative: its import alone takes longer than that, every time.
+everything is done by NumPy, the reference (docs/notes/kernel.md says why C, and why then).
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on
 nothing but its own data, so it is the same in any batch and on any number of threads.
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import hashlib
+import os
 import platform
 import shutil
 import sys
@@ -25,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.mechanics.body import Chain
 from colloc.numerics.c_compiler import c_compiler, cache_folder, compile_library
 from colloc.system.errors import StoreError
 from colloc.system.private_folder import is_private, make_private
@@ -32,7 +34,7 @@ from colloc.system.processors import available_threads
 from colloc.system.replaced_file import replaced_file
 
 _FLAGS = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
-"""Nothing that reorders arithmetic. -O3 takes four times as long to compile and gains 5 %."""
+"""Nothing that reorders arithmetic. -O3 takes three times as long to compile and gains 5 to 10 %."""
 _MAIN = "kernel.c"
 _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
@@ -41,16 +43,18 @@ _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 _BODY = (ctypes.c_int, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
+    "colloc_loaded": (*_BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
     "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 4),
 }
 
 
+_ANY = Chain()
 _switched_off = False
 
 
-def native_kernel() -> ctypes.CDLL | None:
+def native_kernel(body: Chain = _ANY) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
-    return None if _switched_off else library()
+    return library() if body.in_series and not _switched_off else None
 
 
 @contextlib.contextmanager
@@ -95,8 +99,9 @@ def _digest(file: Path) -> str:
 
 
 def _compiled(sources: Path, folder: Path, name: str) -> Path | None:
-    """The library, put in the folder; None without a compiler."""
-    if c_compiler() is None:
+    """The library, put in the folder; None without a compiler, or where nothing can be kept."""
+    make_private(folder)
+    if c_compiler() is None or not os.access(folder, os.W_OK):
         return None
     with tempfile.TemporaryDirectory(prefix="colloc-") as scratch:
         made = Path(scratch) / "kernel.so"

@@ -97,14 +97,15 @@ def test_a_bound_is_pinned_from_both_sides(isotropic):
     )[0]
     reached = value(np.array(isotropic.angles)[:, None], np.array(isotropic.rates)[:, None])
     assert reached[0] == pytest.approx(isotropic.sampled, rel=1e-6)
-    # five rounds leave 1 to 2 % between them, as the samples happen to fall
-    assert isotropic.floor <= isotropic.sampled <= 1.02 * isotropic.floor
+    # in 16 runs with other seeds and settings five rounds left 0.6 to 24 % between them, as the samples happened to fall
+    assert isotropic.floor <= isotropic.sampled <= 1.3 * isotropic.floor
     rng = np.random.default_rng(23)
     q, turn = rng.uniform(-np.pi, np.pi, (2, 4000)), rng.uniform(0, 2 * np.pi, 4000)
     inside = admissible(Chain(), q)
     assert value(q[:, inside], np.stack([np.cos(turn), np.sin(turn)])[:, inside]).max() < isotropic.sampled
-    # this coarse program with harmonic 1; finer ones come down to 0.459, and small gaits at the fold reach 0.456
-    assert isotropic.sampled == pytest.approx(0.4833, rel=0.01)
+    # of this coarse program with harmonic 1 (0.4796 to 0.4803 in those runs); finer ones come down to 0.459, and small gaits at
+    # the fold reach 0.456
+    assert isotropic.floor == pytest.approx(0.480, rel=0.003)
 
 
 def test_a_sampled_bound_holds_at_random_motions_within_a_percent():

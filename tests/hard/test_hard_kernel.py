@@ -5,6 +5,7 @@ import pytest
 from cases import COEFFICIENTS, DELTAS, HARD
 
 from colloc import Chain, Friction, solve_balance
+from colloc.bounds.loaded_balance import loaded_balance
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 
 ANGLES = np.array([angles for angles, _ in HARD.values()]).T
@@ -52,3 +53,20 @@ def test_the_methods_for_comparison_are_the_same_as_well(method):
     compiled, reference = by_both(Chain(), Friction(), ANGLES, RATES, 1e-2, method=method, max_iterations=60)
     np.testing.assert_array_equal(compiled.converged, reference.converged)
     np.testing.assert_allclose(compiled.z / SPEED, reference.z / SPEED, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("delta", [1e-3, 1e-7])
+@pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
+def test_bodies_under_load_come_to_the_same_state(lengths, delta):
+    """Where friction holds the load; where it cannot, neither solver finds a balance."""
+    rng, body = np.random.default_rng(6), Chain(lengths)
+    angles, rates = rng.uniform(-3, 3, (body.n_joint, 400)), rng.uniform(-1, 1, (body.n_joint, 400))
+    load = rng.normal(size=(3, 400)) * [[0.4], [0.4], [0.1]]
+    compiled = loaded_balance(body, angles, rates, load, np.zeros((3, 400)), delta)
+    with numpy_instead(), np.errstate(all="ignore"):
+        reference = loaded_balance(body, angles, rates, load, np.zeros((3, 400)), delta)
+    held = compiled.residual.max(axis=0) < 1e-9
+    assert 0.4 < held.mean() < 0.95
+    np.testing.assert_array_equal(held, reference.residual.max(axis=0) < 1e-9)
+    for ours, theirs in zip(compiled, reference, strict=True):
+        np.testing.assert_allclose(ours[..., held], theirs[..., held], rtol=0, atol=1e-8)

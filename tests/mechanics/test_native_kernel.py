@@ -82,6 +82,17 @@ def test_it_is_compiled_once_and_a_damaged_one_again(fresh, tmp_path):
     assert (other / compiled.name).stat().st_size == compiled.stat().st_size
 
 
+@pytest.mark.skipif(c_compiler() is None or not hasattr(os, "geteuid"), reason="no C compiler, or no POSIX permissions")
+def test_a_library_that_others_could_have_written_is_not_run(fresh, tmp_path):
+    fresh.setenv(FOLDER, str(tmp_path / "code"))
+    assert native_kernel() is not None
+    (compiled,) = (tmp_path / "code").glob("kernel-*.so")
+    assert compiled.stat().st_mode & 0o777 == 0o600
+    (tmp_path / "code").chmod(0o777)
+    library.cache_clear()
+    assert native_kernel() is None
+
+
 @pytest.mark.parametrize("missing", ["compiler", "folder", "working compiler", "permission"])
 def test_without_it_numpy_gives_the_answer(fresh, tmp_path, missing):
     known = solve_balance(Chain(), Friction(), *instants(5), 1e-3).z

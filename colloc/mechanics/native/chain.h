@@ -2,6 +2,8 @@
    colloc/mechanics/balance.py. Positions and velocities are added up from the reference outwards, so that links that rest
    beside it keep the relative precision of their speed. */
 
+#pragma once
+
 #include <stddef.h>
 
 #include "link_friction.h"

@@ -1,6 +1,8 @@
 /* Damped Newton with a fixed-point safeguard for one instant: the same steps, attempts and constants as
    colloc/mechanics/damped_newton.py, where they are explained. */
 
+#pragma once
+
 #include <float.h>
 #include <string.h>
 
@@ -30,15 +32,15 @@ typedef struct {
     long long iterations;
 } State;
 
-/* x with A x = b after symmetric scaling; zero where that is singular. */
-static inline void solve3(Matrix3 A, const double b[3], double x[3])
+/* x with A x = b after symmetric scaling to a unit diagonal, to which `shift` is added; zero where that is singular. */
+static inline void solve3(Matrix3 A, const double b[3], double shift, double x[3])
 {
     double d[3], m[3][4];
     for (int i = 0; i < 3; ++i)
         d[i] = sqrt(fmin(fmax(fabs(A[i][i]), DBL_MIN), DBL_MAX));
     for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j)
-            m[i][j] = A[i][j] / (d[i] * d[j]);
+            m[i][j] = A[i][j] / (d[i] * d[j]) + (i == j ? shift : 0.0);
         m[i][3] = b[i] / d[i];
     }
     x[0] = x[1] = x[2] = 0.0;
@@ -93,7 +95,7 @@ static inline void iterate(const int n, State *s, double delta, double tolerance
         Matrix3 left;
         double step[3], trial[3], alpha = 1.0;
         pull_back(n, s->link, s->now, law, delta, newton, left);
-        solve3(left, at.force, step);
+        solve3(left, at.force, 0.0, step);
         double slope = -2.0 * at.merit, slack = 0.0;
         if (law->isotropic) {
             slope = -(at.force[0] * step[0] + at.force[1] * step[1] + at.force[2] * step[2]);

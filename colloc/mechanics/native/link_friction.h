@@ -1,6 +1,8 @@
 /* Friction on one link in closed form: what colloc/mechanics/link_friction.py states for arrays, for one link at one instant.
    The names are those of that module; the formulas are derived and explained there. */
 
+#pragma once
+
 #include <math.h>
 #include <stdbool.h>
 
@@ -33,10 +35,16 @@ static inline double tangential(const Law *law, double vs)
 /* (g - 1)/q: sum of q^j / (2 j + 3) below the limit of 0.1, where the closed form would cancel. */
 static inline double h_series(double q)
 {
-    double h = 1.0 / 33.0;
-    for (int j = 14; j >= 0; --j)
-        h = h * q + 1.0 / (2 * j + 3);
-    return h;
+    const double q2 = q * q;
+    double even = 1.0 / 31, odd = 1.0 / 33; /* two sums, each half as long a chain of operations */
+    even = even * q2 + 1.0 / 27, odd = odd * q2 + 1.0 / 29;
+    even = even * q2 + 1.0 / 23, odd = odd * q2 + 1.0 / 25;
+    even = even * q2 + 1.0 / 19, odd = odd * q2 + 1.0 / 21;
+    even = even * q2 + 1.0 / 15, odd = odd * q2 + 1.0 / 17;
+    even = even * q2 + 1.0 / 11, odd = odd * q2 + 1.0 / 13;
+    even = even * q2 + 1.0 / 7, odd = odd * q2 + 1.0 / 9;
+    even = even * q2 + 1.0 / 3, odd = odd * q2 + 1.0 / 5;
+    return even + odd * q;
 }
 
 /* Fill in a2 to h from vs, vn, w. */

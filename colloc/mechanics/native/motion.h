@@ -2,6 +2,8 @@
    angles and rates, by the implicit function theorem: colloc/mechanics/chain_motion.py. All about the anchor, whose velocity is known
    to full relative precision. */
 
+#pragma once
+
 #include "damped_newton.h"
 
 enum { TAIL_ROW = 0, CENTRE_ROW = 3, POWER_ROW = 5, DIFFERENTIATED_ROWS = 6, ACTUATOR_ROW = 6, ROWS = 7 };
