@@ -48,7 +48,8 @@ def anatomy(name: str) -> dict[str, float]:
         mark = now
 
     from colloc.collocation.reduced_space import Condensed
-    from colloc.pictures.figure import save_figure, solution_figure
+    from colloc.pictures.figure import solution_figure
+    from colloc.pictures.style import save as save_figure
     from colloc.results.certificate import certify
     from colloc.results.store import save
     from colloc.search import continuation, level_run, nlp
@@ -107,7 +108,7 @@ def anatomy(name: str) -> dict[str, float]:
     lap("verification")
     save(solution, folder / "x.h5")
     lap("saving")
-    save_figure(solution_figure(solution), folder / "x.h5")
+    save_figure(solution_figure(solution), folder / "x", ("png",))
     lap("figure")
 
     functions = inside["value"] + inside["gradient"] + inside["Jacobian"] + inside["Hessian"]
