@@ -11,7 +11,12 @@ PACKAGES = tuple(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
 BESIDE = {"__init__", "__main__", "solve"}
 """What lies beside the packages: the face, ``python -m colloc`` and ``python -m colloc.solve``."""
 MOST_FILES, MOST_LINES = 18, 350
-ONLY = {"matplotlib": {"pictures"}, "h5py": {"system", "results", "studies"}, "casadi": {"numerics", "collocation", "search"}}
+ONLY = {
+    "matplotlib": {"pictures"},
+    "jinja2": {"pictures"},
+    "h5py": {"system", "results", "studies"},
+    "casadi": {"numerics", "collocation", "search"},
+}
 
 
 def packages():

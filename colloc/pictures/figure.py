@@ -115,7 +115,7 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
     """The gait in the plane of two joint angles, light to dark, its start a disc, over the shapes that are allowed."""
     draw_allowed(axes, problem.body, problem.joint_limit)
     q = angles[[first, second]]
-    colours = colormaps[PHASE](np.linspace(0.15, 1, 200))
+    colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # to be seen on white and on black
     pieces = np.array_split(np.arange(q.shape[1] - 1), min(200, q.shape[1] - 1))
     lines = [q[:, piece[0] : piece[-1] + 2].T for piece in pieces]
     axes.add_collection(LineCollection(lines, colors=colours, lw=2.2, capstyle="round"))
