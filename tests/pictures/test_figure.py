@@ -1,5 +1,7 @@
 """The figure of a solution can be read: no words over words, nothing cut off, snapshots apart, and PDF only on demand."""
 
+import subprocess
+import sys
 from itertools import combinations, pairwise
 
 import matplotlib
@@ -106,3 +108,13 @@ def test_only_the_kinds_asked_for_are_written_and_nobodys_settings_change(tmp_pa
     assert save(figure, tmp_path / "x.y", ("png",)) == [tmp_path / "x.y.png"]
     assert {path.name for path in tmp_path.iterdir()} == {"x.y.png"}
     assert dict(matplotlib.rcParams) == before
+
+
+def test_drawing_loads_neither_pyplot_nor_what_writes_pdf():
+    program = (
+        "import sys, colloc.commands.solve; assert 'matplotlib' not in sys.modules; import colloc.pictures.figure;"
+        "print(*sys.modules)"
+    )
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert "matplotlib.figure" in loaded
+    assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "scipy.stats", "jinja2"} & set(loaded)
