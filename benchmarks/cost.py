@@ -41,7 +41,8 @@ def anatomy(name: str) -> dict[str, float]:
         seconds[part] = seconds.get(part, 0.0) + now - mark
         mark = now
 
-    from colloc.pictures.figure import save_figure, solution_figure
+    from colloc.pictures.figure import solution_figure
+    from colloc.pictures.style import save as save_figure
     from colloc.results.certificate import certify
     from colloc.results.solution import Solution
     from colloc.results.store import save
@@ -68,7 +69,7 @@ def anatomy(name: str) -> dict[str, float]:
     lap("certificate")
     save(solution, folder / "x.h5")
     lap("saving")
-    save_figure(solution_figure(solution), folder / "x.h5")
+    save_figure(solution_figure(solution), folder / "x", ("png",))
     lap("figure")
     counts = {
         "(iterations of the search)": iterations,

@@ -97,7 +97,7 @@ def main() -> None:
     kind, symmetry = (np.array([p[k].split(" ")[0] for p in parts]).reshape(efficiency.shape) for k in (0, 1))
     figure = friction_plane_figure(mu_t, mu_b, efficiency, kind, symmetry, rest["at_slowest"].astype(bool), bound)
     folder = options.output or options.results
-    print(*save(figure, folder, "friction_plane"), sep="\n")
+    print(*save(figure, folder / "friction_plane"), sep="\n")
     text = "\n".join(table(mu_t, mu_b, efficiency, rest, bound)) + "\n"
     (folder / "friction_plane.md").write_text(text, encoding="utf-8")
 

@@ -13,6 +13,7 @@ BESIDE = {"__init__", "__main__", "solve"}
 MOST_FILES, MOST_LINES = 18, 350
 ONLY = {
     "matplotlib": {"pictures"},
+    "jinja2": {"pictures"},
     "h5py": {"system", "results", "studies"},
     "casadi": {"numerics", "collocation", "reduced", "search"},
 }

@@ -27,7 +27,7 @@ SUBCOMMANDS = {
 _EXAMPLE = """\
 From a problem to a page to send:
 
-  colloc solve problems/three_link.py        results/three_link.h5, .png, .pdf
+  colloc solve problems/three_link.py        results/three_link.h5, .png
   colloc report results/three_link.h5        results/three_link.html
   colloc animate results/three_link.h5       results/three_link.gif
   colloc export results/three_link.h5 --max-speed 2.0 --rate 50

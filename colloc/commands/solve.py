@@ -66,7 +66,8 @@ def _parser() -> argparse.ArgumentParser:
         "program at every level of delta, from the guess alone",
     )
     add_bound(parser)
-    parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
+    parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png")
+    parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
     add_printing(parser)
     return parser
 
@@ -226,13 +227,14 @@ def _solve(options: argparse.Namespace) -> int:
         lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
         print("\n".join(lines), flush=True)
     if not options.no_figure:
-        from colloc.pictures.figure import save_figure, solution_figure
+        from colloc.pictures.figure import solution_figure
+        from colloc.pictures.style import save as save_figure
 
         with StatusLine(enabled=not quiet) as line:
             line.say("drawing")
             try:
-                save_figure(solution_figure(solution), path)
-                saved += f", {path.with_suffix('.png')}"
+                for drawn in save_figure(solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + options.pdf]):
+                    saved += f", {drawn}"
             except CollocError as error:
                 complaints.append(f"no figure: {error}")
     if not options.json:

@@ -238,8 +238,8 @@ class Solution:
         return total_power(now.velocity, now.force)[0]
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: verdict, numbers, checks and the path in shape space."""
-        return solution_card(self.problem.name, self.status, self.message, self._facts(), self._checks(), self._thumbnail())
+        """What a notebook shows: verdict, numbers and checks."""
+        return solution_card(self.problem.name, self.status, self.message, self._facts(), self._checks())
 
     def _facts(self) -> list[tuple[str, str]]:
         if not self.levels:
@@ -258,9 +258,6 @@ class Solution:
     def _checks(self) -> list[tuple[str, bool, str]]:
         checks = self.certificate.checks if self.certificate.replayed else ()
         return [(check.name, check.passed, f"{check.value:.1e} (≤ {check.threshold:.0e})") for check in checks]
-
-    def _thumbnail(self) -> np.ndarray | None:
-        return self.sample(np.linspace(0.0, 1.0, 181)).angles if self.levels else None
 
 
 def versions() -> dict[str, str]:

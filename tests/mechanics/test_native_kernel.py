@@ -1,5 +1,6 @@
 """The compiled kernel: the same bits on any number of threads and in any batch; whatever is wrong with it costs speed only."""
 
+import os
 import shutil
 import subprocess
 import sys
