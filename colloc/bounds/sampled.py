@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,8 @@ from colloc.bounds.sampling import Domain
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
-from colloc.system.errors import ProblemError
-from colloc.system.json_cache import hash_of, load_entries, save_entry
+from colloc.system.errors import ProblemError, StoreError
+from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
 
 VERSION = 2
 """Part of the cache key: raise it when the computation changes its result."""
@@ -173,11 +174,27 @@ def known_bound(
     cache: str | os.PathLike,
 ) -> Bound | None:
     """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
-    entry = load_entries(cache).get(bound_key(Domain(body, friction, float(joint_limit)), budget))
+    entry = read_rows(Path(cache), CACHE).values.get(bound_key(Domain(body, friction, float(joint_limit)), budget))
     if entry is None:
         return None
-    fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
-    return Bound(**fields)
+    try:
+        fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+        return Bound(**fields)
+    except (TypeError, AttributeError):
+        raise StoreError(f"{cache} holds something else than bounds; move it away.") from None
+
+
+def keep_bound(
+    bound: Bound,
+    body: Chain,
+    friction: Friction,
+    joint_limit: float = float(np.pi),
+    *,
+    budget: Budget = QUICK,
+    cache: str | os.PathLike,
+) -> None:
+    """Put a bound into the cache; arguments as for `efficiency_bound`."""
+    put_rows(Path(cache), CACHE, {bound_key(Domain(body, friction, float(joint_limit)), budget): asdict(bound)})
 
 
 def efficiency_bound(
@@ -200,12 +217,14 @@ def efficiency_bound(
         At most pi.
     budget : Budget
     cache : path, optional
-        A JSON file where bounds are kept by the hash of all inputs.
+        An SQLite file where bounds are kept by the hash of all inputs.
 
     Raises
     ------
     ProblemError
-        For a joint limit outside (0, pi], more than four links, even harmonics with mu_b = mu_f, or an unreadable cache.
+        For a joint limit outside (0, pi], more than four links, or even harmonics with mu_b = mu_f.
+    StoreError
+        If the cache cannot be read or written.
     """
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
@@ -218,9 +237,7 @@ def efficiency_bound(
         return known
     if friction.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
         raise ProblemError("even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only.")
-    domain = Domain(body, friction, float(joint_limit))
-    key = bound_key(domain, budget)
-    bound = compute_bound(domain, budget)
+    bound = compute_bound(Domain(body, friction, float(joint_limit)), budget)
     if cache is not None:
-        save_entry(cache, key, asdict(bound))
+        keep_bound(bound, body, friction, joint_limit, budget=budget, cache=cache)
     return bound

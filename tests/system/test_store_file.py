@@ -137,7 +137,6 @@ def test_readers_touch_no_data_of_variable_length(samples, kind, monkeypatch):
     [
         ("solution", "levels/000/x"),
         ("solution", "problem"),
-        ("archive", "outcomes/start"),
         ("arrays", "a/b"),
         ("study", "status"),
     ],
