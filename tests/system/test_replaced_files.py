@@ -129,6 +129,19 @@ def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
         pass
 
 
+@pytest.mark.parametrize("failure", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
+@pytest.mark.filterwarnings("ignore:flock not supported")
+def test_a_file_system_without_locks_stops_nobody(tmp_path, monkeypatch, failure):
+    def refuse(*_):
+        raise OSError(failure, os.strerror(failure))
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    ran = []
+    with locked(tmp_path / "lock"):
+        ran.append(failure)
+    assert ran == [failure]
+
+
 def _write_many(kind, folder, who, count):
     folder = Path(folder)
     for k in range(count):
