@@ -145,6 +145,8 @@ def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
         raise
     except (sqlite3.Error, OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or error
+        if path.with_name(f"{path.name}.lock").exists():  # only where `_has_locks` is false
+            why = f"{why}, and if no run is under way remove {path.name}.lock"
         raise StoreError(
             f"cannot write {path}: {why}. What was finished before is kept; make room or choose another --output, and give the "
             "same command again."
