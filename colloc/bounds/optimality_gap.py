@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
-from colloc.bounds.sampled import Bound, efficiency_bound, keep_bound, known_bound
+from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
 from colloc.gaits.problem import Problem
 from colloc.system.errors import ChangedFileWarning, StoreError
 
@@ -20,18 +20,10 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
     """
     domain, cache = (problem.body, problem.friction, problem.joint_limit), folder / CACHE
     try:
-        known = known_bound(*domain, cache=cache)
+        return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:
         warnings.warn(f"{error} No bound is taken from it.", ChangedFileWarning, stacklevel=2)
         return efficiency_bound(*domain) if compute else None
-    if known is not None or not compute:
-        return known
-    bound = efficiency_bound(*domain)
-    try:
-        keep_bound(bound, *domain, cache=cache)
-    except StoreError as error:
-        warnings.warn(f"{error} The bound is not kept.", ChangedFileWarning, stacklevel=2)
-    return bound
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:

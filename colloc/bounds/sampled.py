@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from colloc.bounds.sampling import Domain
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
-from colloc.system.errors import ProblemError, StoreError
+from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
 
 VERSION = 2
@@ -184,19 +185,6 @@ def known_bound(
         raise StoreError(f"{cache} holds something else than bounds; move it away.") from None
 
 
-def keep_bound(
-    bound: Bound,
-    body: Chain,
-    friction: Friction,
-    joint_limit: float = float(np.pi),
-    *,
-    budget: Budget = QUICK,
-    cache: str | os.PathLike,
-) -> None:
-    """Put a bound into the cache; arguments as for `efficiency_bound`."""
-    put_rows(Path(cache), CACHE, {bound_key(Domain(body, friction, float(joint_limit)), budget): asdict(bound)})
-
-
 def efficiency_bound(
     body: Chain,
     friction: Friction,
@@ -224,7 +212,7 @@ def efficiency_bound(
     ProblemError
         For a joint limit outside (0, pi], more than four links, or even harmonics with mu_b = mu_f.
     StoreError
-        If the cache cannot be read or written.
+        If the cache cannot be read. One that cannot be written costs a `ChangedFileWarning`.
     """
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
@@ -237,7 +225,11 @@ def efficiency_bound(
         return known
     if friction.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
         raise ProblemError("even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only.")
-    bound = compute_bound(Domain(body, friction, float(joint_limit)), budget)
+    domain = Domain(body, friction, float(joint_limit))
+    bound = compute_bound(domain, budget)
     if cache is not None:
-        keep_bound(bound, body, friction, joint_limit, budget=budget, cache=cache)
+        try:
+            put_rows(Path(cache), CACHE, {bound_key(domain, budget): asdict(bound)})
+        except StoreError as error:
+            warnings.warn(f"{error} The bound is not kept.", ChangedFileWarning, stacklevel=2)
     return bound

@@ -174,8 +174,8 @@ def _write(file: h5py.File, archive: Archive, command: str) -> None:
             put_column(f"{name}_mean", [gait.mean for gait in gaits], "rad", "start, joint")
             for part in ("cos", "sin"):
                 put_column(f"{name}_{part}", [getattr(gait, part) for gait in gaits], "rad", "start, joint, harmonic")
-    found, rows = basins(archive.problem, outcomes), {id(o): row for row, o in enumerate(outcomes)}
-    put_column("basin_row", [rows[id(b.best)] for b in found], "1", "basin")
+    found = basins(archive.problem, outcomes)
+    put_column("basin_row", [next(row for row, o in enumerate(outcomes) if o is b.best) for b in found], "1", "basin")
     put_column("basin_count", [len(b.starts) for b in found], "1", "basin")
     put_column("basin_frequency", [b.frequency for b in found], "share of starts", "basin")
     put_column("basin_efficiency", [b.best.efficiency for b in found], "1/weight", "basin")

@@ -25,7 +25,7 @@ from colloc.results.archive import save_archive
 from colloc.results.store import load, save
 from colloc.system import store_file
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.sealed_file import MAGIC, SEAL_SIZE, check_seal, seal, write_sealed
+from colloc.system.sealed_file import MAGIC, SEAL_SIZE, check_seal, write_sealed
 from colloc.system.store_file import LARGEST_FILE, array, attribute, mark, new_file, sealed_file
 
 QUICK, SLOW, RESEALED = 600, 6000, 1000
@@ -253,7 +253,7 @@ def test_links_data_outside_the_file_and_types_with_references_are_not_followed(
         file["nothing"] = h5py.Empty("f8")
         for name in ("opaque", "reference", "endless", "lists", "record", "nothing"):
             file.attrs[name] = file[name][()]
-    seal(path)
+    write_sealed(path, path.read_bytes())
     types = dict.fromkeys(("opaque", "reference", "endless", "lists", "record"), "neither numbers nor texts")
     refused = {"external": "a link", "soft": "a link", "raw": "in one piece", "virtual": "in one piece", "missing": "missing"}
     for name, why in (refused | types | {"nothing": "is empty"}).items():
@@ -290,7 +290,7 @@ def test_a_seal_is_the_checksum_of_what_stands_before_it(tmp_path):
     assert path.read_bytes().startswith(b"abc" + MAGIC)
     check_seal(path, 100, "thing")
     (tmp_path / "y").write_bytes(b"abc")
-    seal(tmp_path / "y")
+    write_sealed(tmp_path / "y", (tmp_path / "y").read_bytes())
     assert (tmp_path / "y").read_bytes() == path.read_bytes()
     for data in (b"", b"abc", b"abcd" + path.read_bytes()[3:], path.read_bytes()[:-1], path.read_bytes() + b" "):
         path.write_bytes(data)
@@ -309,7 +309,7 @@ def test_a_problem_that_is_too_large_to_check_is_refused(samples, tmp_path):
     with h5py.File(path, "a") as file:
         del file["problem"]
         file["problem"] = np.bytes_('{"body": {"lengths": [' + ", ".join(["1e-9"] * 3_000_000) + "]}}")
-    seal(path)
+    write_sealed(path, path.read_bytes())
     begin = time.perf_counter()
     with pytest.raises(StoreError, match="too large"):
         load(path)

@@ -6,7 +6,7 @@ import pytest
 
 from colloc.results.store import load, save
 from colloc.system.errors import StoreError
-from colloc.system.sealed_file import seal
+from colloc.system.sealed_file import write_sealed
 
 
 def test_round_trip_keeps_everything(three_link, tmp_path):
@@ -55,7 +55,7 @@ def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
         file["x"] = [1.0]
     with pytest.raises(StoreError, match="carries no checksum"):
         load(tmp_path / "other.h5")
-    seal(tmp_path / "other.h5")
+    write_sealed(tmp_path / "other.h5", (tmp_path / "other.h5").read_bytes())
     with pytest.raises(StoreError, match="not a colloc solution"):
         load(tmp_path / "other.h5")
     good = save(three_link, tmp_path / "good.h5")
