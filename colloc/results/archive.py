@@ -36,7 +36,9 @@ from colloc.system.store_file import mark, new_file, put, put_attribute
 KIND, VERSION = "colloc archive", 4
 ROWS = "colloc starts 1"
 _PROBLEM = "problem"
-_NUMBERS = {
+_COLUMNS = {
+    "status": "text",
+    "message": "text",
     "efficiency": "1/weight",
     "efficiency_error": "1/weight",
     "distance": "length",
@@ -163,9 +165,7 @@ def _write(file: h5py.File, archive: Archive, command: str) -> None:
     put_column("start", [name.number for name in names], "1")
     put_column("seed", [name.seed for name in names], "1")
     put_column("sampler", [name.sampler for name in names], "text")
-    for name in ("status", "message"):
-        put_column(name, [getattr(o, name) for o in outcomes], "text")
-    for name, units in _NUMBERS.items():
+    for name, units in _COLUMNS.items():
         put_column(name, [getattr(o, name) for o in outcomes], units)
     if outcomes:
         for name in ("guess", "gait"):
