@@ -30,7 +30,7 @@ from colloc.collocation.transcription import transcribe
 from colloc.gaits.sampling import latin_hypercube_gait
 from colloc.results.solution import Solution
 from colloc.search.optimise import maximise_efficiency
-from colloc.system.json_cache import load_entries, save_entry
+from colloc.system.row_file import cached
 
 LAWS = ((1, 1, 1), (3, 1, 1))
 LINKS = (4, 5)
@@ -92,12 +92,7 @@ def pairs_apart(solution: Solution) -> int:
 
 def kept(cache: Path, label: str, problem: Problem, solve: Callable[[Problem], dict]) -> dict:
     """The outcome of a problem from the cache, or solved and put there."""
-    key = f"{label} {problem.hash[:16]}"
-    entries = load_entries(cache)
-    if key not in entries:
-        save_entry(cache, key, solve(problem))
-        entries = load_entries(cache)
-    return entries[key]
+    return cached(cache, f"{label} {problem.hash}", lambda: solve(problem))
 
 
 def best_of(outcomes: list[dict]) -> dict | None:
@@ -160,7 +155,7 @@ def main() -> None:
         print(json.dumps(outcome(wave_problem(options.wave))))
         return
     options.output.mkdir(parents=True, exist_ok=True)
-    cache = options.output / "chains.json"
+    cache = options.output / "chains.sqlite"
     sizes = run_sizes(cache)
     rows: dict[tuple, str] = {}
     for key, row in case_rows(cache, options.starts, options.harmonics):

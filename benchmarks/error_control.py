@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import argparse
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
 from colloc.search.optimise import optimum
-from colloc.system.json_cache import load_entries, save_entry
+from colloc.system.row_file import cached
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay
 
@@ -161,13 +162,10 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    cache, lines, results = options.output / "error_control.json", [HEADER], []
+    cache, lines, results = options.output / "error_control.sqlite", [HEADER], []
     for index in range(len(CASES)):
         problem = case_problem(index)
-        key = problem.hash[:16]
-        if key not in load_entries(cache):
-            save_entry(cache, key, outcome(problem))
-        results.append(load_entries(cache)[key])
+        results.append(cached(cache, problem.hash, partial(outcome, problem)))
         lines.append(row(index, results[-1]))
         print(lines[-1], flush=True)
     judged = [(r, a) for r in results if r["optimal"] for a in ("against replay", "against optimum") if r[a] is not None]

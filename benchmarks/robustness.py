@@ -29,7 +29,7 @@ import numpy as np
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.sampling import LATIN_HYPERCUBE, on_speed_floor
-from colloc.results.archive import Archive, StartName, save_archive
+from colloc.results.archive import Archive, StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Outcome, basins, counts
 from colloc.results.solution import SOLVED, versions
 from colloc.studies.campaign import process_pool, run_starts
@@ -61,9 +61,7 @@ def case_problem(law: tuple[float, float, float], symmetry: str, delta: float, d
 
 def stored(problem: Problem, folder: Path) -> Archive:
     """The archive of a case as far as it got."""
-    archive = Archive(problem, "benchmarks/robustness.py")
-    save_archive(archive, folder / f"{problem.name}.h5")
-    return archive
+    return open_archive(problem, folder / f"{problem.name}.h5")
 
 
 def pool(workers: int) -> Executor:
@@ -76,20 +74,19 @@ def advance(law: tuple[float, float, float], symmetry: str, most: int, workers: 
     first = stored(case_problem(law, symmetry, DELTA, 0.1), folder)
     second = stored(case_problem(law, symmetry, SMALL_DELTA, NEXT_DELTA), folder)
     settings: dict = {"workers": workers, "time_limit": TIME_LIMIT, "executor": pool}
-    _complete(first, most, folder, lambda missing: run_starts(first.problem, missing, **settings))
-    for name, outcome in first.outcomes.items():
-        if outcome.status != SOLVED and name not in second.outcomes:
-            # what did not reach the larger delta counts as failed at the smaller one, for the same reason
-            second.outcomes[name] = replace(outcome, cpu_seconds=0.0, seconds=0.0, iterations=0)
+    _complete(first, most, lambda missing: run_starts(first.problem, missing, **settings))
+    # what did not reach the larger delta counts as failed at the smaller one, for the same reason
+    failed = {n: o for n, o in first.outcomes.items() if o.status != SOLVED and n not in second.outcomes}
+    second.add({name: replace(outcome, cpu_seconds=0.0, seconds=0.0, iterations=0) for name, outcome in failed.items()})
     known = {k: o.gait for k, o in first.of_search(LATIN_HYPERCUBE, 0).items()}
-    _complete(second, most, folder, lambda missing: run_starts(second.problem, missing, known=known, **settings))
+    _complete(second, most, lambda missing: run_starts(second.problem, missing, known=known, **settings))
 
 
-def _complete(archive: Archive, most: int, folder: Path, run: Callable) -> None:
+def _complete(archive: Archive, most: int, run: Callable) -> None:
     missing = [k for k in range(most) if StartName(LATIN_HYPERCUBE, 0, k) not in archive.outcomes]
     for outcome in run(missing):
-        archive.outcomes[StartName(LATIN_HYPERCUBE, 0, outcome.start)] = outcome
-        save_archive(archive, folder / f"{archive.problem.name}.h5")
+        archive.add({StartName(LATIN_HYPERCUBE, 0, outcome.start): outcome})
+    save_archive(archive, "benchmarks/robustness.py")
 
 
 def contradiction(problem: Problem, outcome: Outcome) -> float:

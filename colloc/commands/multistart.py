@@ -130,18 +130,19 @@ def _run(options: argparse.Namespace, command: str) -> int:
     path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.results.archive import Archive, StartName, save_archive
+    from colloc.results.archive import StartName, open_archive, save_archive
     from colloc.studies.campaign import run_starts
 
     quiet = options.quiet or options.json
     table = not quiet and sys.stdout.isatty()
-    archive = Archive(problem, command)
-    save_archive(archive, path)  # takes the starts there over, or refuses those of another problem, before anything is solved
+    archive = open_archive(problem, path)  # or refused, before anything is solved
     before = archive.of_search(options.sampler, options.seed)
     done = {k for k, o in before.items() if not (options.retry and o.status in _RETRIED)}
     todo = [k for k in range(options.starts) if k not in done]
     if not quiet:
         print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go", flush=True)
+        if archive.damaged:
+            print(f"  {archive.damaged} damaged rows beside {path} were left out; their starts are solved again", flush=True)
     if table:
         print(OUTCOME_HEADER, flush=True)
     begin = time.perf_counter()
@@ -151,8 +152,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
         with StatusLine(enabled=not quiet) as line:
             line.say(f"{problem.name}: 0 of {len(todo)} starts")
             for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
-                archive.outcomes[StartName(options.sampler, options.seed, outcome.start)] = outcome
-                save_archive(archive, path)  # on the disk before it is reported
+                archive.add({StartName(options.sampler, options.seed, outcome.start): outcome})  # before it is reported
                 if table:
                     line.clear()
                     print(outcome_line(outcome), flush=True)
@@ -160,7 +160,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
                 line.say(f"{problem.name}: {count} of {len(todo)} starts", left)
     except KeyboardInterrupt:
         interrupted = True
-    save_archive(archive, path)
+    save_archive(archive, command)
     outcomes = [o for k, o in archive.of_search(options.sampler, options.seed).items() if k < options.starts]
     found = basins(problem, outcomes)
     if options.json:

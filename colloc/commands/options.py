@@ -77,7 +77,7 @@ def add_printing(parser: argparse.ArgumentParser) -> None:
 def add_bound(parser: argparse.ArgumentParser) -> None:
     """``--bound``."""
     parser.add_argument(
-        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.json)"
+        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.sqlite)"
     )
 
 

@@ -146,16 +146,13 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
 
 
 def _save(run, out: Path, source: str, command: str) -> Path:
-    from colloc.bounds.optimality_gap import CACHE
-    from colloc.bounds.sampled import known_bound
+    from colloc.bounds.optimality_gap import upper_bound
     from colloc.gaits.problem import Problem
     from colloc.studies.store import save_study
     from colloc.studies.table import study_table
 
-    cache = out / CACHE
-
     def bound(problem: Problem) -> float | None:
-        known = known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
+        known = upper_bound(problem, out, compute=False)
         return None if known is None else known.sampled
 
     return save_study(study_table(run, bound), out / f"{run.study.name}.nc", source=source, command=command)

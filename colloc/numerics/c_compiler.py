@@ -8,6 +8,8 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+from platformdirs import user_cache_path
+
 from colloc.system.errors import StoreError
 from colloc.system.replaced_file import replaced_file
 
@@ -26,9 +28,10 @@ def cache_folder() -> Path | None:
     if named:
         return Path(named).absolute()
     try:
-        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "colloc"
-    except RuntimeError:
+        folder = user_cache_path("colloc", appauthor=False)
+    except RuntimeError:  # without a home; older platformdirs leave "~" in the path
         return None
+    return folder if folder.is_absolute() else None
 
 
 def c_compiler() -> str | None:

@@ -32,11 +32,12 @@ from colloc.system.store_file import array, attribute, child, mark, new_file, pu
 
 FORMAT, FORMAT_VERSION = "colloc solution", 3
 _MOTION_SAMPLES = 401
+_LAYOUT = "see colloc.collocation.layout"
 _LEVEL_ARRAYS = {
-    "edges": "period",
-    "x": "see colloc.collocation.layout",
-    "lam_x": "see colloc.collocation.layout",
-    "lam_g": "see colloc.collocation.layout",
+    "edges": ("period", "edge"),
+    "x": (_LAYOUT, "variable"),
+    "lam_x": (_LAYOUT, "variable"),
+    "lam_g": (_LAYOUT, "constraint"),
 }
 
 _GAIT_ARRAYS = {
@@ -105,8 +106,8 @@ def _write(file: h5py.File, solution: Solution) -> None:
     put(file, "others", json.dumps(others))
     for index, level in enumerate(solution.levels):
         group = file.create_group(f"levels/{index:03d}")
-        for name, units in _LEVEL_ARRAYS.items():
-            put(group, name, getattr(level, name), units=units, dims="vector")
+        for name, (units, dims) in _LEVEL_ARRAYS.items():
+            put(group, name, getattr(level, name), units=units, dims=dims)
         for field in dataclasses.fields(level):
             if field.name not in _LEVEL_ARRAYS:
                 put_attribute(group, field.name, getattr(level, field.name))
@@ -126,14 +127,14 @@ def _write_motion(file: h5py.File, solution: Solution) -> None:
             put_attribute(gait, name, value)
     motion = solution.sample(np.linspace(0.0, 1.0, _MOTION_SAMPLES))
     group = file.create_group("motion")
-    put(group, "t", motion.t, units="period", dims="time")
-    put(group, "joint_angles", motion.angles, units="rad", dims="joint, time")
-    put(group, "joint_rates", motion.rates, units="rad/period", dims="joint, time")
-    put(group, "tail_velocity", motion.z, units="length/period, length/period, rad/period", dims="(u, v, omega), time")
-    put(group, "theta", motion.theta, units="rad", dims="time")
-    put(group, "centre", motion.centre, units="length", dims="(x, y), time")
-    put(group, "tail", motion.tail, units="length", dims="(x, y), time")
-    put(group, "power", solution.power(motion), units="weight length/period", dims="time")
+    put(group, "t", motion.t, units="period", dims="t")
+    put(group, "joint_angles", motion.angles, units="rad", dims="joint, t")
+    put(group, "joint_rates", motion.rates, units="rad/period", dims="joint, t")
+    put(group, "tail_velocity", motion.z, units="length/period, length/period, rad/period", dims="velocity, t")
+    put(group, "theta", motion.theta, units="rad", dims="t")
+    put(group, "centre", motion.centre, units="length", dims="axis, t")
+    put(group, "tail", motion.tail, units="length", dims="axis, t")
+    put(group, "power", solution.power(motion), units="weight length/period", dims="t")
 
 
 def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
@@ -141,7 +142,7 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
         if field.name != "checks":
             put_attribute(group, field.name, getattr(certificate, field.name))
     for name in ("name", "value", "threshold", "passed", "meaning"):
-        put(group, name, [getattr(check, name) for check in certificate.checks])
+        put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
 
 def _read(file: h5py.File) -> Solution:

@@ -17,7 +17,7 @@ from pathlib import Path
 from colloc.gaits.problem import Problem
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT
 from colloc.studies.cell import BETTER, Attempt, Work, best_attempt, failed_visit, run_chunk, start_key
-from colloc.studies.journal import Journal, Record, read_journal
+from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.study import Index, Study
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
@@ -76,11 +76,11 @@ class StudyRun:
 
     def __init__(self, study: Study, folder: Path, *, retry: bool = False) -> None:
         self.study, self.folder = study, folder
-        text = read_journal(folder)
-        self.damaged = text.damaged
+        journal = read_journal(folder)
+        self.damaged = journal.damaged
         attempts: dict[str, list[Attempt]] = {}
         scores: dict[str, dict[str, float]] = {}
-        for record in text.records:
+        for record in journal.records:
             kept = [a for a in record.attempts if not (retry and a.outcome.status in RETRIED)]
             attempts.setdefault(record.problem_hash, []).extend(kept)
             scores.setdefault(record.problem_hash, {}).update(record.scores)
@@ -130,12 +130,10 @@ class StudyRun:
             As for `colloc.system.task_pool.completed`; `ahead` is a quarter of the workers, and one, by default.
         """
         ahead = 1 + workers // 4 if ahead is None else ahead
-        with Journal(self.folder) as journal:
-            yield from self._round(0, self._first_chunks(), workers, executor, ahead, journal)
-            number = 0
-            while chunks := self._improvable():
-                number += 1
-                yield from self._round(number, chunks, workers, executor, ahead, journal)
+        number, chunks = 0, self._first_chunks()
+        while number == 0 or chunks:
+            yield from self._round(number, chunks, workers, executor, ahead)
+            number, chunks = number + 1, self._improvable()
 
     def _first_chunks(self) -> list[tuple[Index, ...]]:
         """Missing cells in runs along the last axis."""
@@ -160,7 +158,6 @@ class StudyRun:
         workers: int,
         executor: Callable[[int], Executor],
         ahead: int,
-        journal: Journal,
     ) -> Iterator[Progress]:
         waiting: dict[int, set[Index]] = {}
         free: deque[int] = deque()
@@ -187,7 +184,8 @@ class StudyRun:
             works = task.arguments[0]
             visits = [failed_visit(w, CRASHED, result.message) for w in works] if isinstance(result, Lost) else result
             hashes = {work.cell: work.problem.hash for work in works}
-            journal.append([Record(hashes[v.cell], tuple(v.attempts), v.scores) for v in visits if v.attempts or v.scores])
+            told = [v for v in visits if v.attempts or v.scores]
+            append_records(self.folder, [Record(hashes[v.cell], tuple(v.attempts), v.scores) for v in told])
             for found in visits:
                 state = self.cells[found.cell]
                 state.attempts += found.attempts

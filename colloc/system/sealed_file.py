@@ -31,14 +31,6 @@ def _digest(file: BinaryIO, size: int) -> bytes:
     return found.digest()
 
 
-def seal(path: str | os.PathLike[str]) -> None:
-    """Append the seal to a complete file."""
-    with open(path, "r+b") as file:
-        digest = _digest(file, os.fstat(file.fileno()).st_size)
-        file.seek(0, os.SEEK_END)
-        file.write(MAGIC + digest)
-
-
 def write_sealed(path: str | os.PathLike[str], content: bytes) -> None:
     """Write a whole file with its seal."""
     with open(path, "wb") as file:

@@ -39,6 +39,8 @@ LONGEST_TEXT = 2**20
 LONGEST_IN_ARRAY = 2000
 """Characters of a text in an array, where each takes the room of the longest. The rest is left out, and an ellipsis says so."""
 
+BETWEEN_DIMS = ", "
+_NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 _SIGNATURE, _CHECKED_SUPERBLOCKS, _END_OF_FILE = b"\x89HDF\r\n\x1a\n", (2, 3), slice(28, 36)
 """First bytes; versions of the first block whose metadata carry checksums; where that block keeps the length of the file."""
 _REMEDY = "Move it away, and make it again with the command that wrote it"
@@ -147,6 +149,8 @@ def mark(file: h5py.File, kind: str, version: int) -> None:
 def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Dataset:
     """A new dataset of numbers or texts, with texts such as its units as attributes.
 
+    ``dims="joint, time"`` names its dimensions also in the way of netCDF (`_name_dimensions`).
+
     Raises
     ------
     TypeError
@@ -159,7 +163,23 @@ def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Data
         put_attribute(dataset, "_Encoding", "utf-8")  # for xarray, which gives bytes without it
     for key, text in described.items():
         put_attribute(dataset, key, text)
+    if described.get("dims"):
+        _name_dimensions(group, dataset, name, described["dims"].split(BETWEEN_DIMS))
     return dataset
+
+
+def _name_dimensions(group: h5py.Group, dataset: h5py.Dataset, name: str, dims: list[str]) -> None:
+    """Dimension scales of HDF5, by which netCDF and xarray know dimensions; colloc never reads them (they are references).
+
+    The dataset named like its one dimension is the coordinate; a dimension without one has a dataset with no data.
+    """
+    if dims == [name]:
+        dataset.make_scale(name)
+        return
+    for axis, (dim, size) in enumerate(zip(dims, dataset.shape, strict=True)):
+        if dim not in group:
+            group.create_dataset(dim, shape=(size,), dtype=">f4").make_scale(f"{_NO_VARIABLE}{size:10d}")
+        dataset.dims[axis].attach_scale(group[dim])
 
 
 def put_attribute(owner: h5py.Group | h5py.Dataset, name: str, value: Any) -> None:

@@ -18,6 +18,7 @@ from colloc.commands.main import main as colloc
 from colloc.commands.solve import summary_lines
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.store import load, save
+from colloc.system.row_file import CACHE, put_rows
 
 QUICK = """
 from colloc import *
@@ -148,21 +149,31 @@ def test_a_problem_file_that_ends_the_program_is_refused(ending, tmp_path, capsy
     assert "p.py, line 2: the file ends the program" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("cache", ["{", "[1]", '{"sha256": "", "entries": {}}', "ENTRY", "FOLDER"])
+@pytest.mark.parametrize("cache", ["{", "ENTRY", "FOLDER", "KIND"])
 def test_a_broken_cache_of_bounds_is_left_alone(cache, quick, tmp_path):
-    path, problem = tmp_path / "bounds.json", read_problem_file(quick).problem
+    path, problem = tmp_path / "bounds.sqlite", read_problem_file(quick).problem
     if cache == "FOLDER":
         path.mkdir()
     elif cache == "ENTRY":
-        path.write_text(json.dumps({bound_key(Domain(problem.body, problem.friction, problem.joint_limit), BUDGET): {"a": 1}}))
+        put_rows(path, CACHE, {bound_key(Domain(problem.body, problem.friction, problem.joint_limit), BUDGET): {"a": 1}})
+    elif cache == "KIND":
+        put_rows(path, "another kind", {"a": 1})
     else:
         path.write_text(cache)
     with pytest.warns(UserWarning, match="No bound is taken from it"):
         assert upper_bound(problem, tmp_path, compute=False) is None
 
 
+def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bound(quick, tmp_path, monkeypatch):
+    problem = read_problem_file(quick).problem
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: problem.friction)  # anything with fields
+    (tmp_path / "file").write_text("in the way of the folder")
+    with pytest.warns(UserWarning, match="cannot write .*The bound is not kept"):
+        assert upper_bound(problem, tmp_path / "file" / "below", compute=True) is problem.friction
+
+
 def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(quick, tmp_path, capsys):
-    (tmp_path / "bounds.json").write_text("{")
+    (tmp_path / "bounds.sqlite").write_text("{")
     assert colloc(["solve", quick, "--output", f"{tmp_path}/", "--no-figure"]) in (0, 4)
     printed = capsys.readouterr()
     assert "efficiency d/W" in printed.out

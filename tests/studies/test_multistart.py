@@ -5,19 +5,24 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
 from colloc.commands import multistart
 from colloc.gaits.equivalence import distance, images, irreversibility, phase_distance, reversed_in_time
+from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
-from colloc.gaits.path_classes import Polygon
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.path_samples import arcs_through
+from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, shape_speed, start_gait
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
-from colloc.results.archive import Archive, StartName, load_archive, save_archive
+from colloc.results.archive import StartName, open_archive, row_path, save_archive
 from colloc.results.certificate import corner_phases
 from colloc.results.delta_limit import efficiency_at_zero_delta, mesh_errors, resolution_warning
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
@@ -166,20 +171,63 @@ def test_basins_join_images_of_one_gait_and_nothing_else():
 
 
 def test_an_archive_comes_back_as_it_was_written(tmp_path):
+    path = tmp_path / "sub" / "a.h5"
     names = {k: StartName(SAMPLERS[0], 7, k) for k in (4, 1)}
-    archive = Archive(problem(), "command", {names[k]: outcome(k) for k in names})
-    assert load_archive(save_archive(Archive(problem()), tmp_path / "empty.h5")).outcomes == {}
-    back = load_archive(save_archive(archive, tmp_path / "sub" / "a.h5"))
-    assert (back.problem.hash, back.command) == (problem().hash, "command")
-    assert sorted(back.outcomes) == sorted(names.values())
+    assert open_archive(problem(), path).outcomes == {}
+    archive = open_archive(problem(), path)
+    archive.add({names[4]: outcome(4, efficiency=1 / 3), names[1]: outcome(1, efficiency=np.nan, status=ERROR)})
+    back = open_archive(problem(), path)
+    assert (sorted(back.outcomes), back.damaged) == (sorted(names.values()), 0)
     for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
         assert getattr(back.outcomes[names[4]], name) == getattr(archive.outcomes[names[4]], name)
+    assert np.isnan(back.outcomes[names[1]].efficiency)
     np.testing.assert_array_equal(back.outcomes[names[1]].gait.sin, GAIT.sin)
-    assert [p.name for p in (tmp_path / "sub").glob("[!.]*")] == ["a.h5"]
-    (tmp_path / "bad.h5").write_bytes(b"not HDF5")
-    for name in ("bad.h5", "missing.h5"):
-        with pytest.raises(StoreError):
-            load_archive(tmp_path / name)
+    save_archive(back)
+    assert sorted(p.name for p in path.parent.glob("[!.]*")) == ["a.h5", "a.sqlite"]
+
+
+@pytest.mark.parametrize(
+    "gait",
+    [arcs_through(ellipse(0.2, 1.2, 0.8), FreePath(4), np.linspace(0, 1, 9)), Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]])],
+    ids=["path", "polygon"],
+)
+def test_gaits_that_are_no_series_are_kept_to_the_bit(gait, tmp_path):
+    stated = problem(gait=FreePath(4) if hasattr(gait, "length") else Polygon(3), guess=gait)
+    name = StartName(SAMPLERS[0], 0, 0)
+    open_archive(stated, tmp_path / "a.h5").add({name: outcome(0, gait)})
+    back = open_archive(stated, tmp_path / "a.h5").outcomes[name].gait
+    assert type(back) is type(gait)
+    assert fields(back) == fields(gait)
+
+
+def test_an_archive_that_cannot_be_gone_on_from_is_refused_and_left_alone(tmp_path):
+    path = tmp_path / "a.h5"
+    path.write_bytes(b"results of an older colloc")
+    with pytest.raises(StoreError, match="choose another --output"):
+        open_archive(problem(), path)
+    assert path.read_bytes() == b"results of an older colloc"
+    path.unlink()
+    row_path(path).write_bytes(b"not SQLite" * 100)
+    with pytest.raises(StoreError, match="cannot be read as a colloc starts"):
+        open_archive(problem(), path)
+    assert row_path(path).read_bytes() == b"not SQLite" * 100
+
+
+def test_xarray_opens_an_archive_with_named_dimensions(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    archive = open_archive(problem(), tmp_path / "a.h5")
+    with xarray.open_dataset(save_archive(archive), engine="h5netcdf") as data:
+        assert dict(data.sizes) == {"start": 0, "basin": 0}
+    archive.add({StartName(SAMPLERS[0], seed, k): outcome(k) for seed in (0, 1) for k in range(2)})
+    with xarray.open_dataset(save_archive(archive, "command"), engine="h5netcdf") as data:
+        assert dict(data.sizes) == {"start": 4, "joint": 2, "harmonic": 2, "basin": 1}
+        assert data.gait_cos.dims == ("start", "joint", "harmonic")
+        assert data.start.values.tolist() == [0, 1, 0, 1]
+        assert data.seed.values.tolist() == [0, 0, 1, 1]
+        assert set(data.status.values) == {SOLVED}
+        assert data.basin_count.item() == 4
+        assert data.attrs["command"] == "command"
 
 
 def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
@@ -241,8 +289,8 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     multistart.main([str(path), "--starts", "2", "--output", str(out)])
     printed = capsys.readouterr().out
     assert "0 starts done already, 2 to go" in printed
-    archive = load_archive(out / "quick.starts.h5")
-    assert sorted(archive.of_search(SAMPLERS[0], 0)) == [0, 1]
+    kept = lambda: open_archive(read_problem_file(path).problem, out / "quick.starts.h5")  # noqa: E731
+    assert sorted(kept().of_search(SAMPLERS[0], 0)) == [0, 1]
     asked = []
 
     def run(stated, starts, **settings):
@@ -261,7 +309,7 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert multistart.main([str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 0
     assert asked == [2, 3, 0, 1]
     assert "starts in the file besides: 4; the best of all, 0.200000" in capsys.readouterr().out
-    archive = load_archive(out / "quick.starts.h5")
+    archive = kept()
     assert sorted(archive.of_search(SAMPLERS[0], 0)) == [0, 1, 2, 3]
     assert sorted(archive.of_search(SAMPLERS[0], 1)) == [0, 1]
     # another problem of the same name does not
@@ -269,24 +317,24 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert multistart.main([str(path), "--output", str(out)]) == 2
     assert "holds starts of another problem" in capsys.readouterr().err
     assert asked == [2, 3, 0, 1]
-    assert len(load_archive(out / "quick.starts.h5").outcomes) == 6
+    path.write_text(FILE, encoding="utf-8")
+    assert len(kept().outcomes) == 6
 
 
 def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the_other(tmp_path):
-    runs = [Archive(problem(), f"seed {seed}") for seed in (0, 1)]
-    for archive in runs:
-        save_archive(archive, tmp_path / "a.h5")
+    runs = [open_archive(problem(), tmp_path / "a.h5") for _ in (0, 1)]
     for k in range(3):
         for seed, archive in enumerate(runs):
-            archive.outcomes[StartName(SAMPLERS[0], seed, k)] = outcome(k, efficiency=0.1 * (seed + 1))
-            save_archive(archive, tmp_path / "a.h5")
-    found = load_archive(tmp_path / "a.h5").outcomes
-    assert {name: round(o.efficiency, 9) for name, o in found.items()} == {
-        (SAMPLERS[0], seed, k): 0.1 * (seed + 1) for seed in (0, 1) for k in range(3)
-    }
+            archive.add({StartName(SAMPLERS[0], seed, k): outcome(k, efficiency=0.1 * (seed + 1))})
+    assert len(runs[0].outcomes) == 3
+    save_archive(runs[0])
+    expected = {(SAMPLERS[0], seed, k): 0.1 * (seed + 1) for seed in (0, 1) for k in range(3)}
+    assert {name: o.efficiency for name, o in runs[0].outcomes.items()} == expected
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file["start"].size == 6
     with pytest.raises(StoreError, match="another problem"):
-        save_archive(Archive(problem(delta=0.2)), tmp_path / "a.h5")
-    assert len(load_archive(tmp_path / "a.h5").outcomes) == 6
+        open_archive(problem(delta=0.2), tmp_path / "a.h5")
+    assert len(open_archive(problem(), tmp_path / "a.h5").outcomes) == 6
 
 
 def test_bad_options_get_one_clear_sentence(tmp_path, capsys):

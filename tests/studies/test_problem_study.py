@@ -22,7 +22,7 @@ from colloc.results.distinct_optima import CRASHED, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, start_key
-from colloc.studies.journal import Journal, Record, read_journal
+from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
 from colloc.studies.store import load_study, save_study
 from colloc.studies.study import Axis, Study, read_study_file
@@ -174,10 +174,9 @@ def test_the_guess_of_every_problem_is_tried_and_every_cell_has_random_starts_of
 
 def test_cells_that_an_earlier_colloc_finished_without_their_guess_are_missing(fake, tmp_path):
     gait = ellipse(0.0, 1.2, 0.4)
-    with Journal(tmp_path) as journal:
-        for cell in grid().cells():
-            attempt = Attempt("cold", start_key(gait), outcome(0, gait, gait, 0.2))
-            journal.append([Record(grid().problem_at(cell).hash, (attempt,))])
+    for cell in grid().cells():
+        attempt = Attempt("cold", start_key(gait), outcome(0, gait, gait, 0.2))
+        append_records(tmp_path, [Record(grid().problem_at(cell).hash, (attempt,))])
     run = StudyRun(grid(cold_starts=0), tmp_path)
     assert len(run.missing) == 12
     finished(run)
@@ -463,4 +462,4 @@ def test_without_a_dask_scheduler_or_a_journal_folder_the_error_is_clear(fake, t
     assert sweep_study.main([str(path), "--dask", "nonsense://x", "--output", str(tmp_path)]) == 2
     assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
     with pytest.raises(StoreError, match="cannot write"):
-        finished(StudyRun(grid(), tmp_path / "missing"))
+        finished(StudyRun(grid(), path / "below a file"))
