@@ -27,7 +27,7 @@ PARTS = {
     "smooth_panels": "Smooth bodies",
     "map_resolution": "The tabulated velocity map",
     "formulations": "Three formulations, the same starts",
-    "machine_code": "Compiled derivatives",
+    "kernel": "The compiled kernel beside NumPy",
     "cost": "Where the time goes",
     "scaling": "Growth with mesh, links and harmonics",
     "peer_table": "Other tools on the same problem",

@@ -11,7 +11,6 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import mpmath as mp
 import numpy as np
 from scipy.optimize import root
@@ -19,7 +18,7 @@ from scipy.optimize import root
 from benchmarks.reference import balanced_velocity
 from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, solve_balance
-from colloc.pictures.style import BLUE, GREEN, ORANGE, VERMILION, save, styled
+from colloc.pictures.style import BLUE, GREEN, ORANGE, VERMILION, save, styled, subplots
 
 BODY = Chain()
 LAWS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5))
@@ -155,7 +154,7 @@ def report(quick: bool, folder: Path) -> str:
 def _figure(curves: dict, folder: Path) -> None:
     deltas = sorted({delta for _, delta in curves}, reverse=True)
     with styled():
-        figure, axes = plt.subplots(1, len(deltas), figsize=(2.9 * len(deltas) + 0.6, 3.2), sharey=True, squeeze=False)
+        figure, axes = subplots(1, len(deltas), figsize=(2.9 * len(deltas) + 0.6, 3.2), sharey=True, squeeze=False)
         for axis, delta in zip(axes[0], deltas, strict=True):
             for (name, at), points in curves.items():
                 some = [(r, s) for s, share, r in points if share > 0.5 and r > 0]
@@ -164,4 +163,4 @@ def _figure(curves: dict, folder: Path) -> None:
             axis.set(xlabel="largest residual", title=f"delta = {delta:.0e}")
         axes[0][0].set_ylabel("solves per second, one core")
         axes[0][0].legend(fontsize=7)
-        save(figure, folder, "balance_solvers")
+        save(figure, folder / "balance_solvers")

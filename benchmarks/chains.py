@@ -40,11 +40,10 @@ def outcome(problem: Problem) -> dict:
     """What the table needs of one solve."""
     begin = time.process_time()
     solution = maximise_efficiency(problem)
-    certificate = solution.certificate
     return {
         "status": solution.status,
-        "efficiency": solution.efficiency if certificate is None else certificate.efficiency,
-        "distance": solution.distance if certificate is None else certificate.distance,
+        "efficiency": solution.measured.efficiency,
+        "distance": solution.measured.distance,
         "cpu_seconds": time.process_time() - begin,
         "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "iterations": sum(level.iterations for level in solution.levels),

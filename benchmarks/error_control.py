@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import argparse
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
-from colloc.search.continuation import continue_delta
-from colloc.system.json_cache import load_entries, save_entry
+from colloc.search.optimise import optimum
+from colloc.system.row_file import cached
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay
 
@@ -96,7 +97,7 @@ def case_problem(index: int) -> Problem:
 def outcome(problem: Problem) -> dict:
     """Estimate and true errors of one case; ``optimal`` is False if there is nothing to judge."""
     begin = time.process_time()
-    solution = continue_delta(problem)
+    solution = optimum(problem)
     if not solution.last.optimal or solution.last.delta != problem.delta:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
@@ -108,7 +109,7 @@ def outcome(problem: Problem) -> dict:
     finer = problem.with_(
         guess=gait, delta_start=delta, scheme="gauss-5", intervals=max(problem.intervals, 24), mesh_tolerance=1e-7
     )
-    reference = continue_delta(finer)
+    reference = optimum(finer)
     certificate = certify(reference, tolerance=1e-8) if reference.last.optimal else None
     if certificate is not None and certificate.efficiency < (1.0 - FLOOR) * fine.efficiency:
         certificate = None  # below the gait it started from: an optimum of another basin, not the reference of this one
@@ -147,8 +148,8 @@ def row(index: int, result: dict) -> str:
 
 HEADER = """# Estimated and true efficiency errors
 
-Written by `python -m benchmarks.error_control`. All errors are relative. *Estimate*: what `verification.mesh_error` reports, the
-magnitudes of all intervals added up. *Expected*: their signed sum, without linearisation. *Replay*: true error of the
+Written by `python -m benchmarks.error_control`. All errors are relative. *Estimate*: what `verification.mesh_error` reports,
+the magnitudes of all intervals added up. *Expected*: their signed sum, without linearisation. *Replay*: true error of the
 collocated efficiency against a replay of the same gait. *Optimum*: against the optimum of a refined solve of higher order.
 *Ratio*: estimate over magnitude of the true error (errors below 3e-8 count as 3e-8); at least 0.5 is required.
 
@@ -161,13 +162,10 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    cache, lines, results = options.output / "error_control.json", [HEADER], []
+    cache, lines, results = options.output / "error_control.sqlite", [HEADER], []
     for index in range(len(CASES)):
         problem = case_problem(index)
-        key = problem.hash[:16]
-        if key not in load_entries(cache):
-            save_entry(cache, key, outcome(problem))
-        results.append(load_entries(cache)[key])
+        results.append(cached(cache, problem.hash, partial(outcome, problem)))
         lines.append(row(index, results[-1]))
         print(lines[-1], flush=True)
     judged = [(r, a) for r in results if r["optimal"] for a in ("against replay", "against optimum") if r[a] is not None]

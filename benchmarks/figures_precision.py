@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, plt, save, styled
+from colloc.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled, subplots
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 _MARKERS = "osD^vPX"
@@ -19,7 +19,7 @@ Series = Mapping[str, tuple[np.ndarray, np.ndarray]]
 def save_work_precision(folder: Path, name: str, uniform: Series, refined: Series, title: str) -> list[Path]:
     """Errors on uniform and on refined meshes against processor time, one colour a scheme; PNG and PDF."""
     with styled():
-        figure, axes = plt.subplots(figsize=(6.6, 4.4))
+        figure, axes = subplots(figsize=(6.6, 4.4))
         for index, scheme in enumerate(uniform):
             style = {"color": _COLOURS[index % len(_COLOURS)], "marker": _MARKERS[index % len(_MARKERS)], "ms": 5}
             axes.loglog(*uniform[scheme], ls=":", mfc="white", **style)
@@ -34,4 +34,4 @@ def save_work_precision(folder: Path, name: str, uniform: Series, refined: Serie
         axes.set_xticks([], minor=True)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.grid(alpha=0.25)
-        return save(figure, folder, name)
+        return save(figure, folder / name)

@@ -8,9 +8,9 @@ import argparse
 import time
 
 from colloc import FreePath, Problem, ellipse
-from colloc.search.continuation import continue_delta
+from colloc.reduced.spaces import transcribed
 from colloc.search.nlp import Solver
-from colloc.search.path_start import transcribed
+from colloc.search.optimise import optimum
 
 
 def main() -> None:
@@ -21,13 +21,13 @@ def main() -> None:
             "free_path", ellipse(0, 2.8, 1.3), gait=FreePath(8, "bilateral"), intervals=intervals, delta=1e-5, mesh_tolerance=0
         )
         begin = time.process_time()
-        solver = Solver(transcribed(problem))
+        Solver(transcribed(problem))
         built = time.process_time() - begin
         if intervals > 60:
             print(f"{intervals:9d} {built:10.2f}")
             continue
         begin = time.process_time()
-        solution = continue_delta(problem, solver=solver)
+        solution = optimum(problem)
         spent = time.process_time() - begin
         iterations = sum(level.iterations for level in solution.levels)
         found = f"{solution.last.efficiency:.6f}" if solution.last.optimal else solution.last.status

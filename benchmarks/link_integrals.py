@@ -10,13 +10,12 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from benchmarks.reference import link_moments as exact_moments
 from benchmarks.tables import interleaved_seconds, markdown_table
-from colloc.mechanics.friction import link_moments
-from colloc.pictures.style import BLUE, GREEN, ORANGE, SKY, VERMILION, save, styled
+from colloc.mechanics.link_friction import link_moments
+from colloc.pictures.style import BLUE, GREEN, ORANGE, SKY, VERMILION, save, styled, subplots
 
 LENGTH = 1 / 3
 POINTS = (4, 8, 12, 20, 40, 100)
@@ -81,7 +80,7 @@ def report(quick: bool, folder: Path) -> str:
 def _figure(errors: dict, times: dict, deltas: list[float], names: list[str], folder: Path) -> None:
     colours = dict(zip(names, ("black", SKY, "#999999", ORANGE, GREEN, BLUE, VERMILION), strict=True))
     with styled():
-        figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.3))
+        figure, (left, right) = subplots(1, 2, figsize=(8.2, 3.3))
         for name in names:
             line = [errors["pivoting", d][name][0] for d in deltas]
             left.loglog(deltas, line, color=colours[name], marker="o", ms=3, label=name)
@@ -94,4 +93,4 @@ def _figure(errors: dict, times: dict, deltas: list[float], names: list[str], fo
             xlabel="nanoseconds a link", ylabel="worst relative error", title=f"Work against error at delta = {deltas[0]:g}"
         )
         right.margins(x=0.3)
-        save(figure, folder, "link_integrals")
+        save(figure, folder / "link_integrals")

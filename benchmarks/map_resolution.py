@@ -1,7 +1,7 @@
 """The tabulated velocity map: resolution against error, build time and look-ups: python -m benchmarks --only map_resolution
 
-Errors are those of `scripts.models.velocity_map.map_error`: interpolated against directly solved tail velocities at random shapes and
-rates (larger rate 1), the largest component of (u, v, omega/2). A look-up competes with a direct solve in a batch.
+Errors are those of `scripts.models.velocity_map.map_error`: interpolated against directly solved tail velocities at random
+shapes and rates (larger rate 1), the largest component of (u, v, omega/2). A look-up competes with a direct solve in a batch.
 """
 
 from __future__ import annotations

@@ -8,12 +8,10 @@ processor seconds (one run, certificate not included).
 import time
 from pathlib import Path
 
-import matplotlib.pyplot as plt
-
 from benchmarks.tables import markdown_table
 from colloc import Harmonic, Problem, certify, ellipse
-from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, save, styled
-from colloc.search.continuation import continue_delta
+from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, save, styled, subplots
+from colloc.search.optimise import optimum
 
 SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
 COLOURS = dict(zip(SCHEMES, ("#999999", SKY, GREEN, BLUE, PURPLE, ORANGE), strict=True))
@@ -32,7 +30,7 @@ def solved(name: str, tolerance: float) -> list[object]:
         mesh_tolerance=tolerance,
     )
     begin = time.process_time()
-    solution = continue_delta(problem)
+    solution = optimum(problem)
     seconds = time.process_time() - begin
     error = solution.efficiency / certify(solution, tolerance=1e-8, instants=6400).efficiency - 1
     effort = sum(level.iterations for level in solution.levels)
@@ -56,7 +54,7 @@ def report(quick: bool, folder: Path) -> str:
 
 def _figure(rows: list[list], folder: Path) -> None:
     with styled():
-        figure, axis = plt.subplots(figsize=(5.2, 3.6))
+        figure, axis = subplots(figsize=(5.2, 3.6))
         for name in dict.fromkeys(r[0] for r in rows):
             own = [(float(r[6]), abs(float(r[4]))) for r in rows if r[0] == name]
             axis.loglog(*zip(*own, strict=True), color=COLOURS[name], marker="o", ms=4, label=name)
@@ -64,4 +62,4 @@ def _figure(rows: list[list], folder: Path) -> None:
         axis.set_xticks([0.3, 0.5, 1, 2, 5], labels=["0.3", "0.5", "1", "2", "5"])
         axis.minorticks_off()
         axis.legend(fontsize=7)
-        save(figure, folder, "mesh_tolerance")
+        save(figure, folder / "mesh_tolerance")

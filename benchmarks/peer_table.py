@@ -44,11 +44,8 @@ _ROCKIT, _YAPSS = "benchmarks.peers.rockit_three_link", "benchmarks.peers.yapss_
 CERTIFIED = "colloc, defaults"
 OWN = {
     CERTIFIED: Tool("colloc-refined.jsonl", [_COLLOC, "--refined"]),
-    "colloc, defaults, compiled": Tool("colloc-refined-compiled.jsonl", [_COLLOC, "--refined", "--compiled"]),
     "colloc, same mesh": Tool("colloc.jsonl", [_COLLOC]),
-    "colloc, same mesh, compiled": Tool("colloc-compiled.jsonl", [_COLLOC, "--compiled"]),
     "SLSQP on colloc's reduced functions": Tool("slsqp.jsonl", [_SLSQP]),
-    "SLSQP on colloc's reduced functions, compiled": Tool("slsqp-compiled.jsonl", [_SLSQP, "--compiled"]),
     "Nelder-Mead on solve_balance": Tool("nelder-mead.jsonl", ["benchmarks.peers.nelder_mead"]),
 }
 """Run by this environment."""

@@ -29,11 +29,9 @@ import numpy as np
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.sampling import LATIN_HYPERCUBE, on_speed_floor
-from colloc.numerics.machine_code import compiler
-from colloc.results.archive import Archive, load_archive, save_archive
+from colloc.results.archive import Archive, StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Outcome, basins, counts
 from colloc.results.solution import SOLVED, versions
-from colloc.search.compiled_problem import compile_problem
 from colloc.studies.campaign import process_pool, run_starts
 from colloc.verification.replay import replay
 
@@ -63,10 +61,7 @@ def case_problem(law: tuple[float, float, float], symmetry: str, delta: float, d
 
 def stored(problem: Problem, folder: Path) -> Archive:
     """The archive of a case as far as it got."""
-    path = folder / f"{problem.name}.h5"
-    if path.exists() and (archive := load_archive(path)).problem.hash == problem.hash:
-        return archive
-    return Archive(problem, LATIN_HYPERCUBE, 0, "benchmarks/robustness.py")
+    return open_archive(problem, folder / f"{problem.name}.h5")
 
 
 def pool(workers: int) -> Executor:
@@ -79,20 +74,19 @@ def advance(law: tuple[float, float, float], symmetry: str, most: int, workers: 
     first = stored(case_problem(law, symmetry, DELTA, 0.1), folder)
     second = stored(case_problem(law, symmetry, SMALL_DELTA, NEXT_DELTA), folder)
     settings: dict = {"workers": workers, "time_limit": TIME_LIMIT, "executor": pool}
-    _complete(first, most, folder, lambda missing: run_starts(first.problem, missing, **settings))
-    for start, outcome in first.outcomes.items():
-        if outcome.status != SOLVED and start not in second.outcomes:
-            # what did not reach the larger delta counts as failed at the smaller one, for the same reason
-            second.outcomes[start] = replace(outcome, cpu_seconds=0.0, seconds=0.0, iterations=0)
-    known = {k: o.gait for k, o in first.outcomes.items()}
-    _complete(second, most, folder, lambda missing: run_starts(second.problem, missing, known=known, **settings))
+    _complete(first, most, lambda missing: run_starts(first.problem, missing, **settings))
+    # what did not reach the larger delta counts as failed at the smaller one, for the same reason
+    failed = {n: o for n, o in first.outcomes.items() if o.status != SOLVED and n not in second.outcomes}
+    second.add({name: replace(outcome, cpu_seconds=0.0, seconds=0.0, iterations=0) for name, outcome in failed.items()})
+    known = {k: o.gait for k, o in first.of_search(LATIN_HYPERCUBE, 0).items()}
+    _complete(second, most, lambda missing: run_starts(second.problem, missing, known=known, **settings))
 
 
-def _complete(archive: Archive, most: int, folder: Path, run: Callable) -> None:
-    missing = [k for k in range(most) if k not in archive.outcomes]
+def _complete(archive: Archive, most: int, run: Callable) -> None:
+    missing = [k for k in range(most) if StartName(LATIN_HYPERCUBE, 0, k) not in archive.outcomes]
     for outcome in run(missing):
-        archive.outcomes[outcome.start] = outcome
-        save_archive(archive, folder / f"{archive.problem.name}.h5")
+        archive.add({StartName(LATIN_HYPERCUBE, 0, outcome.start): outcome})
+    save_archive(archive, "benchmarks/robustness.py")
 
 
 def contradiction(problem: Problem, outcome: Outcome) -> float:
@@ -107,7 +101,7 @@ def contradiction(problem: Problem, outcome: Outcome) -> float:
 
 def row(archive: Archive) -> dict:
     """What the table says about a case."""
-    problem, outcomes = archive.problem, archive.ordered()
+    problem, outcomes = archive.problem, list(archive.of_search(LATIN_HYPERCUBE, 0).values())
     found = basins(problem, outcomes)
     friction = problem.friction
     return {
@@ -133,7 +127,7 @@ def markdown(rows: list[dict], asked: int, command: str) -> str:
         "",
         f"One harmonic, Latin-hypercube starts (seed 0). Written by `{command}`.",
         "Certified: first-order conditions and an independent fine replay agree. Time: processor time of one start,",
-        "certificate included, derivatives compiled (`numerics.machine_code`), on one core of a machine that did other work too;",
+        "certificate included, on a core of a busy machine;",
         "at the smaller delta that of going on from the result at the larger one. Replay: largest relative difference of the",
         "distinct optima's efficiencies from a second replay, on another grid and from another phase. On the floor: optima",
         "that are as slow as smallest_shape_speed = 0.1 allows; that bound, not mechanics, decides their size.",
@@ -196,9 +190,6 @@ def main() -> None:
     if tuple(options.symmetries) != SYMMETRIES:
         command += f" --symmetries {' '.join(options.symmetries)}"
     turns = [] if options.tables else [*range(TURN, options.starts, TURN), options.starts]
-    if turns and compiler() is not None:
-        for law in LAWS:  # a few starts at a time are too few for `run_starts` to compile
-            compile_problem(case_problem(law, "none", DELTA, 0.1))
     for most in turns:
         for symmetry, law in product(options.symmetries, LAWS):
             advance(law, symmetry, most, options.workers, folder)

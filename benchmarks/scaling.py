@@ -14,13 +14,12 @@ import sys
 import time
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from benchmarks.tables import markdown_table
 from colloc import Chain, Harmonic, Problem
 from colloc.gaits.harmonic import Fourier
-from colloc.pictures.style import BLUE, GREEN, ORANGE, save, styled
+from colloc.pictures.style import BLUE, GREEN, ORANGE, save, styled, subplots
 
 
 def problem_of(intervals: int, links: int, harmonics: int) -> Problem:
@@ -94,7 +93,7 @@ def report(quick: bool, folder: Path) -> str:
         text = f"fitted: build ~ n^{exponent['build']:.2f}, an iteration ~ n^{exponent['an iteration']:.2f}"
         parts.append(f"{markdown_table(header, rows)}\n\n{text}; imports alone {runs[0]['imports MB']:.0f} MB.")
     with styled():
-        figure, axes = plt.subplots(1, 3, figsize=(8.6, 3.0))
+        figure, axes = subplots(1, 3, figsize=(8.6, 3.0))
         for axis, (name, (n, runs)) in zip(axes, found.items(), strict=True):
             axis.loglog(n, [r["build"] for r in runs], "o-", color=ORANGE, label="build [s]")
             axis.loglog(n, [r["an iteration"] for r in runs], "s-", color=BLUE, label="an iteration [s]")
@@ -103,5 +102,5 @@ def report(quick: bool, folder: Path) -> str:
             axis.set_xticks(n, [f"{size:g}" for size in n])
             axis.set_xticks([], minor=True)
         axes[0].legend(fontsize=7)
-        save(figure, folder, "scaling")
+        save(figure, folder / "scaling")
     return "\n\n".join(parts)

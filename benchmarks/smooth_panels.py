@@ -11,14 +11,13 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.tables import cpu_seconds, markdown_table
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import instant, total_power
-from colloc.pictures.style import BLUE, GREEN, ORANGE, VERMILION, save, styled
+from colloc.pictures.style import BLUE, GREEN, ORANGE, VERMILION, save, styled, subplots
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.motion import Motion, sine_wave
 
@@ -126,7 +125,7 @@ def report(quick: bool, folder: Path) -> str:
 
 def _figure(curves: list, folder: Path) -> None:
     with styled():
-        figure, axes = plt.subplots(1, len(curves), figsize=(3.1 * len(curves), 3.2), squeeze=False)
+        figure, axes = subplots(1, len(curves), figsize=(3.1 * len(curves), 3.2), squeeze=False)
         for axis, (title, lines) in zip(axes[0], curves, strict=True):
             for name, points in lines.items():
                 axis.loglog(*zip(*points, strict=True), color=COLOURS[name], marker=MARKERS.get(name, "o"), ms=4, label=name)
@@ -135,4 +134,4 @@ def _figure(curves: list, folder: Path) -> None:
             axis.minorticks_off()
         axes[0][0].set_ylabel("relative error of the power")
         axes[0][0].legend(fontsize=7)
-        save(figure, folder, "smooth_panels")
+        save(figure, folder / "smooth_panels")

@@ -24,7 +24,7 @@ from typing import NamedTuple
 from colloc import Friction, Harmonic, Problem, ellipse
 from colloc.results.distinct_optima import Outcome
 from colloc.studies import run as study_run
-from colloc.studies.cell import Attempt, Work, run_chunk, start_key
+from colloc.studies.cell import Attempt, Visit, Work, run_chunk, start_key
 from colloc.studies.run import StudyRun
 from colloc.studies.study import Axis, Study
 from colloc.system.task_pool import one_thread_each, process_pool
@@ -47,7 +47,7 @@ def problem(x: float) -> Problem:
 def study(cells: int, chunk: int = 1) -> Study:
     """Cells that do not wait for each other."""
     axis = Axis("x", tuple(range(cells)), travels=False)
-    return Study("scaling", (axis,), problem, cold_starts=0, passes=0, chunk=chunk)
+    return Study("scaling", (axis,), problem, cold_starts=0, chunk=chunk)
 
 
 def nothing(chunk: tuple[Work, ...]) -> list:
@@ -55,7 +55,8 @@ def nothing(chunk: tuple[Work, ...]) -> list:
     results = []
     for work in chunk:
         guess = work.problem.guess
-        results.append((work.cell, [Attempt("none", start_key(guess), Outcome(0, "solved", "", guess, guess, 0.2))]))
+        attempt = Attempt("none", start_key(guess), Outcome(0, "solved", "", guess, guess, 0.2))
+        results.append(Visit(work.cell, [attempt]))
     return results
 
 
@@ -123,7 +124,7 @@ def main() -> None:
     if options.dask:
         from distributed import Client
 
-        client = Client(n_workers=2, threads_per_worker=1, dashboard_address=None)
+        client = Client(n_workers=2, threads_per_worker=1, dashboard_address=":0")
         makers.append(("Dask", lambda n: client.get_executor(pure=False)))
     for name, maker in makers:
         for chunk in (1, 10):

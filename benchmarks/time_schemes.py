@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -21,7 +20,7 @@ from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.balance import instant, total_power
-from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled
+from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled, subplots
 
 GAIT = ellipse(0, 2.85, 1.29)
 SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
@@ -84,7 +83,7 @@ def report(quick: bool, folder: Path) -> str:
         header = ["scheme", *(f"{n} intervals" for n in intervals), "fitted order", "ms at the last"]
         parts.append(f"delta = {delta:g}, reference d/W = {reference:.9f}:\n\n{markdown_table(header, rows)}")
     with styled():
-        figure, axes = plt.subplots(1, len(deltas), figsize=(3.0 * len(deltas), 3.2), squeeze=False)
+        figure, axes = subplots(1, len(deltas), figsize=(3.0 * len(deltas), 3.2), squeeze=False)
         for axis, delta in zip(axes[0], deltas, strict=True):
             for name in SCHEMES:
                 points, _, missed = zip(*curves[delta, name], strict=True)
@@ -94,5 +93,5 @@ def report(quick: bool, folder: Path) -> str:
             axis.set(xlabel="points on half a period", title=f"delta = {delta:g}")
         axes[0][0].set_ylabel("relative error of d/W")
         axes[0][0].legend(fontsize=7, loc="lower left")
-        save(figure, folder, "time_schemes")
+        save(figure, folder / "time_schemes")
     return "\n\n".join(parts)

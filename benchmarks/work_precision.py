@@ -21,8 +21,8 @@ import numpy as np
 
 from benchmarks.figures_precision import save_work_precision
 from colloc import FreePath, Harmonic, Problem, certify, ellipse
-from colloc.search.continuation import continue_delta
-from colloc.system.json_cache import load_entries, save_entry
+from colloc.search.optimise import optimum
+from colloc.system.row_file import cached
 
 SECOND_ORDER = "trapezoid"
 REFERENCE = ("gauss-5", 20, 1e-7)
@@ -92,7 +92,7 @@ PATH = Picture(
 def outcome(problem: Problem) -> dict:
     """What the table needs of a solve."""
     begin = time.process_time()
-    solution = continue_delta(problem)
+    solution = optimum(problem)
     seconds = time.process_time() - begin
     replayed = certify(solution, tolerance=1e-8, instants=6400).efficiency
     return {
@@ -109,10 +109,7 @@ def outcome(problem: Problem) -> dict:
 
 def kept(cache: Path, problem: Problem) -> dict:
     """The outcome of a problem from the cache, or solved and put there."""
-    key = problem.hash[:16]
-    if key not in load_entries(cache):
-        save_entry(cache, key, outcome(problem))
-    return load_entries(cache)[key]
+    return cached(cache, problem.hash, lambda: outcome(problem))
 
 
 HEADER = """# Schemes, mesh tolerance and error
@@ -142,7 +139,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("results"))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    cache = options.output / "work_precision.json"
+    cache = options.output / "work_precision.sqlite"
     picture = PATH if options.path else ELLIPSE
     reference = np.nan if options.path else kept(cache, run_problem(*REFERENCE))["replayed"]
     lines = [PATH_HEADER if options.path else HEADER.format(reference=reference)]

@@ -80,6 +80,11 @@ _HOME = {
 }
 
 
+def __dir__() -> list[str]:
+    """Also the public names that nobody has used yet."""
+    return sorted({*globals(), *__all__})
+
+
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used, so that the NumPy part never loads CasADi."""
     for module, names in _HOME.items():

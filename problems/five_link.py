@@ -18,5 +18,4 @@ PROBLEM = Problem(
     guess=Fourier([0.0] * 4, [[1.0], [0.5], [-0.5], [-1.0]], [[0.3], [0.8], [0.8], [0.3]]),
     delta=1e-4,
     intervals=24,
-    formulation="map",  # "condensed" steps to gaits whose links cross at the first level, and does not find back
 )

@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("results"))
     arguments = parser.parse_args()
     body, friction = Chain(), Friction()
-    bound = efficiency_bound(body, friction, arguments.limit, budget=BUDGET, cache=arguments.out / "bounds.json")
+    bound = efficiency_bound(body, friction, arguments.limit, budget=BUDGET, cache=arguments.out / "bounds.sqlite")
     print(f"sampled {bound.sampled:.5f} on {bound.samples} motions in {bound.seconds:.0f} s", flush=True)
     certificate = certify(body, friction, bound, arguments.target, seconds=arguments.seconds, deepest=10)
     print(certificate)

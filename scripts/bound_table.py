@@ -2,7 +2,7 @@
 
 python -m scripts.bound_table [--out results] [--limits 3.14159265 3.0 2.5] [--seconds INF]
 
-Resumable: bounds and small gaits are kept in the folder's `bounds.json` and `small_gaits.json` as they come; a repeated run
+Resumable: bounds and small gaits are kept in the folder's `bounds.sqlite` and `small_gaits.sqlite` as they come; a repeated run
 takes up where the last one stopped, and writes `bound_table.md` from what there is.
 """
 
@@ -18,7 +18,7 @@ from colloc.bounds.infinitesimal import best_small_gait
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound, known_bound
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
-from colloc.system.json_cache import hash_of, load_entries, save_entry
+from colloc.system.row_file import cached, hash_of
 from scripts.certified_gaits import best_efficiency
 
 COEFFICIENTS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
@@ -54,17 +54,13 @@ def row(mu: tuple[float, ...], limit: float, bound: Bound, least: float, gait: d
 def small(friction: Friction, limit: float, cache: Path) -> dict:
     """The best small gait, from the cache if it is there."""
     key = hash_of({"version": 1, "mu": [friction.mu_t, friction.mu_f, friction.mu_b], "limit": limit})
-    known = load_entries(cache).get(key)
-    if known is None:
+
+    def found() -> dict:
         gait, angles = best_small_gait(Chain(), friction, limit)
-        known = {
-            "efficiency": gait.efficiency,
-            "angles": angles.tolist(),
-            "heading": gait.heading,
-            "rates": gait.rates.tolist(),
-        }
-        save_entry(cache, key, known)
-    return known
+        rates = gait.rates.tolist()
+        return {"efficiency": gait.efficiency, "angles": angles.tolist(), "heading": gait.heading, "rates": rates}
+
+    return cached(cache, key, found)
 
 
 def main() -> None:
@@ -77,7 +73,7 @@ def main() -> None:
     least = dict.fromkeys(COEFFICIENTS, np.inf)
     for limit in sorted(arguments.limits, reverse=True):
         for mu in COEFFICIENTS:
-            friction, cache = Friction(*map(float, mu)), arguments.out / "bounds.json"
+            friction, cache = Friction(*map(float, mu)), arguments.out / "bounds.sqlite"
             if time.process_time() < arguments.seconds:
                 bound = efficiency_bound(Chain(), friction, limit, budget=BUDGET, cache=cache)
             else:
@@ -86,7 +82,7 @@ def main() -> None:
                     continue
                 bound = known
             least[mu] = min(least[mu], bound.sampled)
-            smallest = small(friction, limit, arguments.out / "small_gaits.json")
+            smallest = small(friction, limit, arguments.out / "small_gaits.sqlite")
             rows.append(row(mu, limit, bound, least[mu], smallest, best_efficiency(mu, limit, arguments.out)))
             print(rows[-1], flush=True)
     (arguments.out / "bound_table.md").write_text(HEAD + "\n".join(rows) + "\n")

@@ -106,7 +106,7 @@ def smaller_delta(row: str, found: dict) -> bool:
 
 def bound_line(friction: Friction) -> str:
     """What no gait can exceed, as far as it is known here, and what the smallest gaits reach."""
-    cache = Path("results/bounds.json")
+    cache = Path("results/bounds.sqlite")
     budgets = (BUDGET, QUICK) if cache.exists() else ()
     bounds = [bound.sampled for budget in budgets if (bound := known_bound(Chain(), friction, budget=budget, cache=cache))]
     upper = f"{min(bounds):.4f} (sampled; scripts.bound_table)" if bounds else f"{1 / friction.smallest:.4g} = 1/min(mu)"

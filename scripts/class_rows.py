@@ -13,14 +13,14 @@ from colloc.bounds.infinitesimal import SmallGait, small_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.contact import crossing_depth
-from colloc.system.json_cache import hash_of, load_entries, save_entry
+from colloc.system.row_file import cached, hash_of
 
 SIZE = 0.7
 """Length [rad] of polygons made of infinitesimal gaits."""
 FEWER = "fewer links"
 """The start from the best gait of the same class with one link less."""
 _STARTS = 6
-CACHE = Path("results/small_gaits_chains.json")
+CACHE = Path("results/small_gaits_chains.sqlite")
 _PHASES = np.linspace(0.0, 1.0, 1001)
 
 
@@ -126,12 +126,13 @@ def known_small_gait(name: str, links: int, friction: Friction) -> tuple[SmallGa
             shape = max(grid, key=lambda s: small_gait(body, friction, s, directions=36, headings=4).efficiency)
         return small_gait(body, friction, shape), shape
     key = hash_of({"links": links, "law": [friction.mu_t, friction.mu_f, friction.mu_b], "name": name})
-    kept = load_entries(CACHE).get(key)
-    if kept is None:
+
+    def found() -> dict:
         gait, shape = _searched_small_gait(name, body, friction)
-        kept = {"efficiency": gait.efficiency, "heading": gait.heading, "shape": shape.tolist()}
-        save_entry(CACHE, key, kept | {"rates": gait.rates.tolist(), "weights": gait.weights.tolist()})
-        kept = load_entries(CACHE)[key]
+        numbers = {"rates": gait.rates.tolist(), "weights": gait.weights.tolist(), "shape": shape.tolist()}
+        return {"efficiency": gait.efficiency, "heading": gait.heading} | numbers
+
+    kept = cached(CACHE, key, found)
     numbers = (np.array(kept[k]) for k in ("rates", "weights"))
     return SmallGait(kept["efficiency"], kept["heading"], *numbers), np.array(kept["shape"])
 

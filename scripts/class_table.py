@@ -18,11 +18,10 @@ import numpy as np
 
 from colloc import Friction, Problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from
+from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import path_length
-from colloc.numerics.machine_code import compiler
 from colloc.results.solution import Solution
-from colloc.search.class_transfer import RESTARTS, delta_in, laid_into, maximise_from, over_links
-from colloc.search.compiled_problem import compile_problem
+from colloc.search.class_transfer import RESTARTS, delta_in, maximise_from
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
@@ -56,7 +55,6 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
         body = equal_links(links)
         start = laid_into(row.gait_class, guess, body)
         stated = Problem("class", start, body, friction, row.gait_class, delta, RESTARTS[-1] * delta, intervals=row.intervals)
-        compiled(links, friction, type(row.gait_class), stated)
         if known is None:
             solution = maximise_efficiency(stated, watch)
         else:
@@ -71,7 +69,7 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
         result |= {"status": "error", "message": str(error)}
     else:
         result |= {"status": solution.status, "message": solution.message, "gait": fields(solution.gait)}
-        if solution.certificate is not None:
+        if solution.certificate.replayed:
             c = solution.certificate
             result |= {"efficiency": c.efficiency, "error": c.efficiency_error, "distance": c.distance, "work": c.work}
             result |= {"at zero delta": c.efficiency_at_zero_delta, "delta": solution.problem.delta}
@@ -82,17 +80,7 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
 
 def delta_matters(solution: Solution) -> bool:
     """Whether the certificate says that delta changes the efficiency by too much."""
-    return solution.certificate is not None and any(c.name.startswith("delta") for c in solution.certificate.failures)
-
-
-_compiled: set[tuple[int, Friction, type]] = set()
-
-
-def compiled(links: int, friction: Friction, kind: type, stated: Problem) -> None:
-    """Puts the machine code of a kind of classes into its folder, if it can be made."""
-    if (links, friction, kind) not in _compiled and compiler() is not None:
-        compile_problem(stated)
-        _compiled.add((links, friction, kind))
+    return any(c.name.startswith("delta") for c in solution.certificate.failures)
 
 
 def keep(links: int, friction: str, row: str, seed: str, result: dict) -> None:

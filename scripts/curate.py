@@ -47,7 +47,6 @@ KEPT = {
     "smooth_low_mode.md": "python -m scripts.optimise_smooth",
     "sweep_scaling.md": "python -m benchmarks.sweep_scaling --cells 24 --tasks 500 --dask",
     "bound_table.md": "python -m scripts.bound_table",
-    "cycles.md": "python -m scripts.search_cycles --cases 32,1 24,2 24,4 24,7",
     "without_contact.md": "python -m scripts.without_contact",
     "small_polygons.md": "python -m scripts.small_polygons",
     "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",

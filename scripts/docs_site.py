@@ -96,8 +96,8 @@ def gallery_page() -> str:
     table = json.loads((ROOT / "results/curated/gallery.json").read_text())
     parts = [
         "# Gallery",
-        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest tests/commands/test_gallery.py` solves them again "
-        "and holds them against these numbers.",
+        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest tests/commands/test_gallery.py` solves them "
+        "again and holds them against these numbers.",
     ]
     for path in sorted((ROOT / "problems").glob("[!_]*.py")):
         source = path.read_text(encoding="utf-8")
@@ -134,7 +134,7 @@ def commands_page() -> str:
     for name, (module, summary) in SUBCOMMANDS.items():
         text = io.StringIO()
         with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
-            importlib.import_module(module).main(["--help"])
+            importlib.import_module(f"colloc.commands.{module}").main(["--help"])
         parts.append(f"## colloc {name}\n\n{summary[:1].upper()}{summary[1:]}.\n\n```text\n{text.getvalue().rstrip()}\n```")
     return "\n\n".join(parts) + "\n"
 
@@ -156,10 +156,10 @@ def api_page() -> str:
 def modules_page() -> str:
     """First lines of all modules."""
     rows = ["| module | holds |", "|---|---|"]
-    for path in sorted((ROOT / "colloc").glob("[!_]*.py")):
+    for path in sorted((ROOT / "colloc").glob("*/[!_]*.py")):
         first = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
-        rows.append(f"| `{path.stem}` | {first.replace('|', chr(92) + '|')} |")
-    text = "Imports point down from level to level; `tests/test_layering.py` holds the levels."
+        rows.append(f"| `{path.parent.name}.{path.stem}` | {first.replace('|', chr(92) + '|')} |")
+    text = "Imports point down from package to package; `tests/test_layering.py` holds the order."
     return "# Modules\n\n" + text + "\n\n" + "\n".join(rows) + "\n"
 
 

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from colloc.gaits.path_samples import Gait
 from colloc.mechanics.body import Chain
-from colloc.pictures.figure import GREY, RED, STYLE, draw_allowed, save_figure
+from colloc.pictures.figure import draw_allowed
+from colloc.pictures.style import GREY, VERMILION, save, styled
 
 
 class GaitPanel(NamedTuple):
@@ -54,8 +55,8 @@ def gait_panels(panels: list[GaitPanel], body: Chain | None = None) -> Figure:
     body = body or Chain()
     columns = min(4, len(panels))
     rows = -(-len(panels) // columns)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.1 * columns, 4.0 * rows), layout="constrained")
+    with styled():
+        figure = Figure(figsize=(3.1 * columns, 4.0 * rows))
         grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3.2, 0.6] * rows)
         for k, panel in enumerate(panels):
             row, column = divmod(k, columns)
@@ -77,7 +78,7 @@ def gait_panels(panels: list[GaitPanel], body: Chain | None = None) -> Figure:
                 inset.tick_params(labelsize=5)
                 for spine in inset.spines.values():
                     spine.set_visible(True)
-                    spine.set_color(RED)
+                    spine.set_color(VERMILION)
             _draw_bodies(figure.add_subplot(grid[2 * row + 1, column]), body, panel.gait)
     return figure
 
@@ -89,8 +90,8 @@ def body_strips(panels: list[GaitPanel], body: Chain) -> Figure:
     """
     columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(5.2 * columns, 1.15 * rows), layout="constrained")
+    with styled():
+        figure = Figure(figsize=(5.2 * columns, 1.15 * rows))
         for k, panel in enumerate(panels):
             axes = figure.add_subplot(rows, columns, k + 1)
             _draw_bodies(axes, body, panel.gait, None)
@@ -100,9 +101,9 @@ def body_strips(panels: list[GaitPanel], body: Chain) -> Figure:
 
 def save_body_strips(panels: list[GaitPanel], body: Chain, path: Path) -> None:
     """Save `body_strips` as PNG and PDF."""
-    save_figure(body_strips(panels, body), path)
+    save(body_strips(panels, body), path.with_suffix(""))
 
 
 def save_gait_panels(panels: list[GaitPanel], path: Path) -> None:
     """Save `gait_panels` as PNG and PDF."""
-    save_figure(gait_panels(panels), path)
+    save(gait_panels(panels), path.with_suffix(""))

@@ -3,36 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import colormaps
 
+from colloc.pictures.style import BLUE, GREEN, VERMILION, save, styled, subplots
 from colloc.smooth.bump_body import BumpBody
 from colloc.smooth.motion import Motion
-
-matplotlib.use("Agg")
-_STYLE: Any = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "pdf.fonttype": 42,
-    "savefig.dpi": 180,
-    "figure.constrained_layout.use": True,
-}
-_BLUE, _VERMILION, _GREEN = "#0072B2", "#D55E00", "#009E73"
-
-
-def _save(figure: Any, folder: Path, name: str) -> list[Path]:
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"{name}.{kind}" for kind in ("png", "pdf")]
-    for path in paths:
-        figure.savefig(path)
-    plt.close(figure)
-    return paths
 
 
 def _region_curves(motion: Motion, body: BumpBody, times: np.ndarray) -> np.ndarray:
@@ -63,11 +40,11 @@ def crawler_comparison(
         For "prescribed" and "optimised".
     folder : Path
     """
-    with plt.rc_context(_STYLE):
-        figure, axes = plt.subplots(1, 3, figsize=(9.5, 3.6), width_ratios=(1, 1, 1.5))
+    with styled():
+        figure, axes = subplots(1, 3, figsize=(9.5, 3.6), width_ratios=(1, 1, 1.5))
         figure.suptitle("The bump region at phases from 0 to 1/2", x=0.02, ha="left", fontsize=9)
         times = np.linspace(0.0, 0.4999, 9)
-        colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, times.size))
+        colours = colormaps["viridis"](np.linspace(0.0, 0.9, times.size))
         for ax, vertices, title in zip(axes, (prescribed, optimised), ("A  prescribed", "B  optimised"), strict=False):
             curves = _region_curves(body.motion(vertices), body, times)
             for k, colour in enumerate(colours):
@@ -76,7 +53,7 @@ def crawler_comparison(
             ax.set_title(title, loc="left")
             ax.set_aspect("equal")
             ax.set_axis_off()
-        for (name, values), colour, marker in zip(efficiencies.items(), (_BLUE, _VERMILION), "os", strict=True):
+        for (name, values), colour, marker in zip(efficiencies.items(), (BLUE, VERMILION), "os", strict=True):
             axes[2].loglog(epsilons, 1 - values, marker=marker, color=colour, label=name)
         guide = np.array([epsilons.min(), epsilons.max()])
         axes[2].loglog(guide, 0.6 * guide, "k--", lw=0.8, label=r"slope 1")
@@ -84,14 +61,14 @@ def crawler_comparison(
         axes[2].set_ylabel("1 - efficiency")
         axes[2].set_title("C  distance from the bound", loc="left")
         axes[2].legend()
-        return _save(figure, folder, "crawlers_optimised")
+        return save(figure, folder / "crawlers_optimised")
 
 
 def chain_convergence(links: np.ndarray, errors: dict[float, np.ndarray], folder: Path) -> list[Path]:
     """Relative excess of the work of chains over that of the smooth body against the number of links, by mu_t."""
-    with plt.rc_context(_STYLE):
-        figure, ax = plt.subplots(figsize=(4.2, 3.2))
-        for (mu, error), colour, marker in zip(errors.items(), (_BLUE, _GREEN, _VERMILION), "osD", strict=True):
+    with styled():
+        figure, ax = subplots(figsize=(4.2, 3.2))
+        for (mu, error), colour, marker in zip(errors.items(), (BLUE, GREEN, VERMILION), "osD", strict=True):
             ax.loglog(links, np.abs(error), marker=marker, color=colour, ms=4, label=rf"$\mu_t = {mu:g}$")
             if mu > 1:
                 ax.loglog(links, mu * 2 * np.pi**2 / (12 * links**2), color=colour, lw=0.8, ls="--")
@@ -99,4 +76,4 @@ def chain_convergence(links: np.ndarray, errors: dict[float, np.ndarray], folder
         ax.set_ylabel(r"$|W / W_{\rm smooth} - 1|$")
         ax.set_title(r"wave B; dashed $\mu_t \langle\kappa^2\rangle / (12 n^2)$", loc="left")
         ax.legend()
-        return _save(figure, folder, "chain_convergence")
+        return save(figure, folder / "chain_convergence")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from colloc.gaits.gait_class import DIRECT, RETROGRADE, STANDING
-from colloc.pictures.style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, letter, styled
+from colloc.pictures.style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, letter, styled, subplots
 
 KINDS = (RETROGRADE, STANDING, DIRECT)
 _COLOURS = {RETROGRADE: SKY, STANDING: ORANGE, DIRECT: GREEN}
@@ -56,7 +56,7 @@ def friction_plane_figure(
     """
     x, y = _edges(mu_t), _edges(mu_b)
     with styled():
-        figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11.4, 3.9))
+        figure, (left, middle, right) = subplots(1, 3, figsize=(11.4, 3.9))
         codes = np.full(kind.shape, np.nan)
         for code, name in enumerate(KINDS):
             codes[kind == name] = code
@@ -69,9 +69,9 @@ def friction_plane_figure(
                 size = np.where(small[i, j], 5.0, 22.0)
                 left.scatter(mu_t[i], mu_b[j], s=size, marker=marker, c="black", linewidths=0.8)
                 label = {"both": "bilateral and antipodal", "none": "no symmetry"}.get(name, name)
-                handles.append(plt.Line2D([], [], marker=marker, color="black", ls="", ms=4.5, label=label))
+                handles.append(Line2D([], [], marker=marker, color="black", ls="", ms=4.5, label=label))
         if small.any():
-            handles.append(plt.Line2D([], [], marker="o", color="black", ls="", ms=2, label="small symbol: small strokes"))
+            handles.append(Line2D([], [], marker="o", color="black", ls="", ms=2, label="small symbol: small strokes"))
         figure.legend(handles=handles, loc="outside lower left", ncols=4)
         left.set_title("kind and symmetry of the best gait")
         shown = middle.pcolormesh(x, y, efficiency.T, cmap=SEQUENTIAL, norm=LogNorm())

@@ -3,7 +3,7 @@
 Reads what ``python -m colloc.commands.sweep studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
 over the classes searched, and writes friction_plane.png, .pdf and .md. With ``--bounds N`` an upper bound for every gait of
 the body is computed first on a subset of N x N points (sampled, with a small spline basis: see docs/bound.md), kept in
-FOLDER/bounds.json; nothing is interpolated between them.
+FOLDER/bounds.sqlite; nothing is interpolated between them.
 """
 
 from __future__ import annotations
@@ -92,12 +92,12 @@ def main() -> None:
         parser.error(f"{error} python -m colloc.commands.sweep studies/friction_plane.py makes it.")
     mu_t, mu_b = study.coordinates["mu_t"], study.coordinates["mu_b"]
     efficiency, rest = winners(study)
-    bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.json")
+    bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.sqlite")
     parts = [text.split(", ") if text else ("", "") for text in rest["gait_class"].ravel()]
     kind, symmetry = (np.array([p[k].split(" ")[0] for p in parts]).reshape(efficiency.shape) for k in (0, 1))
     figure = friction_plane_figure(mu_t, mu_b, efficiency, kind, symmetry, rest["at_slowest"].astype(bool), bound)
     folder = options.output or options.results
-    print(*save(figure, folder, "friction_plane"), sep="\n")
+    print(*save(figure, folder / "friction_plane"), sep="\n")
     text = "\n".join(table(mu_t, mu_b, efficiency, rest, bound)) + "\n"
     (folder / "friction_plane.md").write_text(text, encoding="utf-8")
 

@@ -21,10 +21,12 @@ from matplotlib.figure import Figure
 
 from colloc.gaits.problem import Problem, Reference
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import STYLE, draw_filmstrip, draw_shape_path
+from colloc.pictures.figure import draw_filmstrip, draw_shape_path
+from colloc.pictures.style import styled
 from colloc.results.solution import Solution, versions
+from colloc.search.global_search import STARTS
 from colloc.search.modal_optimum import ModalOptimum, optimise_modal
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.optimise import best_gait
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_problem import ModalProblem
 from colloc.smooth.motion import Motion
@@ -102,7 +104,7 @@ def prescribed_row(example: Example) -> dict[str, Any]:
 def solved_row(solution: Solution) -> dict[str, Any]:
     """Numbers of a solved problem, by its certificate."""
     certificate = solution.certificate
-    if certificate is None:
+    if not certificate.replayed:
         return {"status": solution.status, "delta": solution.last.delta}
     return {
         "status": solution.status,
@@ -116,14 +118,14 @@ def solved_row(solution: Solution) -> dict[str, Any]:
 
 def _picture(example: Example, solution: Solution | None) -> None:
     PICTURES.mkdir(parents=True, exist_ok=True)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=_SIZE, layout="constrained")
+    with styled():
+        figure = Figure(figsize=_SIZE)
         if solution is not None:
             grid = figure.add_gridspec(1, 2, width_ratios=(2.6, 1))
             draw_filmstrip(figure.add_subplot(grid[0]), solution, count=6)
             t = np.linspace(0.0, 1.0, 801)
             if solution.problem.body.n_joint > 1:
-                draw_shape_path(figure.add_subplot(grid[1]), solution.problem, solution.sample(t).angles, legend=False)
+                draw_shape_path(figure.add_subplot(grid[1]), solution.problem, solution.sample(t).angles)
         else:
             _draw_snapshots(figure, example.stated)
         figure.savefig(PICTURES / f"{example.name}.png", dpi=_RESOLUTION)
@@ -156,7 +158,7 @@ def main() -> None:
         if names and example.name not in names:
             continue
         begin = time.process_time()
-        solution = maximise_efficiency(example.stated["PROBLEM"]) if example.optimised else None
+        solution = best_gait(example.stated["PROBLEM"], example.stated.get("STARTS", STARTS)) if example.optimised else None
         row = solved_row(solution) if solution is not None else prescribed_row(example)
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row

@@ -16,8 +16,8 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
-from colloc.search.continuation import continue_delta
 from colloc.search.modal_optimum import ModalOptimum, optimise_modal
+from colloc.search.optimise import optimum
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.modal_problem import ModalProblem
 from colloc.smooth.period import measured_period
@@ -36,7 +36,7 @@ def chain_start(body: ModalBody, friction: Friction) -> Fourier:
     guess = Fourier(np.zeros(LINKS - 1), 0.8 * np.cos(2 * np.pi * s)[:, None], -0.8 * np.sin(2 * np.pi * s)[:, None])
     chain = Chain((1.0 / LINKS,) * LINKS)
     problem = Problem("chain", guess, chain, friction, Harmonic(1, "antipodal"), delta=1e-2, mesh_tolerance=0)
-    return body.prolonged(np.array(chain.lengths), continue_delta(problem).gait)
+    return body.prolonged(np.array(chain.lengths), optimum(problem).gait)
 
 
 def admissible(problem: ModalProblem, guess: Fourier) -> Fourier:

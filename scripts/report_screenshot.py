@@ -34,7 +34,7 @@ OPTIONS = [
     "--hide-scrollbars",
     "--virtual-time-budget=3000",
 ]
-_WINDOW, _WIDTH, _COLOURS = (1120, 4400), 900, 96
+_WINDOW, _WIDTH, _COLOURS = (1120, 4400), 900, 256
 
 
 def tutorial_problem() -> str:
@@ -65,7 +65,7 @@ def main() -> int:
     used = np.flatnonzero((pixels != pixels[-1, 0]).any(axis=(1, 2)))[-1] + 20
     image = image.crop((0, 0, image.width, int(used)))
     image = image.resize((_WIDTH, round(image.height * _WIDTH / image.width)), Image.Resampling.LANCZOS)
-    image.quantize(_COLOURS, dither=Image.Dither.NONE).save(TARGET, optimize=True)
+    image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(TARGET, optimize=True)
     print(f"saved {TARGET.relative_to(ROOT)}")
     return 0
 

@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 
 from colloc.system.errors import CollocError
-from scripts import paper_crawlers, paper_map, paper_pacing, paper_static, paper_three_link, paper_waves
-from scripts.paper.parallel import available_processes
+from colloc.system.processors import available_processes
+from scripts.paper import crawlers, map, pacing, static, three_link, waves
 from scripts.paper.study import Part, Study
 
 DELTA = 1e-4
@@ -22,7 +22,7 @@ DELTA = 1e-4
 PARTS = (
     Part(
         "connection",
-        paper_map.connection,
+        map.connection,
         settings={
             "delta": 1e-5,
             "resolutions": [16, 32, 64, 128],
@@ -35,7 +35,7 @@ PARTS = (
     ),
     Part(
         "sweep",
-        paper_three_link.sweep,
+        three_link.sweep,
         settings={"delta": DELTA, "steps": 74, "instants": 100, "sample_every": 50},
         quick={"steps": 24, "sample_every": 20},
         needs=("connection",),
@@ -43,14 +43,14 @@ PARTS = (
     ),
     Part(
         "pacing",
-        paper_pacing.pacing,
+        pacing.pacing,
         settings={"delta": DELTA, "sample_every": 10, "resolutions": [16, 32, 64], "relative": [1e-3, 1e-4, 1e-5, 1e-6]},
         quick={"sample_every": 4, "resolutions": [16, 32], "relative": [1e-4, 1e-5]},
         needs=("connection", "sweep"),
     ),
     Part(
         "plane",
-        paper_three_link.plane,
+        three_link.plane,
         settings={"delta": DELTA, "steps": 200, "instants": 100, "boundary": 361},
         quick={"steps": 50, "boundary": 91},
         needs=("connection",),
@@ -58,7 +58,7 @@ PARTS = (
     ),
     Part(
         "optima",
-        paper_three_link.optima,
+        three_link.optima,
         settings={"delta": DELTA, "instants": 800, "directions": 121, "fractions": 61, "named_A0": [0.0, 1.1, 2.5]},
         quick={"instants": 400, "directions": 41, "fractions": 31},
         needs=("connection", "sweep"),
@@ -66,22 +66,22 @@ PARTS = (
     ),
     Part(
         "delta",
-        paper_three_link.delta_influence,
+        three_link.delta_influence,
         settings={"deltas": [1e-3, 1e-4, 1e-5, 1e-6, 1e-8], "random": 12, "seed": 7},
         quick={"deltas": [1e-4, 1e-6], "random": 3},
         needs=("sweep", "optima"),
     ),
     Part(
         "motions",
-        paper_three_link.motions,
+        three_link.motions,
         settings={"delta": DELTA, "instants": 4000},
         needs=("optima",),
         units={"D/speeds": "body lengths/period", "F/speeds": "body lengths/period"},
     ),
-    Part("instant", paper_three_link.worked_instant, settings={"deltas": [1e-4, 1e-6, 1e-8]}),
+    Part("instant", three_link.worked_instant, settings={"deltas": [1e-4, 1e-6, 1e-8]}),
     Part(
         "static",
-        paper_static.static,
+        static.static,
         settings={
             "delta": DELTA,
             "nodes": 73,
@@ -96,7 +96,7 @@ PARTS = (
     ),
     Part(
         "flap",
-        paper_static.flap,
+        static.flap,
         settings={
             "lengths": [0.8, 0.1, 0.1],
             "openings": 61,
@@ -106,7 +106,7 @@ PARTS = (
     ),
     Part(
         "waves",
-        paper_waves.waves,
+        waves.waves,
         settings={
             "delta": DELTA,
             "default_intervals": 8,
@@ -117,7 +117,7 @@ PARTS = (
     ),
     Part(
         "wave_parameters",
-        paper_waves.wave_parameters,
+        waves.wave_parameters,
         settings={
             "delta": DELTA,
             "steepness": [5, 10, 40, 100, 400],
@@ -131,7 +131,7 @@ PARTS = (
     ),
     Part(
         "crawlers",
-        paper_crawlers.crawlers,
+        crawlers.crawlers,
         settings={
             "epsilons": [0.2, 0.1, 0.05, 0.02, 0.01, 0.005],
             "fit_below": 0.03,
@@ -168,10 +168,10 @@ def main(arguments: list[str] | None = None) -> int:
                 continue
             print(f"{part}: computing", flush=True)
             print(f"{part}: {work.compute(part, options.processes):.1f} s", flush=True)
-        from scripts import paper_table
+        from scripts.paper.table import table as written_table
 
         table = options.output / f"{name}.md"
-        table.write_text(paper_table.table(work), encoding="utf-8")
+        table.write_text(written_table(work), encoding="utf-8")
         print(f"wrote {table}")
         if not options.no_figures:
             from scripts.paper import figures as figures_paper

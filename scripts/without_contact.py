@@ -21,10 +21,8 @@ from colloc import Corners, FreePath, Friction, Harmonic, Polygon, Problem
 from colloc.bounds.infinitesimal import small_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait, fields, gait_from
 from colloc.gaits.path_samples import path_length
-from colloc.numerics.machine_code import compiler
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.class_transfer import RESTARTS, delta_in, laid_into, maximise_from
-from colloc.search.compiled_problem import compile_problem
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
@@ -111,8 +109,6 @@ def stated(case: Case, start: AnyGait) -> Problem:
 def solved(case: Case, known: dict) -> Solution:
     """The search of a case."""
     start = guess(case, known)
-    if compiler() is not None:
-        compile_problem(stated(case, start))
     before = known.get(case.start, {}) if isinstance(case.start, str) else {}
     if "efficiency" in before:
         return maximise_from(stated(case, start), start, case.gait_class, before["efficiency"])

@@ -32,6 +32,4 @@ STUDY = Study(
         Axis("outer", np.linspace(0.15, 0.45, 13), "length of the outer links", "body length"),
     ),
     problem=problem,
-    cold_starts=2,
-    cold_every=4,
 )

@@ -32,9 +32,7 @@ STUDY = Study(
     ),
     problem=problem,
     cold_starts=1,
-    cold_every=5,
     warm_starts=1,
     chunk=2,
-    passes=2,
     time_limit=60.0,
 )

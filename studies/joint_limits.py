@@ -28,6 +28,4 @@ STUDY = Study(
         Axis("joint_limit", np.linspace(np.pi, np.pi / 6, 16), "largest joint angle", "rad"),
     ),
     problem=problem,
-    cold_starts=2,
-    cold_every=4,
 )

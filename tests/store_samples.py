@@ -1,27 +1,27 @@
 """A small file of every kind that colloc writes, with its reader and a writer; for tests of faults and of damage."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
-from colloc.results.archive import Archive, load_archive, save_archive
+from colloc.results.archive import Archive, StartName, open_archive
 from colloc.results.distinct_optima import Outcome
 from colloc.results.store import load, save
 from colloc.studies.cell import Attempt
-from colloc.studies.journal import Journal, Record, read_journal
+from colloc.studies.journal import NAME, Record, append_records, read_journal
 from colloc.studies.run import StudyRun
 from colloc.studies.store import load_study, save_study
 from colloc.studies.study import Axis, Study
 from colloc.studies.table import study_table
-from colloc.system.json_cache import load_entries, save_entry
+from colloc.system.row_file import CACHE, put_rows, read_rows
 from scripts.paper.array_store import read_arrays, write_arrays
 
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
-HDF5_KINDS = ("solution", "archive", "arrays", "study")
-KINDS = (*HDF5_KINDS, "journal", "cache")
+HDF5_KINDS = ("solution", "arrays", "study")
+ROW_KINDS = ("archive", "journal", "cache")
+KINDS = (*HDF5_KINDS, *ROW_KINDS)
 
 
 def problem(x=1.0):
@@ -33,18 +33,14 @@ def outcome(start, efficiency=0.2):
     return Outcome(start, "solved", "", GAIT, GAIT, efficiency, 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25)
 
 
-def archive(starts=range(3)):
-    return Archive(problem(), "latin-hypercube", 0, "command", {k: outcome(k) for k in starts})
+def archive(path, starts=range(3)) -> Archive:
+    found = open_archive(problem(), path)
+    found.add({StartName("latin-hypercube", 0, k): outcome(k) for k in starts})
+    return found
 
 
 def record(k=0):
     return Record(problem(1.0 + 0.01 * k).hash, (Attempt("warm", f"key{k}", outcome(k)),))
-
-
-def append(folder: Path, records):
-    with Journal(folder) as journal:
-        for one in records:
-            journal.append([one])
 
 
 def table(folder):
@@ -62,7 +58,7 @@ class Samples:
         self.folder, self.solution, self.table = folder, solution, table(folder / "none")
 
     def path(self, kind: str) -> Path:
-        return self.folder / {"journal": "journal-sample.jsonl", "cache": "bounds.json"}.get(kind, f"{kind}.h5")
+        return self.folder / {"journal": NAME, "cache": "bounds.sqlite", "archive": "archive.sqlite"}.get(kind, f"{kind}.h5")
 
     def write(self, kind: str, version: int = 0) -> Path:
         path = self.path(kind)
@@ -71,22 +67,15 @@ class Samples:
             self.solution.seconds = float(version)
             save(self.solution, path)
         elif kind == "archive":
-            save_archive(archive(range(3 + version)), path)
+            archive(path.with_suffix(".h5"), range(3 + version))
         elif kind == "arrays":
             write_arrays(path, {"a/b": np.arange(2000.0) + version, "names": np.array(["d", "W"])})
         elif kind == "study":
             save_study(self.table, path, source=str(version) * 10)
         elif kind == "journal":
-            if path.exists():
-                append(self.folder, [record(version)])
-            else:
-                journal = Journal(self.folder)
-                journal.path = path
-                with journal:
-                    for k in range(5):
-                        journal.append([record(k)])
+            append_records(self.folder, [record(5 + version)] if path.exists() else [record(k) for k in range(5)])
         else:
-            save_entry(path, f"key{version}", {"value": 1.0 + version})
+            put_rows(path, CACHE, {f"key{version}": {"value": 1.0 + version}})
         return path
 
     def read(self, kind: str, path: Path | None = None):
@@ -96,7 +85,8 @@ class Samples:
             found = load(path)
             return found.seconds, found.problem.hash, found.last.x.tobytes(), found.certificate
         if kind == "archive":
-            return {k: o.efficiency for k, o in load_archive(path).outcomes.items()}
+            found = open_archive(problem(), path.with_suffix(".h5"))
+            return {name: o.efficiency for name, o in found.outcomes.items()}, found.damaged
         if kind == "arrays":
             return {k: v.tolist() for k, v in read_arrays(path).items()}
         if kind == "study":
@@ -105,4 +95,5 @@ class Samples:
         if kind == "journal":
             text = read_journal(path.parent)
             return sorted(r.attempts[0].key for r in text.records), text.damaged
-        return json.dumps(load_entries(path), sort_keys=True)
+        found = read_rows(path, CACHE)
+        return found.values, found.damaged

@@ -15,7 +15,7 @@ from colloc.gaits.harmonic import ellipse
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
-SOURCES = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "colloc").glob("*.py"))
+SOURCES = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "colloc").rglob("*.py"))
 
 
 def blocks(page, language):
@@ -25,7 +25,7 @@ def blocks(page, language):
 def options_of(command):
     text = io.StringIO()
     with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
-        importlib.import_module(SUBCOMMANDS[command][0]).main(["--help"])
+        importlib.import_module(f"colloc.commands.{SUBCOMMANDS[command][0]}").main(["--help"])
     return set(re.findall(r"--[a-z][a-z-]*", text.getvalue()))
 
 

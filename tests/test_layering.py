@@ -1,235 +1,101 @@
-"""Data flows one way: imports point down, heavy libraries are named in one place, modules stay short."""
+"""Data flows one way: imports point down the packages and never in a circle; heavy libraries are named in few places."""
 
 import ast
+import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-LEVELS = {
-    0: [
-        "symmetry",
-        "arrays",
-        "errors",
-        "schemes",
-        "parallel",
-        "json_cache",
-        "spline",
-        "replaced_file",
-        "markup",
-        "progress",
-        "interruption",
-        "task_pool",
-        "sealed_file",
-        "file_lock",
-        "minimax_program",
-        "multiplier_estimate",
-        "machine_code",
-    ],
-    1: ["arcs", "path_gait", "friction", "body", "gait", "contact", "mesh", "motion", "curve", "point_friction", "chart"],
-    2: [
-        "path_class",
-        "path_samples",
-        "gait_fields",
-        "balance",
-        "problem",
-        "damped_newton",
-        "bump_body",
-        "ellipses",
-        "equivalence",
-        "modal_body",
-        "modal_problem",
-    ],
-    3: [
-        "fixed_point",
-        "layout",
-        "blocks",
-        "program",
-        "constraint_rows",
-        "shape_checks",
-        "path_kernels",
-        "path_geometry",
-        "path_transcription",
-        "kernels",
-        "newton_balance",
-        "velocity_callback",
-        "path_replay",
-        "warm_start",
-        "worst_instants",
-        "transcription",
-        "smooth_balance",
-        "bump_balance",
-        "bump_transcription",
-        "sampling",
-        "far_contact",
-        "fine_motion",
-        "kinks",
-        "mesh_error",
-        "smooth_batch",
-        "modal_balance",
-        "modal_transcription",
-        "balanced_velocity",
-    ],
-    4: [
-        "nlp",
-        "path_start",
-        "solution",
-        "problem_file",
-        "store",
-        "refinement",
-        "smooth_period",
-        "array_store",
-        "velocity_map",
-        "static_friction",
-        "motion_record",
-        "smooth_record",
-        "coulomb_motion",
-        "loaded_balance",
-        "potential",
-        "bound_sampling",
-        "infinitesimal",
-        "closure",
-        "solution_card",
-        "condensed",
-        "condensed_program",
-        "prediction",
-        "problem_study",
-        "store_file",
-        "gait_class",
-        "exchange",
-        "cycle_search",
-    ],
-    5: [
-        "verify",
-        "diagnosis",
-        "continuation",
-        "compiled_problem",
-        "level_run",
-        "concertina",
-        "epsilon_study",
-        "chain_study",
-        "bump_optimum",
-        "wave_optimum",
-        "map_store",
-        "sweep",
-        "flap",
-        "study",
-        "bound",
-        "bound_margin",
-        "basins",
-        "store_archive",
-        "delta_limit",
-        "trajectory",
-        "motion_frames",
-        "modal_optimum",
-    ],
-    6: [
-        "optimise",
-        "campaign",
-        "multistart",
-        "gap",
-        "homotopy",
-        "prolongation",
-        "figures",
-        "figures_smooth",
-        "figures_classes",
-        "figures_bound",
-        "solve",
-        "figures_style",
-        "figures_bodies",
-        "figures_maps",
-        "figures_crawlers",
-        "figures_paper",
-        "command_options",
-        "command",
-        "recheck",
-        "compare",
-        "export",
-        "report_charts",
-        "report_page",
-        "report",
-        "figures_publication",
-        "figures_animation",
-        "animate",
-        "figures_studies",
-        "figures_precision",
-    ],
-    7: ["study_cell", "study_journal", "study_run", "study_table", "store_study", "sweep_study"],
+PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+PACKAGES = tuple(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
+"""The packages of the library as the page lists them, lower ones first: a module imports its own package and lower ones."""
+BESIDE = {"__init__", "__main__", "solve"}
+"""What lies beside the packages: the face, ``python -m colloc`` and ``python -m colloc.solve``."""
+MOST_FILES, MOST_LINES = 18, 350
+ONLY = {
+    "matplotlib": {"pictures"},
+    "jinja2": {"pictures"},
+    "h5py": {"system", "results", "studies"},
+    "casadi": {"numerics", "collocation", "reduced", "search"},
 }
-LEVEL = {module: level for level, modules in LEVELS.items() for module in modules}
-ONLY = {"matplotlib": "figures", "h5py": "store"}
+
+
+def packages():
+    return {path.name for path in (ROOT / "colloc").iterdir() if (path / "__init__.py").exists()}
 
 
 def modules():
-    return {path.stem: path for path in (ROOT / "colloc").glob("*.py") if path.stem not in ("__init__", "__main__")}
+    """Dotted name below colloc to path, of all modules in packages."""
+    return {f"{path.parent.name}.{path.stem}": path for path in (ROOT / "colloc").glob("*/*.py") if path.stem != "__init__"}
 
 
 def imported(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module:
             yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
 
 
-def test_every_module_has_a_level():
-    assert set(modules()) == set(LEVEL)
+def test_the_packages_are_the_ones_the_page_lists_and_nothing_lies_beside_them():
+    assert packages() == set(PACKAGES)
+    assert {path.stem for path in (ROOT / "colloc").glob("*.py")} == BESIDE
 
 
-def test_imports_point_down_or_within_a_level_without_cycles():
-    graph = {}
+def test_the_init_files_of_packages_are_empty():
+    for package in PACKAGES:
+        assert (ROOT / "colloc" / package / "__init__.py").read_text(encoding="utf-8") == ""
+
+
+def test_imports_point_down_the_packages():
     for name, path in modules().items():
-        own = {m.split(".")[1] for m in imported(path) if m.startswith("colloc.")}
-        graph[name] = own
-        for other in own:
-            assert LEVEL[other] <= LEVEL[name], f"{name} imports {other} from above"
+        level = PACKAGES.index(name.partition(".")[0])
+        for other in imported(path):
+            if other.startswith("colloc."):
+                package = other.split(".")[1]
+                assert package in PACKAGES, f"{name} imports {other}"
+                assert PACKAGES.index(package) <= level, f"{name} imports {other} from above"
+
+
+def test_no_circles_between_modules():
+    known = modules()
+    graph = {
+        name: {".".join(other.split(".")[1:3]) for other in imported(path) if other.startswith("colloc.")} & set(known) - {name}
+        for name, path in known.items()
+    }
     while graph:
         free = {name for name, needs in graph.items() if not needs & set(graph)}
-        assert free, f"import cycle among {sorted(graph)}"
+        assert free, f"import circle among {sorted(graph)}"
         graph = {name: needs for name, needs in graph.items() if name not in free}
 
 
-def test_heavy_libraries_are_named_in_one_kind_of_module():
+def test_heavy_libraries_are_named_in_few_packages():
     for name, path in modules().items():
         for module in imported(path):
-            library = module.split(".")[0]
-            if library in ONLY:
-                assert ONLY[library] in name, f"{name} names {library}"
-
-
-def test_the_numpy_side_never_loads_casadi():
-    numpy_side = [m for m in LEVEL if "casadi" in {i.split(".")[0] for i in imported(modules()[m])}]
-    assert set(numpy_side) <= {
-        "arrays",
-        "balanced_velocity",
-        "blocks",
-        "bump_transcription",
-        "condensed",
-        "condensed_program",
-        "kernels",
-        "machine_code",
-        "modal_transcription",
-        "newton_balance",
-        "nlp",
-        "path_geometry",
-        "path_kernels",
-        "path_transcription",
-        "shape_checks",
-        "worst_instants",
-        "transcription",
-        "velocity_callback",
-    }
+            allowed = ONLY.get(module.split(".")[0])
+            assert allowed is None or name.partition(".")[0] in allowed, f"{name} names {module}"
 
 
 def test_only_one_module_names_ipopt():
-    assert [n for n, p in modules().items() if '"ipopt"' in p.read_text(encoding="utf-8")] == ["nlp"]
+    assert [name for name, path in modules().items() if '"ipopt"' in path.read_text(encoding="utf-8")] == ["search.nlp"]
 
 
-def test_modules_are_short():
-    for name, path in modules().items():
-        assert len(path.read_text(encoding="utf-8").splitlines()) <= 350, name
+def test_packages_and_modules_are_small():
+    known = modules()
+    for package in PACKAGES:
+        assert sum(name.startswith(f"{package}.") for name in known) <= MOST_FILES, package
+    for name, path in known.items():
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= MOST_LINES, name
 
 
-def test_no_public_name_is_shadowed_by_a_module():
+def test_no_public_name_is_shadowed_by_a_package():
     """Importing colloc.x sets the attribute x of colloc, so a function of that name would vanish once it is used."""
     import colloc
 
-    assert not set(colloc.__all__) & set(modules())
+    assert not set(colloc.__all__) & (set(PACKAGES) | BESIDE)
+
+
+def test_the_page_names_what_exists_and_fits_a_screen():
+    for name in re.findall(r"`([\w/]+(?:\.py|/))`", PAGE):
+        assert (ROOT / name).exists(), name
+    assert len(PAGE.splitlines()) <= 50

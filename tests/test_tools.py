@@ -15,7 +15,8 @@ from benchmarks.__main__ import PARTS
 from scripts.curate import COMMANDS, KEPT
 
 ROOT = Path(__file__).resolve().parents[1]
-MODULES = sorted(path for folder in ("scripts", "benchmarks") for path in (ROOT / folder).glob("*.py"))
+FOLDERS = ("scripts", "scripts/paper", "scripts/models", "benchmarks")
+MODULES = sorted(path for folder in FOLDERS for path in (ROOT / folder).glob("*.py") if path.stat().st_size)
 OPTIONAL = {"docs_site": "mkdocs"}
 """Modules that need more than the tests do."""
 EXAMPLES = ("continue_delta", "continue_epsilon")
@@ -30,7 +31,7 @@ def needed(path):
 
 
 def name_of(path):
-    return f"{path.parent.name}.{path.stem}"
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts)
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)

@@ -1,30 +1,25 @@
-"""The three-link problem in colloc: python -m benchmarks.peers.colloc_three_link --starts 20 [--refined] [--compiled]
+"""The three-link problem in colloc: python -m benchmarks.peers.colloc_three_link --starts 20 [--refined]
 
 Without --refined the mesh, scheme and levels are those of the other tools (no refinement); with it, everything is at its
-defaults, and a start counts only with a certificate. With --compiled the derivatives are compiled first; the first start pays.
+defaults, and a start counts only with a certificate.
 """
 
 from __future__ import annotations
-
-import os
-import tempfile
 
 import numpy as np
 
 from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import INTERVALS
 from colloc import Harmonic, Problem, ellipse, maximise_efficiency
-from colloc.numerics.machine_code import FOLDER, OFF
 from colloc.results.solution import SOLVED
-from colloc.search.compiled_problem import compile_problem
-from colloc.search.continuation import continue_delta
+from colloc.search.optimise import optimum
 
 
 def solve(refined: bool, start: np.ndarray) -> dict:
     """The gait and efficiency from one start, or what went wrong."""
     same_work: dict = {} if refined else {"scheme": "radau-3", "mesh_tolerance": 0}
     problem = Problem("peer", ellipse(*start), gait=Harmonic(1, "bilateral"), intervals=INTERVALS, **same_work)
-    solution = maximise_efficiency(problem) if refined else continue_delta(problem)
+    solution = maximise_efficiency(problem) if refined else optimum(problem)
     good = solution.status == SOLVED if refined else solution.levels[-1].optimal and solution.levels[-1].delta <= 1e-4
     if not good:
         return failed(solution.levels[-1].delta, solution.message)
@@ -32,15 +27,6 @@ def solve(refined: bool, start: np.ndarray) -> dict:
     return found(solution.efficiency, [gait.mean[0], gait.cos[0, 0], gait.sin[0, 0]])
 
 
-def build(refined: bool, compiled: bool) -> bool:
-    """Compiles the derivatives if it is to; what `solve` is told."""
-    if compiled:
-        compile_problem(Problem("peer", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral")))
-    return refined
-
-
 if __name__ == "__main__":
-    chosen = arguments(__doc__, refined="everything at its defaults, certified", compiled="compile the derivatives first")
-    with tempfile.TemporaryDirectory() as code:
-        os.environ[FOLDER] = code if chosen.compiled else OFF
-        run(chosen, lambda: build(chosen.refined, chosen.compiled), solve)
+    chosen = arguments(__doc__, refined="everything at its defaults, certified")
+    run(chosen, lambda: chosen.refined, solve)

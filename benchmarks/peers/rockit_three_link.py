@@ -73,7 +73,7 @@ def solve(program: Program, start: np.ndarray) -> dict:
         states, velocity = feasible_motion(own, delta, program.phases)
         first = INTERVALS + 1
         motion = [states[:, :first], states[:, first:], velocity[:, first:], own, delta]
-        guess = program.pack @ np.concatenate([np.ravel(part, order="F") for part in motion])
+        guess = program.pack @ np.concatenate([np.asarray(part).ravel(order="F") for part in motion])
         try:
             solution = program.solve(guess)
         except RuntimeError as error:

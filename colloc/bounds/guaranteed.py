@@ -3,10 +3,11 @@ r"""A guaranteed upper bound for a three-link body with isotropic friction: cert
 Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest. In link-fixed axes the
 dissipation J of a motion does not depend on the shape, and a balanced motion minimises it. For a multiplier M, at every
 corner k of a cell let P_k be the minimal dissipation, and phi_k the friction forces in balance under the load ``l_e/M``,
-where ``e.V_c = l_e.z + alpha_e.r`` is the speed of the reference point along e, D_k their power, z_k the motion. Interpolated
-over the cell the P_k stay above and the phi_k below the dissipation, up to terms of second order in the cell size, so
+where ``e.V_c = l_e.z + alpha_e.r`` is the speed of the reference point along e, D_k their power, z_k the motion, rho_k what
+they leave unbalanced. Interpolated over the cell the P_k stay above and the phi_k below the dissipation, up to terms of second
+order in the cell size, so
 
-    e.V_c / P  <=  M (1 + t) - min_k (M D_k - e.V_c(z_k) - a) / (P_k + b)        for every balanced motion in the cell,
+    e.V_c / P  <=  M (1 + t) - min_k (M D_k + M rho_k.z_k - e.V_c(z_k) - a) / (P_k + b)   for every balanced motion in the cell,
 
 with explicit t, a, b = O(size^2). Both components of V_c are bounded so. Cells that fail are split.
 """
@@ -134,7 +135,7 @@ def _spread(values: np.ndarray, axis: int) -> np.ndarray:
 def _cell_bounds(
     body: Chain, reference: _Reference, low: np.ndarray, size: np.ndarray, multiplier: float, delta: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Upper bounds of |V_c|/P over cells with low corners ``(3, n)`` and common size ``(3,)``; and M(1 + t)."""
+    """Upper bounds of |V_c|/P over cells with low corners ``(3, n)`` and size ``(3,)``, infinite if unknown; M(1 + t)."""
     n = low.shape[1]
     corner = low[:, :, None] + size[:, None, None] * _CORNERS.T[:, None, :]
     index = np.rint((corner - low.min(axis=1)[:, None, None]) / size[:, None, None]).astype(np.int64)
@@ -176,7 +177,7 @@ def _cell_bounds(
         moment = forces[2, 1] * (0.5 * l3) + forces[2, 2]
         component = int(np.flatnonzero(e)[0])
         error = multiplier * hs / 4 * _spread(moment[None], 2) + slope_error[component] + spin * c_error[1 - component]
-        lower = multiplier * state.power[at] - solved.gain[k][at] - error[:, None]
+        lower = multiplier * (state.power + state.leftover_power)[at] - solved.gain[k][at] - error[:, None]
         # the linear-fractional bound needs the sign of its numerator
         sides[k] = multiplier * (1 + t)[:, None] - lower / P
         sides[k][lower.min(axis=1) < 0] = np.inf
@@ -186,7 +187,8 @@ def _cell_bounds(
     for a in x:
         for b in y:
             value = np.maximum(value, np.sqrt(a * a + b * b).max(axis=1))
-    return value + _ROUNDING, factors.max(axis=0)
+    # where a solve ended in NaN nothing is proved
+    return np.where(np.isnan(value), np.inf, value + _ROUNDING), factors.max(axis=0)
 
 
 def _touches(body: Chain, low: np.ndarray, size: np.ndarray) -> np.ndarray:
@@ -259,11 +261,11 @@ def certify(
                 break
             chosen = slice(first, first + _CHUNK)
             cell_values, factors = _cell_bounds(body, reference, low[:, chosen], size, multiplier * 2.0 ** (0.5 * level), delta)
-            values[chosen] = np.minimum(parents[chosen], cell_values)
+            values[chosen] = np.fmin(parents[chosen], cell_values)
             closed = values[chosen] <= goal
             largest = max(largest, float(factors[closed].max(initial=0.0)))
             examined += cell_values.size
-        still = values > goal
+        still = ~(values <= goal)
         low, parents = low[:, still], values[still]
         if out_of_time or not still.any() or level == deepest:
             break

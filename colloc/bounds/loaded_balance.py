@@ -1,7 +1,8 @@
 """The balance of a body under isotropic friction and a small outside load: the dual certificate of the bound.
 
-The body minimises its dissipation potential less the load's power. The friction forces found are admissible (|f| <= mu), and
-that is all `colloc.bounds.guaranteed` needs: a solve that stops early gives a weaker certificate, not a wrong one.
+The body minimises its dissipation potential less the load's power. The friction forces found are admissible (|f| <= mu) and
+what they leave unbalanced is stated, which is all that `bounds.guaranteed` needs: a solve that stops early gives a weaker
+certificate, not a wrong one.
 """
 
 from __future__ import annotations
@@ -12,7 +13,10 @@ import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant, net_force, total_power
 from colloc.mechanics.body import Chain
-from colloc.mechanics.friction import Friction, link_dissipation
+from colloc.mechanics.compiled_balance import loaded
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_dissipation
+from colloc.mechanics.native_kernel import native_kernel
 
 _UNIT = Friction()
 _SHRINK = (0.5,) * 3 + (0.1,) * 5
@@ -28,6 +32,7 @@ class Loaded(NamedTuple):
 
     velocity (3, n): of the middle link. potential (n,): J_delta. power (n,): of the friction forces. forces (n_link, 3, n):
     minus the friction force on each link in its own axes (tangential, normal, couple). residual (2, n): force and torque left.
+    leftover_power (n,): power of what is left, load plus friction, on the motion.
     """
 
     velocity: np.ndarray
@@ -35,6 +40,7 @@ class Loaded(NamedTuple):
     power: np.ndarray
     forces: np.ndarray
     residual: np.ndarray
+    leftover_power: np.ndarray
 
 
 def _turn(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -50,6 +56,9 @@ def loaded_balance(
 
     Where Newton's method stalls on the creases of the potential, it is run again through falling delta.
     """
+    library = native_kernel(body)
+    if library is not None:
+        return Loaded(*loaded(library, body, _UNIT, angles, rates, load, start, delta, steps))
     state = _newton(body, angles, rates, load, start, delta, steps)
     stalled = np.flatnonzero(state.residual.max(axis=0) > _STALLED)
     if stalled.size:
@@ -113,4 +122,5 @@ def _newton(
         total_power(now.velocity, now.force)[0],
         -np.stack([now.force.tangential, now.force.normal, now.force.couple], axis=1),
         np.stack([np.hypot(force[0], force[1]), np.abs(force[2])]),
+        (force * z).sum(axis=0),
     )

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
 from colloc.gaits.problem import Problem
+from colloc.system.errors import ChangedFileWarning, StoreError
 
-CACHE = "bounds.json"
+CACHE = "bounds.sqlite"
 """Where bounds are kept, beside the results."""
 
 
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
-    """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for."""
-    cache = folder / CACHE
-    if compute:
-        return efficiency_bound(problem.body, problem.friction, problem.joint_limit, cache=cache)
-    return known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
+    """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
+
+    A cache that cannot be read or written is left as it is, with a `ChangedFileWarning`: no result depends on it.
+    """
+    domain, cache = (problem.body, problem.friction, problem.joint_limit), folder / CACHE
+    try:
+        return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
+    except StoreError as error:
+        warnings.warn(f"{error} No bound is taken from it.", ChangedFileWarning, stacklevel=2)
+        return efficiency_bound(*domain) if compute else None
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:

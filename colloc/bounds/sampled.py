@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,8 +23,8 @@ from colloc.bounds.sampling import Domain
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
-from colloc.system.errors import ProblemError
-from colloc.system.json_cache import hash_of, load_entries, save_entry
+from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
+from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
 
 VERSION = 2
 """Part of the cache key: raise it when the computation changes its result."""
@@ -173,11 +175,14 @@ def known_bound(
     cache: str | os.PathLike,
 ) -> Bound | None:
     """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
-    entry = load_entries(cache).get(bound_key(Domain(body, friction, float(joint_limit)), budget))
+    entry = read_rows(Path(cache), CACHE).values.get(bound_key(Domain(body, friction, float(joint_limit)), budget))
     if entry is None:
         return None
-    fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
-    return Bound(**fields)
+    try:
+        fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+        return Bound(**fields)
+    except (TypeError, AttributeError):
+        raise StoreError(f"{cache} holds something else than bounds; move it away.") from None
 
 
 def efficiency_bound(
@@ -200,12 +205,14 @@ def efficiency_bound(
         At most pi.
     budget : Budget
     cache : path, optional
-        A JSON file where bounds are kept by the hash of all inputs.
+        An SQLite file where bounds are kept by the hash of all inputs.
 
     Raises
     ------
     ProblemError
-        For a joint limit outside (0, pi], more than four links, even harmonics with mu_b = mu_f, or an unreadable cache.
+        For a joint limit outside (0, pi], more than four links, or even harmonics with mu_b = mu_f.
+    StoreError
+        If the cache cannot be read. One that cannot be written costs a `ChangedFileWarning`.
     """
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
@@ -219,8 +226,10 @@ def efficiency_bound(
     if friction.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
         raise ProblemError("even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only.")
     domain = Domain(body, friction, float(joint_limit))
-    key = bound_key(domain, budget)
     bound = compute_bound(domain, budget)
     if cache is not None:
-        save_entry(cache, key, asdict(bound))
+        try:
+            put_rows(Path(cache), CACHE, {bound_key(domain, budget): asdict(bound)})
+        except StoreError as error:
+            warnings.warn(f"{error} The bound is not kept.", ChangedFileWarning, stacklevel=2)
     return bound

@@ -3,8 +3,8 @@
 Decision variables: coordinates q of the bump at every edge of the mesh (a straight piece between neighbours, the pieces'
 lengths in a fixed proportion: that fixes the pace); the body's orientation theta at every site; distance x and work W at
 every edge. The velocity at every Gauss point is the one that balances the body, from the NumPy solver, with first and
-second derivatives by the implicit function theorem (as the formulation "map" of `collocation.point_equations`): where straight parts
-stick, the balance as a constraint is a step, the velocity it implies is not. Only the first half period is solved, its
+second derivatives by the implicit function theorem (as the formulation "map" of `collocation.point_equations`): where straight
+parts stick, the balance as a constraint is a step, the velocity it implies is not. Only the first half period is solved, its
 mirror image is the second.
 
 Minimised is ``(W / (smallest coefficient x) - 1) / (2 epsilon)``, the relative loss per region length.

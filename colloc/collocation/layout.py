@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.path_classes import FreePath
-from colloc.gaits.problem import LIFTED, Problem
+from colloc.gaits.problem import FULL, Problem
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
 
@@ -42,7 +42,8 @@ def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
     n_joint, n_link = problem.body.n_joint, problem.body.n_link
     gait, path = problem.gait, problem.has_path
     size = gait.size(n_joint, mesh.n) if isinstance(gait, FreePath) else gait.size(n_joint)
-    n_point = 0 if path else mesh.n_point  # along a path angles, rates and velocities follow from the parameters
+    # without them angles, rates and velocities along a path follow from its parameters
+    n_point = mesh.n_point if problem.formulation == FULL or not path else 0
     sizes = {
         "parameters": (size, 1),
         "theta": (1, mesh.n_site),
@@ -51,7 +52,7 @@ def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
         "angles": (n_joint, n_point),
         "rates": (n_joint, n_point),
         "z": (3, n_point),
-        "forces": (3 * n_link if problem.formulation == LIFTED else 0, n_point),
+        "forces": (3 * n_link if problem.formulation == FULL else 0, n_point),
     }
     indices, start = {}, 0
     for name, (rows, columns) in sizes.items():

@@ -1,6 +1,7 @@
-"""Tail velocities in balance near known ones: undamped Newton steps in CasADi, the damped solver for the rest.
+"""Tail velocities in balance near known ones: by the compiled kernel, or by undamped Newton steps in CasADi.
 
-What a search evaluates thousands of times has a good start each time. Where a Newton step makes the residual worse, a step of
+What a search evaluates thousands of times has a good start each time. NumPy would spend more on small batches than on the
+steps, so without the kernel the first ones are CasADi's. Where a Newton step makes the residual worse, a step of
 the paper's fixed point is taken instead, from where it was better. `mechanics.fixed_point`, which converges from anywhere and
 shares nothing with CasADi, then only has to take the few instants that such steps lose.
 """
@@ -13,6 +14,7 @@ from colloc.collocation.point_equations import balance_steps
 from colloc.mechanics.body import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.native_kernel import native_kernel
 
 _ROUNDING = 1e-16
 _STEPS = 40
@@ -50,7 +52,7 @@ def balanced_near(
     z = np.zeros((3, n_time)) if start is None else start.copy()
     todo, converged = np.arange(n_time), np.ones(n_time, dtype=bool)
     enough = max(tolerance, _ROUNDING / delta)
-    if start is not None:
+    if start is not None and native_kernel(body) is None:
         steps = balance_steps(body, friction)
         fallback, best = z.copy(), np.full(n_time, np.inf)
         limit = _FAR * np.abs(rates).max(axis=0)

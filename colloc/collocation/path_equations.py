@@ -14,8 +14,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from colloc.collocation.point_equations import advance, full_equations, link_forces
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.arcs import advance, direction
+from colloc.gaits import arcs
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -48,8 +49,8 @@ def arc(n_joint: int) -> Piece:
     return Piece(
         ca.vertcat(start, t0, t1, speed),
         ca.vertcat(tau, h),
-        start + length * h * advance(t0, t1, tau),
-        direction(t0, t1, tau),
+        start + length * h * arcs.advance(t0, t1, tau),
+        arcs.direction(t0, t1, tau),
         length,
     )
 
@@ -79,6 +80,22 @@ def path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) ->
     out = piece.speed * ca.vertcat(z[2], ca.cos(theta) * cx - ca.sin(theta) * cy, total_power(now.velocity, now.force))
     balance = net_force(now.posture, now.force)
     return implicit_function("point", ca.vertcat(theta, piece.shape), piece.given, z, delta, balance, out)
+
+
+@lru_cache(maxsize=32)
+def full_path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+    """The same with everything as a variable. Outputs: the place of the point and its direction, then
+    `collocation.point_equations.full_equations`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
+    link forces, shape."""
+    piece, n_joint = kind(body.n_joint), body.n_joint
+    theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("z", 3)
+    angles, rates, force = ca.SX.sym("q", n_joint), ca.SX.sym("r", n_joint), link_forces(body)
+    equations, power = full_equations(body, friction, angles, rates, z, force, delta)
+    forward = advance(body, theta, angles, rates, z)
+    place = ca.vertcat(angles - piece.angles, rates - piece.direction)
+    out = ca.vertcat(place, equations, piece.speed * ca.vertcat(z[2], forward, power))
+    local = ca.vertcat(theta, angles, rates, z, *force, piece.shape)
+    return local_function("point", local, piece.given, delta, out)
 
 
 def chord(piece: Piece) -> LocalFunction:

@@ -2,14 +2,14 @@
 
 Decision variables: the path's parameters (see `gaits.path_classes`); the tail's orientation theta at every site; distance x
 and work W at every edge. Rates are unit tangents and delta is measured at unit shape speed; the tail velocity is not a
-variable but the one that balances the body. As in `collocation.transcription`, x is the displacement of the centre of mass along
-a fixed direction and the first orientation is free.
+variable but the one that balances the body. As in `collocation.transcription`, x is the displacement of the centre of mass
+along a fixed direction and the first orientation is free.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -17,10 +17,11 @@ from scipy import sparse
 
 from colloc.collocation.implicit_velocity import VelocityMap
 from colloc.collocation.layout import Layout, problem_layout, problem_mesh
-from colloc.collocation.path_equations import ADVANCE, OMEGA, POWER, arc, path_point, side, squared_distance
+from colloc.collocation.path_equations import ADVANCE, OMEGA, POWER, arc, full_path_point, path_point, side, squared_distance
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
 from colloc.collocation.point_equations import minus_efficiency
 from colloc.collocation.shape_checks import ShapeCheck
+from colloc.collocation.transcription import largest_forces
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
@@ -28,7 +29,7 @@ from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.contact import Pairs
 from colloc.numerics.blocks import Assembly, Block
-from colloc.numerics.constraint_rows import Group, equalities, quadrature_group, rotation_groups, selector
+from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
 from colloc.numerics.mesh import Mesh
 
 
@@ -48,9 +49,13 @@ class PathTranscription:
     groups: dict[str, slice]
     velocity: VelocityMap | None
 
+    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> PathTranscription:
+        """The program with other bounds of its rows."""
+        return replace(self, constraint_lower=lower, constraint_upper=upper)
+
     @property
     def lifted(self) -> bool:
-        return False
+        return self.layout.forces.size > 0
 
     @property
     def speed_unit(self) -> float:
@@ -144,23 +149,31 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     near, mesh = path_through(problem, gait, edges)
     layout = problem_layout(problem, mesh)
     geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near, far)
-    point = path_point(problem.body, problem.friction, arc if isinstance(problem.gait, FreePath) else side)
+    kind = arc if isinstance(problem.gait, FreePath) else side
+    full = layout.forces.size > 0
+    point = (full_path_point if full else path_point)(problem.body, problem.friction, kind)
     interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
     tau = np.tile(mesh.scheme.c, mesh.n)
     # a point that two intervals share would have two tangents at a corner: points of each interval are its own
     theta = layout.theta[:, mesh.sites.ravel()]
     given = geometry.given(tau)
-    geometry.blocks["point"] = (point, np.concatenate([theta, geometry.shape[:, interval]]), given)
+    own = np.concatenate([layout.angles, layout.rates, layout.z, layout.forces]) if full else np.empty((0, tau.size), dtype=int)
+    geometry.blocks["point"] = (point, np.concatenate([theta, own, geometry.shape[:, interval]]), given)
+    if full:
+        limit = largest_forces(problem)
+        geometry.lower[layout.forces], geometry.upper[layout.forces] = -limit, limit
 
     n_point, n_out = tau.size, point.n_out
+    omega, forward, power = (output - 3 + n_out for output in (OMEGA, ADVANCE, POWER))
     state, rate = mesh.integration()
-    pick = selector(np.arange(n_point) * n_out + OMEGA, n_out * n_point)
+    pick = selector(np.arange(n_point) * n_out + omega, n_out * n_point)
     groups = [
         *geometry.groups,
+        *(_full_groups(problem, n_out, n_point, layout.n) if full else []),
         equalities("orientation", state @ selector(layout.theta[0], layout.n), {"point": (-rate @ pick).tocsr()}),
         *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n),
-        quadrature_group("distance", layout.distance, ADVANCE, n_out, mesh, layout.n, 1.0),
-        quadrature_group("work", layout.work, POWER, n_out, mesh, layout.n, 1.0),
+        quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
+        quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
     ]
     velocity = VelocityMap(problem.body, problem.friction, n_point)
     piece = geometry.piece
@@ -175,7 +188,15 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         geometry.lower[state_index] = geometry.upper[state_index] = 0.0
     ends = np.array([[layout.distance[0, -1]], [layout.work[0, -1]]])
     objective = Block(minus_efficiency(), ends, sparse.eye(1, format="csr"), np.empty((0, 1)))
-    return _assembled(problem, mesh, layout, geometry, groups, objective, {"point": balanced}, velocity)
+    return _assembled(problem, mesh, layout, geometry, groups, objective, {} if full else {"point": balanced}, velocity)
+
+
+def _full_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
+    """The equations of every point where nothing is eliminated."""
+    n_joint, n_law = problem.body.n_joint, 3 * problem.body.n_link
+    ends = np.cumsum([0, n_joint, n_joint, n_law, 3])
+    names = ("angles", "rates", "force law", "balance")
+    return [output_group(name, range(a, b), n_out, n_point, n) for name, a, b in zip(names, ends, ends[1:], strict=False)]
 
 
 def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathTranscription:

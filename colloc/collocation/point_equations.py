@@ -1,16 +1,15 @@
 """CasADi expressions of one mesh point: what collocation evaluates, each stated for a single instant.
 
-The physics is that of `mechanics.balance` and `mechanics.friction`; here it is only arranged into outputs. The balance itself
-is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
+The physics is that of `mechanics.balance` and `mechanics.link_friction`; here it is only arranged into outputs. The balance
+itself is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
 *formulations* of a point:
 
-``lifted``
+``full``
     Link forces are variables, each tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0;
     the balance is linear in the forces.
-``map``
+``implicit velocity``
     The tail velocity is tied to the one that balances the body, z - Z(angles, rates) = 0, with Z from the NumPy solver
     and its derivatives from the implicit function theorem. The velocity map is mild where the balance is not.
-    ("condensed" takes the same point, and then eliminates everything but the gait: see `colloc.collocation.reduced_space`.)
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from functools import lru_cache
 import casadi as ca
 
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.problem import LIFTED
+from colloc.gaits.problem import FULL
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.body import Chain
-from colloc.mechanics.friction import Friction, LinkForce, link_moments
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import LinkForce, link_moments
 from colloc.numerics.blocks import LocalFunction, local_function, total_function
-from colloc.numerics.machine_code import machine_code
 
 N_RATE = 2
 """The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
@@ -35,9 +34,9 @@ N_RATE = 2
 def point_function(formulation: str, body: Chain, friction: Friction) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
 
-    Locals: theta, joint angles, joint rates, z, and for "lifted" tangential forces, normal forces, couples of the links.
+    Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links.
     """
-    return _lifted_point(body, friction) if formulation == LIFTED else _map_point(body, friction)
+    return _full_point(body, friction) if formulation == FULL else _map_point(body, friction)
 
 
 def _symbols(body: Chain) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -46,16 +45,17 @@ def _symbols(body: Chain) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
     return theta, angles, rates, z, delta
 
 
-def _advance(body: Chain, theta: ca.SX, angles: ca.SX, rates: ca.SX, z: ca.SX) -> ca.SX:
+def advance(body: Chain, theta: ca.SX, angles: ca.SX, rates: ca.SX, z: ca.SX) -> ca.SX:
     """Velocity of the centre of mass along the lab's x."""
     posture = body.posture(angles)
     cx, cy = body.centre_velocity(posture, body.velocity(posture, rates, z))
     return ca.cos(theta) * cx - ca.sin(theta) * cy
 
 
-def _lifted_point(body: Chain, friction: Friction) -> LocalFunction:
-    theta, angles, rates, z, delta = _symbols(body)
-    force = LinkForce(*(ca.SX.sym(s, body.n_link) for s in ("f_s", "f_n", "couple")))
+def full_equations(
+    body: Chain, friction: Friction, angles: ca.SX, rates: ca.SX, z: ca.SX, force: LinkForce, delta: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """What vanishes where link forces obey the law of friction and balance: scaled laws, then the balance; and the power."""
     posture = body.posture(angles)
     velocity = body.velocity(posture, rates, z)
     vs, vn, w = velocity
@@ -67,12 +67,19 @@ def _lifted_point(body: Chain, friction: Friction) -> LocalFunction:
         force.normal / I0 + mu_t * (vn + w * I1 / I0),
         (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * 6 / length,
     ]
-    out = ca.vertcat(
-        *laws,
-        net_force(posture, force),
-        _advance(body, theta, angles, rates, z),
-        total_power(velocity, force),
-    )
+    return ca.vertcat(*laws, net_force(posture, force)), total_power(velocity, force)
+
+
+def link_forces(body: Chain) -> LinkForce:
+    """Symbols of the forces on the links."""
+    return LinkForce(*(ca.SX.sym(s, body.n_link) for s in ("f_s", "f_n", "couple")))
+
+
+def _full_point(body: Chain, friction: Friction) -> LocalFunction:
+    theta, angles, rates, z, delta = _symbols(body)
+    force = link_forces(body)
+    equations, power = full_equations(body, friction, angles, rates, z, force, delta)
+    out = ca.vertcat(equations, advance(body, theta, angles, rates, z), power)
     return local_function("point", ca.vertcat(theta, angles, rates, z, *force), ca.SX(0, 1), delta, out)
 
 
@@ -88,8 +95,8 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     now = instant(body, friction, angles, rates, solved, delta)
     balance, power = net_force(now.posture, now.force), total_power(now.velocity, now.force)
     local = ca.vertcat(theta, y, z)
-    advance = _advance(body, theta, angles, rates, z)
-    out = ca.vertcat(z - solved, advance, power)
+    forward = advance(body, theta, angles, rates, z)
+    out = ca.vertcat(z - solved, forward, power)
 
     R_z, R_y = ca.jacobian(balance, solved), ca.jacobian(balance, y)
     P_z, P_y = ca.jacobian(power, solved), ca.jacobian(power, y)
@@ -98,7 +105,7 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     zeros = ca.SX(3, 1)
     jacobian = ca.vertcat(
         ca.horzcat(zeros, -slope, ca.SX.eye(3)),
-        ca.jacobian(advance, local),
+        ca.jacobian(forward, local),
         ca.horzcat(ca.SX(1, 1), P_y + P_z @ slope, ca.SX(1, 3)),
     )
     weight = ca.SX.sym("weight", 5)
@@ -108,7 +115,7 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     nu_value = ca.solve(R_z.T, weight[0:3] - weight[4] * P_z.T)
     inner = ca.substitute(inner, nu, nu_value)
     frame = ca.vertcat(ca.SX.eye(n_y), slope)
-    hessian = ca.hessian(weight[3] * advance, local)[0]
+    hessian = ca.hessian(weight[3] * forward, local)[0]
     hessian[1 : 1 + n_y, 1 : 1 + n_y] += frame.T @ inner @ frame
     return total_function("point", local, solved, delta, out, jacobian, hessian, weight)
 
@@ -135,7 +142,7 @@ def balance_steps(body: Chain, friction: Friction) -> ca.Function:
     secant = ca.substitute([slope], frozen, list(moments))[0]
     fixed_point = z - ca.solve(secant, balance)
     outputs = [newton, fixed_point, ca.norm_inf(balance)]
-    return machine_code([ca.Function("balance_steps", [angles, rates, z, delta], outputs, {"cse": True})])[0]
+    return ca.Function("balance_steps", [angles, rates, z, delta], outputs, {"cse": True})
 
 
 def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:

@@ -75,6 +75,9 @@ class GaitProgram(Program, Protocol):
     def member(self, parameters: np.ndarray) -> AnyGait:
         """The gait of a parameter vector ``(n_parameter,)``."""
 
+    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> GaitProgram:
+        """The program with other bounds of its rows."""
+
     def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member."""
 

@@ -25,12 +25,20 @@ class ShapeCheck(NamedTuple):
 
     value: of the angles. share: of the angles, the weight of the first of two sums of which the function is the minimum,
     or -1. cut: of the angles and a share, the tangent plane of that weight, or the function itself where it is negative.
+    slope: its derivative with respect to the angles. joint: which joint's angle it is itself; -1 if none's.
     """
 
     name: str
     value: ca.Function
     share: ca.Function
     cut: ca.Function
+    slope: ca.Function
+    joint: int = -1
+
+    @property
+    def on_joint(self) -> bool:
+        """Whether it is a joint angle itself, bounded from below too."""
+        return self.joint >= 0
 
 
 def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[ShapeCheck]:
@@ -40,7 +48,7 @@ def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[Shape
     for the pairs `far` of links farther apart.
     """
     angles = ca.SX.sym("q", body.n_joint)
-    checks = [_smooth_check(f"joint {j + 1}", angles, angles[j]) for j in range(body.n_joint)]
+    checks = [_joint_check(f"joint {j + 1}", angles, j) for j in range(body.n_joint)]
     for i, (first, second) in enumerate(crossing_sums(body, angles)):
         name = f"links {i + 1} and {i + 3}"
         checks.append(_minimum_check(f"{name} (left)", angles, first - np.pi, second - np.pi))
@@ -52,10 +60,15 @@ def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[Shape
     return checks
 
 
-def _smooth_check(name: str, angles: ca.SX, value: ca.SX) -> ShapeCheck:
-    share = ca.SX.sym("share")
+def _joint_check(name: str, angles: ca.SX, joint: int) -> ShapeCheck:
+    share, value = ca.SX.sym("share"), angles[joint]
     none = ca.Function("share", [angles], [ca.SX(-1)])
-    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, ca.Function("cut", [angles, share], [value]))
+    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, *_cut(angles, share, value), joint)
+
+
+def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:
+    slope = ca.densify(ca.gradient(cut, angles))
+    return ca.Function("cut", [angles, share], [cut]), ca.Function("slope", [angles, share], [slope])
 
 
 def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX, width: float = SMOOTHING) -> ShapeCheck:
@@ -65,5 +78,5 @@ def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX, width:
         name,
         ca.Function("check", [angles], [value]),
         ca.Function("share", [angles], [share_of_first(first, second, width)]),
-        ca.Function("cut", [angles, share], [cut]),
+        *_cut(angles, share, cut),
     )

@@ -4,17 +4,16 @@ Decision variables: gait parameters p; at every point joint angles, joint rates 
 theta at every site; distance x and work W at every edge. Rates, velocities and delta are per radian of phase, so that all
 variables are O(1).
 
-The balance itself is a step function of the tail velocity as delta goes to 0. Its place is taken by z - Z(angles, rates) = 0,
-with Z the velocity that balances the body. So it is under the formulations "map" and "condensed" (the default, which then
-eliminates all variables but p and the first theta: `collocation.reduced_space`). Under "lifted" the links' forces are variables at every
-point too: each is tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0, and the balance is linear.
+The balance itself is a step function of the tail velocity as delta goes to 0. The formulation "full" lifts the links' forces:
+each is a variable, tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0, and the balance is linear.
+"implicit velocity" puts z - Z(angles, rates) = 0 in the place of the balance, with Z the velocity that balances the body.
 x is the displacement of the centre of mass along a fixed direction. The first orientation is free, so maximising x
 turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -26,7 +25,7 @@ from colloc.collocation.point_equations import N_RATE, gait_check, mean_square, 
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.problem import LIFTED, Problem
+from colloc.gaits.problem import FULL, Problem
 from colloc.mechanics.contact import Pairs
 from colloc.numerics.blocks import Assembly, Block
 from colloc.numerics.constraint_rows import (
@@ -75,9 +74,13 @@ class Transcription:
     checks: list[ShapeCheck]
     velocity: VelocityMap
 
+    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> Transcription:
+        """The program with other bounds of its rows."""
+        return replace(self, constraint_lower=lower, constraint_upper=upper)
+
     @property
     def lifted(self) -> bool:
-        return self.problem.formulation == LIFTED
+        return self.layout.forces.size > 0
 
     @property
     def speed_unit(self) -> float:
@@ -193,7 +196,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
                     gather,
                     stacked(groups, name, function.n_out * gather.shape[1]),
                     parameters,
-                    velocity_map if name == "point" and problem.formulation != LIFTED else None,
+                    velocity_map if name == "point" and problem.formulation != FULL else None,
                 )
                 for name, (function, gather, parameters) in blocks.items()
             ),
@@ -212,21 +215,26 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
     # a function bounded by L has Fourier coefficients of at most 4 L / pi
     lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * problem.joint_limit / np.pi
-    if problem.formulation == LIFTED:
-        friction, length = problem.friction, problem.body.length_column()
-        tangential = max(friction.mu_f, friction.mu_b) * length
-        limit = np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+    if layout.forces.size:
+        limit = largest_forces(problem)
         lower[layout.forces], upper[layout.forces] = -limit, limit
     for state in (layout.distance, layout.work):
         lower[state[0, 0]] = upper[state[0, 0]] = 0.0
     return lower, upper
 
 
+def largest_forces(problem: Problem) -> np.ndarray:
+    """Largest tangential and normal forces and couples of friction on the links, ``(3 n_link, 1)``."""
+    friction, length = problem.friction, problem.body.length_column()
+    tangential = max(friction.mu_f, friction.mu_b) * length
+    return np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+
+
 def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
     """The equations of every point: lifted force laws, then the balance (or the velocity map in its place)."""
     n_law = n_out - N_RATE - 3
     groups = [output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
-    if problem.formulation == LIFTED:
+    if problem.formulation == FULL:
         groups.insert(0, output_group("force law", range(n_law), n_out, n_point, n))
     return groups
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse.linalg import spsolve
 
-from colloc.collocation.layout import RADIANS
+from colloc.collocation.layout import Layout
 from colloc.collocation.newton_balance import balanced_near
 from colloc.collocation.program import GaitProgram
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant, total_power
+from colloc.numerics.mesh import Mesh
 
 _TOLERANCE = 1e-11
 
@@ -32,19 +35,33 @@ def feasible_point(
     -------
     (n,) array
     """
-    problem, layout, gait = transcription.problem, transcription.layout, transcription.member(parameters)
+    gait = transcription.member(parameters)
     mesh = transcription.phase_mesh(gait)
+    return balanced_variables(transcription.problem, transcription.layout, mesh, gait, parameters, delta, start)
+
+
+def balanced_variables(
+    problem: Problem,
+    layout: Layout,
+    mesh: Mesh,
+    gait: AnyGait,
+    parameters: np.ndarray,
+    delta: float,
+    start: np.ndarray | None = None,
+) -> np.ndarray:
+    """The same for a layout of variables, a mesh in phases of the gait, and the gait's parameters in that layout."""
     x = np.zeros(layout.n)
     x[layout.parameters[:, 0]] = parameters
-    slow = delta * gait.delta_unit / RADIANS
-    angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
+    unit = gait.speed_unit
+    slow = delta * gait.delta_unit / unit
+    angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
     z, _ = balanced_near(problem.body, problem.friction, angles, rates, slow, start, _TOLERANCE)
     now = instant(problem.body, problem.friction, angles, rates, z, slow)
 
     state, rate = mesh.integration()
     # theta_0 = 0 closes the system; the matrix is block bidiagonal
     theta = np.zeros(mesh.n_site)
-    theta[1:] = spsolve(state[:, 1:].tocsc(), RADIANS * (rate @ z[2]))
+    theta[1:] = spsolve(state[:, 1:].tocsc(), unit * (rate @ z[2]))
     site_of_point = np.empty(mesh.n_point, dtype=int)
     site_of_point[mesh.points] = mesh.sites
     cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
@@ -58,8 +75,11 @@ def feasible_point(
         theta -= np.arctan2(dy.sum(), dx.sum())
     c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
     _, quadrature = mesh.quadrature()
-    x[layout.distance[0, 1:]] = np.cumsum(RADIANS * (quadrature @ (c * cx[0] - s * cy[0])))
-    x[layout.work[0, 1:]] = np.cumsum(RADIANS * (quadrature @ total_power(now.velocity, now.force)[0]))
+    distance = np.cumsum(unit * (quadrature @ (c * cx[0] - s * cy[0])))
+    if distance[-1] < 0:  # an antipodal gait that travels the other way along its axis
+        theta, distance = theta + np.pi, -distance
+    x[layout.distance[0, 1:]] = distance
+    x[layout.work[0, 1:]] = np.cumsum(unit * (quadrature @ total_power(now.velocity, now.force)[0]))
     x[layout.theta[0]] = theta
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z

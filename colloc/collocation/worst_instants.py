@@ -19,6 +19,9 @@ _SAMPLES = 16
 _ZOOMS = 3
 """Every zoom samples 8 times as densely. On a cell of 1/40 of a period the last samples are 3e-6 periods apart, within
 which angles change by far less than the width over which a kink is smoothed."""
+_NEAR, _FAR = 0.1, 1.0
+"""A search watches every cell in which a check is nearer to its bound than the first [rad], and peaks nearer than the second:
+the rest is looked at again when the gait has moved."""
 _HELD_SHARE, _HELD_NEAR = 1e-3, 0.05
 """A check is replaced by its tangent plane where both sums have at least this share in it and where it is nearer to its bound
 than this [rad]: elsewhere the gait may move far, and the plane would forbid what is free."""
@@ -26,38 +29,62 @@ than this [rad]: elsewhere the gait may move far, and the plane would forbid wha
 
 def worst_instants(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck]) -> list[np.ndarray]:
     """For each check, the instant in every mesh cell where it comes closest to its bound, ``(n_interval,)``."""
-    return [_worst(gait, mesh, check) for check in checks]
+    return [_worst(gait, mesh, check, np.arange(mesh.n)) for check in checks]
 
 
-def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck) -> np.ndarray:
-    cells, fine = np.arange(mesh.n), np.linspace(0.0, 1.0, _SAMPLES + 1)
-    left, width = mesh.edges[:-1], mesh.h
+def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each check, the mesh cells in which it might bind soon, and its worst instants there, ``(n,)`` each.
+
+    Those are the cells in which it is near its bound (`limit` for joints, else 0), and those in which it has a peak.
+    """
+    fine = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    angles = gait.angles((mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel())
+    found = []
+    for check in checks:
+        highest = _magnitudes(check, angles).reshape(mesh.n, -1).max(axis=1) - (limit if check.on_joint else 0.0)
+        around = np.pad(highest, 1, constant_values=-np.inf)
+        peak = (highest >= around[:-2]) & (highest >= around[2:])
+        cells = np.flatnonzero((highest > -_NEAR) | (peak & (highest > -_FAR)))
+        found.append((cells, _worst(gait, mesh, check, cells) if cells.size else np.empty(0)))
+    return found
+
+
+def _magnitudes(check: ShapeCheck, angles: np.ndarray) -> np.ndarray:
+    """What a bound from above is laid on, ``(n_time,)``: joint angles are bounded both ways."""
+    if check.on_joint:
+        return np.abs(angles[check.joint])
+    return check.value(angles).full().ravel()
+
+
+def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray) -> np.ndarray:
+    rows, fine = np.arange(cells.size), np.linspace(0.0, 1.0, _SAMPLES + 1)
+    left, width = mesh.edges[cells], mesh.h[cells]
     for zoom in range(_ZOOMS + 1):
         times = left[:, None] + width[:, None] * fine
-        values = check_values(check, gait, times.ravel()).reshape(times.shape)
-        if check.name.startswith("joint"):
-            values = np.abs(values)
+        values = _magnitudes(check, gait.angles(times.ravel())).reshape(times.shape)
         best = np.argmax(values, axis=1)
         inner = np.clip(best, 1, _SAMPLES - 1)
         if zoom < _ZOOMS:
-            left, width = times[cells, inner - 1], 2 * width / _SAMPLES
+            left, width = times[rows, inner - 1], 2 * width / _SAMPLES
     # one parabola through the best sample and its neighbours places a smooth maximum inside to O(step^4)
-    low, mid, high = (values[cells, inner + k] for k in (-1, 0, 1))
+    low, mid, high = (values[rows, inner + k] for k in (-1, 0, 1))
     curvature = low - 2 * mid + high
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = np.where(curvature < 0, 0.5 * (low - high) / curvature, 0.0)
     offset = np.where(best == inner, np.clip(offset, -1, 1), 0.0)
-    return times[cells, best] + offset * width / _SAMPLES
+    return times[rows, best] + offset * width / _SAMPLES
 
 
 def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
     """A check along a gait, ``(n_time,)``."""
-    return np.array(check.value.map(times.size)(gait.angles(times))).ravel()
+    angles = gait.angles(times)
+    return angles[check.joint] if check.on_joint else check.value(angles).full().ravel()
 
 
 def held_shares(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
     """The share of the first sum to hold in the cut at each of the instants, or -1 for the check itself, ``(n_time,)``."""
-    angles = gait.angles(times)
-    shares = np.array(check.share.map(times.size)(angles)).ravel()
+    if check.on_joint:
+        return np.full(times.size, -1.0)
+    shares = check.share(gait.angles(times)).full().ravel()
     both = (shares > _HELD_SHARE) & (shares < 1 - _HELD_SHARE)
     return np.where(both & (check_values(check, gait, times) > -_HELD_NEAR), shares, -1.0)

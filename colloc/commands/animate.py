@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.commands.options import OK, add_result, exit_code, new_parser, output_path
+from colloc.commands.ending import OK, run
+from colloc.commands.options import add_result, new_parser, output_kind, output_path
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -133,8 +134,7 @@ def animate(
         raise ProblemError(f"{periods} periods of {count} pictures cannot be drawn; change --periods, --seconds or --fps.")
     if not 200 <= width <= 4000:
         raise ProblemError(f"--width must lie between 200 and 4000, not {width}.")
-    if not solution.levels:
-        raise ProblemError("the result holds no gait: its solve failed before the first level.")
+    solution.last  # noqa: B018  raises where there is no gait
     if path.suffix == ".mp4":
         _ffmpeg()  # before anything is drawn
     from colloc.pictures.animation import pictures
@@ -155,16 +155,13 @@ def _counted(pictures: Iterator[np.ndarray], total: int, line: StatusLine) -> It
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _animate(options))
+    return run(_parser(), _animate, arguments)
 
 
 def _animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
-    suffix = Path(options.output).suffix.lstrip(".") if options.output else ""
-    kind = options.format or (suffix if suffix in ("gif", "mp4") else "gif")
-    path = output_path(options.output, source.with_suffix(f".{kind}"))
+    path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('gif', 'mp4'))}"))
     settings = {"periods": options.periods, "seconds": options.seconds, "fps": options.fps, "width": options.width}
     animate(solution, path, **settings, arrows=not options.no_arrows)
     print(f"saved {path} ({path.stat().st_size / 1000:.0f} kB)")

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.commands.options import OK, add_printing, exit_code, new_parser
+from colloc.commands.ending import OK, run
+from colloc.commands.options import add_printing, new_parser
 from colloc.results.certificate import gait_path
 from colloc.results.distinct_optima import SAME_EFFICIENCY, SAME_GAIT
 from colloc.results.solution import Solution
 from colloc.results.store import load
-from colloc.system.errors import ProblemError
 
 DIFFERENT = 1
 _EPILOG = """\
@@ -82,13 +82,12 @@ _NAMES = ("status", "efficiency", "  at delta -> 0", "distance d", "work W", "de
 
 
 def _column(solution: Solution) -> list[str]:
-    last, certificate = solution.last, solution.certificate
-    measured = certificate if certificate is not None else last
-    error = f" +- {certificate.efficiency_error:.0e}" if certificate is not None else " (not replayed)"
+    last, certificate, measured = solution.last, solution.certificate, solution.measured
+    error = f" +- {certificate.efficiency_error:.0e}" if certificate.replayed else " (not replayed)"
     return [
         solution.status,
         f"{measured.efficiency:.6f}{error}",
-        f"{certificate.efficiency_at_zero_delta:.6f}" if certificate is not None else "-",
+        f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
         f"{measured.distance:.6f}",
         f"{measured.work:.6f}",
         f"{last.delta:.1e}",
@@ -100,7 +99,7 @@ def _column(solution: Solution) -> list[str]:
 
 def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
     """Whether the two are the same optimum, and why, in a sentence."""
-    values = [s.certificate.efficiency if s.certificate is not None else s.last.efficiency for s in (a, b)]
+    values = [s.measured.efficiency for s in (a, b)]
     difference = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
     apart = gait_distance(a, b)
     if apart is None:
@@ -120,15 +119,11 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _compare(options))
+    return run(_parser(), _compare, arguments)
 
 
 def _compare(options: argparse.Namespace) -> int:
     a, b = load(options.first), load(options.second)
-    for solution, path in ((a, options.first), (b, options.second)):
-        if not solution.levels:
-            raise ProblemError(f"{path} holds no gait: its solve failed before the first level.")
     same, sentence = verdict(a, b)
     if options.json:
         table = {name.strip() or "name": [x, y] for name, x, y in rows(a, b)}

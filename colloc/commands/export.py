@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.commands.options import OK, add_result, exit_code, new_parser, output_path
+from colloc.commands.ending import OK, run
+from colloc.commands.options import add_result, new_parser, output_kind, output_path
 from colloc.results.certificate import gait_path
 from colloc.results.solution import Solution
 from colloc.results.store import load
@@ -49,8 +50,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Sequence[float] | None) -> dict:
     """What a reader of the samples has to know, as plain numbers and strings."""
-    certificate = solution.certificate
-    measured = certificate if certificate is not None else solution.last
+    measured = solution.measured
     return {
         "name": solution.problem.name,
         "status": solution.status,
@@ -96,8 +96,7 @@ def json_text(facts: dict, trajectory: Trajectory, periods: int = 1) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _export(options))
+    return run(_parser(), _export, arguments)
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -105,10 +104,7 @@ def _export(options: argparse.Namespace) -> int:
         raise ProblemError(f"--periods must be at least 1, not {options.periods}.")
     source = Path(options.result)
     solution = load(source)
-    if not solution.levels:
-        raise ProblemError(f"{source} holds no gait: its solve failed before the first level.")
-    suffix = Path(options.output).suffix.lstrip(".") if options.output else ""
-    kind = options.format or (suffix if suffix in ("csv", "json") else "csv")
+    kind = output_kind(options, ("csv", "json"))
     path = output_path(options.output, source.with_suffix(f".{kind}"))
     limits = options.max_speed
     trajectory = timed(gait_path(solution), options.rate, options.period, None if limits is None else np.array(limits))

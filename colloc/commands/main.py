@@ -7,27 +7,27 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from colloc.commands.options import BAD_PROBLEM, OK
+from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
 
 SUBCOMMANDS = {
-    "solve": ("colloc.solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
+    "solve": ("solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
     "multistart": (
-        "colloc.commands.multistart",
+        "multistart",
         "solve a problem from many random starts; distinct optima with their frequencies",
     ),
-    "sweep": ("colloc.commands.sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
-    "verify": ("colloc.commands.verify", "check a result again by independent replay, without CasADi"),
-    "compare": ("colloc.commands.compare", "hold two results against each other"),
-    "report": ("colloc.commands.report", "one self-contained web page about a result, to read or to send"),
-    "animate": ("colloc.commands.animate", "the motion as GIF or MP4"),
-    "export": ("colloc.commands.export", "joint angles over time for a robot, as CSV or JSON"),
+    "sweep": ("sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
+    "verify": ("verify", "check a result again by independent replay, without CasADi"),
+    "compare": ("compare", "hold two results against each other"),
+    "report": ("report", "one self-contained web page about a result, to read or to send"),
+    "animate": ("animate", "the motion as GIF or MP4"),
+    "export": ("export", "joint angles over time for a robot, as CSV or JSON"),
 }
-"""Name to module with a ``main(arguments)`` that returns an exit code, and what it does."""
+"""Name to module of this package with a ``main(arguments)`` that returns an exit code, and what it does."""
 
 _EXAMPLE = """\
 From a problem to a page to send:
 
-  colloc solve problems/three_link.py        results/three_link.h5, .png, .pdf
+  colloc solve problems/three_link.py        results/three_link.h5, .png
   colloc report results/three_link.h5        results/three_link.html
   colloc animate results/three_link.h5       results/three_link.gif
   colloc export results/three_link.h5 --max-speed 2.0 --rate 50
@@ -46,6 +46,10 @@ def help_text() -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``colloc``; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    return exit_code(lambda: _command(words), as_json="--json" in words)
+
+
+def _command(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help", "help"):
         print(help_text())
         return OK if words else BAD_PROBLEM
@@ -61,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         hint = f"do you mean colloc {near[0]}?" if near else f"choose one of {', '.join(SUBCOMMANDS)}."
         print(f"colloc: there is no command {words[0]!r}; {hint}", file=sys.stderr)
         return BAD_PROBLEM
-    return importlib.import_module(SUBCOMMANDS[words[0]][0]).main(words[1:])
+    return importlib.import_module(f"colloc.commands.{SUBCOMMANDS[words[0]][0]}").main(words[1:])
 
 
 if __name__ == "__main__":

@@ -9,20 +9,13 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from colloc.commands.options import (
-    NONE_FOUND,
-    OK,
-    add_bound,
-    add_printing,
-    add_problem,
-    changed,
-    exit_code,
-    new_parser,
-    output_path,
-)
+from colloc.commands.ending import NONE_FOUND, OK, run
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
+from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
@@ -31,6 +24,9 @@ from colloc.results.solution import SOLVED
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 
+if TYPE_CHECKING:
+    from colloc.results.archive import StartName
+
 _MOST_BASINS_SHOWN = 12
 _RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 
@@ -38,8 +34,8 @@ _RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 _EPILOG = """\
 Exit codes: 0 at least one certified optimum; 2 bad problem or option; 3 none found; 130 interrupted.
 
-Start k is the same gait whatever --starts and --workers are. What an archive holds already is not solved again, so the
-same command goes on after Ctrl-C, and a larger --starts adds to it.
+Start k of a seed is the same gait whatever --starts and --workers are. What the archive of the problem holds already is not
+solved again: the same command goes on after Ctrl-C, and a larger --starts or another --seed adds to it.
 
   colloc multistart problems/three_link.py --starts 100 --workers 2"""
 
@@ -105,7 +101,7 @@ def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[
                 "frequency": b.frequency,
                 "starts": list(b.starts),
                 "on_speed_floor": on_speed_floor(problem, b.best.gait),
-                "gait": {key: getattr(b.best.gait, key).tolist() for key in ("mean", "cos", "sin")},
+                "gait": fields(b.best.gait),
             }
             for b in found
         ],
@@ -113,11 +109,19 @@ def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[
     }
 
 
+def _others_lines(kept: Mapping[StartName, Outcome], shown: int) -> list[str]:
+    """What the archive holds besides the starts that were asked for."""
+    if len(kept) == shown:
+        return []
+    best = max(kept, key=lambda name: kept[name].efficiency if kept[name].status == SOLVED else -1.0)
+    what = f"; the best of all, {kept[best].efficiency:.6f}, is start {best.number} of seed {best.seed} ({best.sampler})"
+    return [f"  starts in the file besides: {len(kept) - shown}{what if kept[best].status == SOLVED else ''}"]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
     command = " ".join(["colloc multistart", *(sys.argv[1:] if arguments is None else arguments)])
-    return exit_code(lambda: _run(options, command))
+    return run(_parser(), lambda options: _run(options, command), arguments)
 
 
 def _run(options: argparse.Namespace, command: str) -> int:
@@ -126,21 +130,19 @@ def _run(options: argparse.Namespace, command: str) -> int:
     path = output_path(options.output, Path("results") / f"{problem.name}.starts.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.results.archive import Archive, load_archive, save_archive
+    from colloc.results.archive import StartName, open_archive, save_archive
     from colloc.studies.campaign import run_starts
 
     quiet = options.quiet or options.json
     table = not quiet and sys.stdout.isatty()
-    archive = Archive(problem, options.sampler, options.seed, command)
-    if path.exists():
-        before = load_archive(path)
-        if (before.problem.hash, before.sampler, before.seed) != (problem.hash, options.sampler, options.seed):
-            raise ProblemError(f"{path} belongs to another problem, sampler or seed; choose another --output.")
-        archive.outcomes = before.outcomes
-    done = {k for k, o in archive.outcomes.items() if not (options.retry and o.status in _RETRIED)}
+    archive = open_archive(problem, path)  # or refused, before anything is solved
+    before = archive.of_search(options.sampler, options.seed)
+    done = {k for k, o in before.items() if not (options.retry and o.status in _RETRIED)}
     todo = [k for k in range(options.starts) if k not in done]
     if not quiet:
         print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go", flush=True)
+        if archive.damaged:
+            print(f"  {archive.damaged} damaged rows beside {path} were left out; their starts are solved again", flush=True)
     if table:
         print(OUTCOME_HEADER, flush=True)
     begin = time.perf_counter()
@@ -150,8 +152,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
         with StatusLine(enabled=not quiet) as line:
             line.say(f"{problem.name}: 0 of {len(todo)} starts")
             for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
-                archive.outcomes[outcome.start] = outcome
-                save_archive(archive, path)  # on the disk before it is reported
+                archive.add({StartName(options.sampler, options.seed, outcome.start): outcome})  # before it is reported
                 if table:
                     line.clear()
                     print(outcome_line(outcome), flush=True)
@@ -159,8 +160,8 @@ def _run(options: argparse.Namespace, command: str) -> int:
                 line.say(f"{problem.name}: {count} of {len(todo)} starts", left)
     except KeyboardInterrupt:
         interrupted = True
-    save_archive(archive, path)
-    outcomes = [o for o in archive.ordered() if o.start < options.starts]
+    save_archive(archive, command)
+    outcomes = [o for k, o in archive.of_search(options.sampler, options.seed).items() if k < options.starts]
     found = basins(problem, outcomes)
     if options.json:
         print(json.dumps(summary_dict(problem, outcomes, found, path)))
@@ -169,7 +170,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
         if found:
             best = max(basin.best.efficiency for basin in found)
             lines.append(gap_line(problem, best, upper_bound(problem, path.parent, compute=options.bound)))
-        print("\n".join([*lines, f"  saved {path}"]))
+        print("\n".join([*lines, *_others_lines(archive.outcomes, len(outcomes)), f"  saved {path}"]))
     if interrupted:
         raise KeyboardInterrupt("run the same command again to go on.")
     return OK if found else NONE_FOUND

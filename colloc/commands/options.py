@@ -1,28 +1,25 @@
-"""What the subcommands share: one way to refuse bad options, to name the problem and the output, and to end.
-
-Exit codes: 0 well; 2 bad problem, option or file; 3 not converged or none found; 4 a certificate failed; 130 interrupted.
-"""
+"""What the subcommands share: one way to refuse bad options, and to name the problem and the output."""
 
 from __future__ import annotations
 
 import argparse
 import os
-import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
 from colloc.gaits.problem import FORMULATIONS, Problem
-from colloc.system.errors import CollocError, ProblemError
+from colloc.system.errors import ProblemError
 
-OK, BAD_PROBLEM, NONE_FOUND, FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+_LONGEST_NAME = 220
+"""Bytes of the name of an output: systems allow 255, and files under way have longer names than finished ones."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Refuses bad options in one sentence, with the exit code of a bad problem."""
+    """Refuses bad options in one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(BAD_PROBLEM, f"colloc: {message}; see {self.prog} --help.\n")
+        raise ProblemError(f"{message}; see {self.prog} --help.")
 
 
 def new_parser(command: str, description: str, epilog: str) -> Parser:
@@ -46,13 +43,24 @@ _CHANGES = ("delta", "delta_start", "intervals", "mesh_tolerance", "scheme", "fo
 
 
 def changed(problem: Problem, options: argparse.Namespace) -> Problem:
-    """The problem with the changes of `add_problem`, and with the gait of the result that ``--start`` names as guess."""
-    changes = {name: getattr(options, name) for name in _CHANGES if getattr(options, name) is not None}
-    if getattr(options, "start", None) is not None:
-        from colloc.results.store import load
+    """The problem with the changes of `add_problem`, and with the gait of the result that ``--start`` names as guess.
 
-        changes["guess"] = load(options.start).gait
-    return problem.with_(**changes) if changes else problem
+    Raises
+    ------
+    ProblemError
+        If a value cannot be used, or the gait cannot be the guess; the message names the file.
+    """
+    changes = {name: getattr(options, name) for name in _CHANGES if getattr(options, name) is not None}
+    problem = problem.with_(**changes) if changes else problem
+    if getattr(options, "start", None) is None:
+        return problem
+    from colloc.results.store import load
+
+    gait = load(options.start).gait
+    try:
+        return problem.with_(guess=gait)
+    except ProblemError as error:
+        raise ProblemError(f"the gait of {options.start} cannot be the guess: {error}") from None
 
 
 def add_result(parser: argparse.ArgumentParser) -> None:
@@ -69,8 +77,31 @@ def add_printing(parser: argparse.ArgumentParser) -> None:
 def add_bound(parser: argparse.ArgumentParser) -> None:
     """``--bound``."""
     parser.add_argument(
-        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.json)"
+        "--bound", action="store_true", help="compute an upper bound on every gait (a minute; kept in bounds.sqlite)"
     )
+
+
+def output_kind(options: argparse.Namespace, kinds: Sequence[str]) -> str:
+    """Which of several kinds of files to write: ``--format``, else the ending of ``--output``, else the first.
+
+    Raises
+    ------
+    ProblemError
+        If ``--output`` ends in something else.
+    """
+    ending = "" if _is_folder(options.output) else Path(options.output).suffix
+    if options.format is None and ending and ending.lstrip(".") not in kinds:
+        raise _wrong_ending(options.output, " or ".join(f".{kind}" for kind in kinds))
+    return options.format or ending.lstrip(".") or kinds[0]
+
+
+def _is_folder(output: str | None) -> bool:
+    """Whether what the user named is a folder: by a separator at its end, by having no ending, or because it is one."""
+    return output is None or output.endswith(("/", os.sep)) or not Path(output).suffix or os.path.isdir(output)
+
+
+def _wrong_ending(output: str, wanted: str) -> ProblemError:
+    return ProblemError(f"--output {output} should end in {wanted}; a folder of that name is written {output}/.")
 
 
 def output_path(output: str | None, default: Path) -> Path:
@@ -85,10 +116,15 @@ def output_path(output: str | None, default: Path) -> Path:
     Raises
     ------
     ProblemError
-        If nothing can be written there.
+        If nothing can be written there, or it ends in another suffix.
     """
-    path = default if output is None else Path(output)
-    path = path if path.suffix == default.suffix else path / default.name
+    path = default if output is None else Path(output) / default.name if _is_folder(output) else Path(output)
+    if path.suffix != default.suffix:
+        raise _wrong_ending(str(path), default.suffix)
+    if len(os.fsencode(path.name)) > _LONGEST_NAME:
+        raise ProblemError(
+            f"the file name {path.name[:30]}... is too long: choose an --output of at most {_LONGEST_NAME} bytes."
+        )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -96,21 +132,3 @@ def output_path(output: str | None, default: Path) -> Path:
     if not os.access(path.parent, os.W_OK) or path.is_dir():
         raise ProblemError(f"cannot write {path}; choose another --output.")
     return path
-
-
-def exit_code(command: Callable[[], int]) -> int:
-    """Run a command; errors made for people become one sentence on standard error and an exit code.
-
-    A KeyboardInterrupt may carry a sentence about what was kept.
-    """
-    try:
-        return command()
-    except CollocError as error:
-        print(f"colloc: {error}", file=sys.stderr)
-        return BAD_PROBLEM
-    except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  the reader of a pipe left; results are saved
-        return BAD_PROBLEM
-    except KeyboardInterrupt as stop:
-        print(f"colloc: interrupted; {str(stop) or 'nothing was written.'}", file=sys.stderr)
-        return INTERRUPTED

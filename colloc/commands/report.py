@@ -10,7 +10,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.options import OK, add_result, exit_code, new_parser, output_path
+from colloc.commands.ending import OK, run
+from colloc.commands.options import add_result, new_parser, output_path
 from colloc.gaits.problem import Reference
 from colloc.pictures.report_page import report_page
 from colloc.results.store import load
@@ -36,8 +37,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _report(options))
+    return run(_parser(), _report, arguments)
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -72,7 +72,7 @@ def _reference(problem_file: str | None) -> Reference | None:
 def _gap(solution, folder: Path) -> str:
     from colloc.bounds.optimality_gap import gap_line, upper_bound
 
-    if solution.certificate is None:
+    if not solution.certificate.replayed:
         return ""
     bound = upper_bound(solution.problem, folder, compute=False)
     return gap_line(solution.problem, solution.certificate.efficiency, bound)

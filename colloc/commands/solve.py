@@ -16,30 +16,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colloc.commands.options import (
-    FAILED,
-    NONE_FOUND,
-    OK,
-    add_bound,
-    add_printing,
-    add_problem,
-    changed,
-    exit_code,
-    new_parser,
-    output_path,
-)
+from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.paths import ArcPath
 from colloc.gaits.problem import Problem, Reference
-from colloc.gaits.problem_file import read_problem_file
-from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Level, Solution
-from colloc.system.errors import StoreError
-from colloc.system.progress import StatusLine
+from colloc.gaits.problem_file import ProblemFile, read_problem_file
+from colloc.results.level import REDUCED, Level
+from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
+from colloc.system.errors import CollocError, ProblemError, StoreError
+from colloc.system.progress import StatusLine, duration
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
 
+_MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
+"""Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
+_MOST_OTHERS = 4
+SEARCHES = ("reduced", "full")
 EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED}
 _EPILOG = """\
 Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
@@ -59,9 +54,20 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
     parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
     parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
+    parser.add_argument(
+        "--starts", type=int, metavar="N", help="starts to find the best gait of (default: 16); 1: the guess alone"
+    )
+    parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="begin no other start after so long")
+    parser.add_argument(
+        "--search",
+        choices=SEARCHES,
+        default=SEARCHES[0],
+        help="reduced: SQP on the gait's parameters, answered by IPOPT on the full program (default); full: IPOPT on the full "
+        "program at every level of delta, from the guess alone",
+    )
     add_bound(parser)
-    parser.add_argument("--compile", action="store_true", help="first compile what solves of this body and friction evaluate")
-    parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png and NAME.pdf")
+    parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png")
+    parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
     add_printing(parser)
     return parser
 
@@ -82,13 +88,15 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
     """What a person wants to know at the end."""
     lines = [f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"]
     certificate = solution.certificate
-    if certificate is not None:
+    if certificate.replayed:
         lines += [
             f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
-            f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} for delta -> 0",
+            f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} +- "
+            f"{certificate.error_at_zero_delta:.0e} for delta -> 0",
             f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}      "
             f"at delta {solution.last.delta:.0e}",
         ]
+        lines += [f"  search          {text}" for text in _search_lines(solution)]
         lines += [f"  gait            {text}" for text in _gait_lines(solution)]
         lines += [f"  {check.line()}" for check in certificate.checks]
         if reference is not None:
@@ -97,6 +105,22 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             lines.append(f"  {agree} {reference.efficiency:g} +- {reference.tolerance:g} ({reference.source})")
     if solution.message:
         lines.append(f"  {solution.message}")
+    return lines
+
+
+def _search_lines(solution: Solution) -> list[str]:
+    """What was solved last, and what the gait is the best of."""
+    level = solution.last
+    rows = f"{level.x.size} variables, {level.lam_g.size} constraints"
+    how = f"{level.iterations} iterations of IPOPT" if level.program != REDUCED else level.status
+    lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {level.kkt_error:.0e}"]
+    if solution.starts == 1:
+        return [*lines, "local optimum, from one start"]
+    best, *others = solution.others
+    lines.append(f"local optimum, best of {solution.starts} starts; {best.starts} led here")
+    for other in others[:_MOST_OTHERS]:
+        size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
+        lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
     return lines
 
 
@@ -134,18 +158,28 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "work": solution.work,
         "iterations": sum(level.iterations for level in solution.levels),
         "class": solution.problem.gait.describe(),
+        "program": solution.last.program,
+        "variables": int(solution.last.x.size),
+        "constraints": int(solution.last.lam_g.size),
+        "kkt_error": solution.last.kkt_error,
+        "starts": solution.starts,
+        "others": [
+            {"efficiency": a.efficiency, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
+            for a in solution.others
+        ],
         "gait": fields(solution.gait),
         "certificate": None,
         "reference": None,
         "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
         "versions": solution.versions,
     }
-    if certificate is not None:
+    if certificate.replayed:
         result["certificate"] = {
             "passed": certificate.passed,
             "efficiency": certificate.efficiency,
             "efficiency_error": certificate.efficiency_error,
             "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
+            "error_at_zero_delta": certificate.error_at_zero_delta,
             "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
         }
     if reference is not None:
@@ -156,8 +190,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _solve(options))
+    return run(_parser(), _solve, arguments)
 
 
 def _solve(options: argparse.Namespace) -> int:
@@ -169,31 +202,46 @@ def _solve(options: argparse.Namespace) -> int:
     from colloc.results.store import save
 
     quiet = options.quiet or options.json
-    if options.compile:
-        from colloc.search.compiled_problem import compile_problem
-
-        with StatusLine(enabled=not quiet) as line:
-            line.say("compiling")
-            compile_problem(problem)
-    solution = _solved(problem, stated.source, path, options.fresh, quiet)
+    if not quiet and problem.intervals > _MANY_INTERVALS:
+        seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
+        hint = "mesh_tolerance refines a small mesh where it has to be fine"
+        print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
+    if options.starts is not None and options.starts < 1:
+        raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
+    solution = _solved(problem, stated, path, options, quiet)
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")
     save(solution, path)
     _partial(path).unlink(missing_ok=True)
+    bound, saved, complaints = None, str(path), []
     with StatusLine(enabled=not quiet) as line:
-        line.say("computing an upper bound on every gait" if options.bound else "drawing")
-        bound = upper_bound(problem, path.parent, compute=options.bound)
-        if not options.no_figure:
-            from colloc.pictures.figure import save_figure, solution_figure
-
-            save_figure(solution_figure(solution), path)
+        if options.bound:
+            line.say("computing an upper bound on every gait")
+        try:
+            bound = upper_bound(problem, path.parent, compute=options.bound)
+        except CollocError as error:  # what is solved is not lost for it
+            complaints.append(f"no bound: {error}")
     if options.json:
-        print(json.dumps(summary_dict(solution, path, stated.reference, bound)))
+        print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
     else:
-        efficiency = solution.efficiency if solution.certificate is None else solution.certificate.efficiency
-        print("\n".join([*summary_lines(solution, stated.reference), gap_line(problem, efficiency, bound)]))
-        print(f"  saved {path}" + ("" if options.no_figure else f", {path.with_suffix('.png')}"))
-    return EXIT[solution.status]
+        lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
+        print("\n".join(lines), flush=True)
+    if not options.no_figure:
+        from colloc.pictures.figure import solution_figure
+        from colloc.pictures.style import save as save_figure
+
+        with StatusLine(enabled=not quiet) as line:
+            line.say("drawing")
+            try:
+                for drawn in save_figure(solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + options.pdf]):
+                    saved += f", {drawn}"
+            except CollocError as error:
+                complaints.append(f"no figure: {error}")
+    if not options.json:
+        print(f"  saved {saved}")
+    for complaint in complaints:
+        print(f"colloc: {complaint}", file=sys.stderr)
+    return BAD_PROBLEM if complaints else EXIT[solution.status]
 
 
 def _partial(path: Path) -> Path:
@@ -201,14 +249,18 @@ def _partial(path: Path) -> Path:
     return path.with_name(f"{path.name.removesuffix('.h5').removesuffix('.failed')}.partial.h5")
 
 
-def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool) -> Solution:
+def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse.Namespace, quiet: bool) -> Solution:
     """The solution, from the levels that an interrupted run left if there are any; each level is kept as it ends."""
     from colloc.results.store import load, save
-    from colloc.search.optimise import maximise_efficiency
+    from colloc.search.global_search import STARTS
+    from colloc.search.optimise import best_gait, maximise_efficiency
 
+    # a gait that is given on the command line is to be improved, not left for another
+    starts = options.starts or (1 if options.start else stated.starts or STARTS)
+    source = stated.source
     partial = _partial(path)
     levels: list[Level] = []
-    if partial.exists() and not fresh:
+    if partial.exists() and not options.fresh:
         try:
             before = load(partial)
         except StoreError as error:
@@ -224,7 +276,7 @@ def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool)
     before_levels = tuple(levels)
     try:
         with StatusLine(enabled=not quiet) as line:
-            line.say(f"{problem.name}: building")
+            line.say(f"{problem.name}: " + ("building" if starts == 1 else f"trying {starts} starts"))
 
             def ended(level: Level) -> None:
                 levels.append(level)
@@ -236,7 +288,10 @@ def _solved(problem: Problem, source: str, path: Path, fresh: bool, quiet: bool)
                 what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
                 line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
 
-            solution = maximise_efficiency(problem, ended, before_levels)
+            if options.search == SEARCHES[0]:
+                solution = best_gait(problem, starts, ended, options.seconds, before_levels)
+            else:
+                solution = maximise_efficiency(problem, ended, literal=True)
     except KeyboardInterrupt:
         if not levels:
             raise

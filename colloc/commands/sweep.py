@@ -17,9 +17,10 @@ from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import replace
 from pathlib import Path
 
-from colloc.commands.options import INTERRUPTED, NONE_FOUND, OK, add_printing, exit_code, new_parser
+from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
+from colloc.commands.options import add_printing, new_parser
 from colloc.studies.study import Study, read_study_file
-from colloc.system.errors import ProblemError, StoreError
+from colloc.system.errors import CollocError, ProblemError, StoreError
 
 _SAVE_EVERY = 60.0
 _MOST_FAILURES_SHOWN = 12
@@ -44,9 +45,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
     command = " ".join(["colloc sweep", *(sys.argv[1:] if arguments is None else arguments)])
-    return exit_code(lambda: _study(options, command))
+    return run(_parser(), lambda options: _study(options, command), arguments)
 
 
 def _study(options: argparse.Namespace, command: str) -> int:
@@ -63,18 +63,9 @@ def _executor(options: argparse.Namespace) -> tuple[Callable[[int], Executor] | 
     """What runs the tasks (None: processes), and how many workers it has."""
     if options.dask is None:
         return None, options.workers
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ProblemError("--dask needs the package distributed: pip install 'colloc[dask]'.") from None
-    try:
-        if options.dask == "local":
-            client = Client(n_workers=options.workers, threads_per_worker=1, dashboard_address=None)
-        else:
-            client = Client(options.dask, timeout=20)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise ProblemError(f"no Dask scheduler at {options.dask}: {error}") from None
-    return (lambda n: client.get_executor(pure=False)), max(1, sum(client.nthreads().values()))
+    from colloc.system.dask_pool import connected
+
+    return connected(options.dask, options.workers, lambda text: print(f"colloc: {text}", file=sys.stderr, flush=True))
 
 
 def _run(study: Study, source: str, command: str, options: argparse.Namespace) -> int:
@@ -94,7 +85,11 @@ def _run(study: Study, source: str, command: str, options: argparse.Namespace) -
         run = StudyRun(study, folder, retry=options.retry)
         if not quiet:
             _announce(run, folder)
-        interrupted = _work(run, options, quiet, lambda: _save(run, out, source, command))
+        try:
+            interrupted = _work(run, options, quiet, lambda: _save(run, out, source, command))
+        except CollocError:
+            _save(run, out, source, command)
+            raise
         path = _save(run, out, source, command)
     if options.json:
         print(json.dumps(_summary(run, path)))
@@ -130,7 +125,7 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
                 best = progress.state.best
                 what = f"{best.outcome.efficiency:9.6f}" if best else "     none"
                 tries = Counter(a.outcome.status for a in progress.new)
-                told = ", ".join(f"{n} {status}" for status, n in tries.items()) or "nothing to improve"
+                told = ", ".join(f"{n} {status}" for status, n in tries.items())
                 left = (time.perf_counter() - begin) / progress.done * (progress.total - progress.done)
                 print(
                     f"{cell_text(run.study, progress.cell)}: {what}  ({told}; round {number}: {progress.done} of "
@@ -151,16 +146,13 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
 
 
 def _save(run, out: Path, source: str, command: str) -> Path:
-    from colloc.bounds.optimality_gap import CACHE
-    from colloc.bounds.sampled import known_bound
+    from colloc.bounds.optimality_gap import upper_bound
     from colloc.gaits.problem import Problem
     from colloc.studies.store import save_study
     from colloc.studies.table import study_table
 
-    cache = out / CACHE
-
     def bound(problem: Problem) -> float | None:
-        known = known_bound(problem.body, problem.friction, problem.joint_limit, cache=cache) if cache.exists() else None
+        known = upper_bound(problem, out, compute=False)
         return None if known is None else known.sampled
 
     return save_study(study_table(run, bound), out / f"{run.study.name}.nc", source=source, command=command)
@@ -172,7 +164,14 @@ def _summary(run, path: Path) -> dict:
     counts = Counter(
         "solved" if s.best else NO_PROBLEM if s.problem is None else "no certified gait" for s in run.cells.values()
     )
-    return {"name": run.study.name, "file": str(path), "cells": len(run.cells), "counts": dict(counts)}
+    below = [run.study.coordinates(cell) for cell in run.cells if run.below_neighbour(cell)]
+    return {
+        "name": run.study.name,
+        "file": str(path),
+        "cells": len(run.cells),
+        "counts": dict(counts),
+        "below_neighbour": below,
+    }
 
 
 def _summary_lines(run, path: Path) -> list[str]:
@@ -180,6 +179,12 @@ def _summary_lines(run, path: Path) -> list[str]:
 
     counts = ", ".join(f"{n} {what}" for what, n in _summary(run, path)["counts"].items())
     lines = [f"{run.study.name}: {len(run.cells)} cells: {counts}; saved {path}"]
+    below = [cell for cell in run.cells if run.below_neighbour(cell)]
+    if below:
+        lines.append(f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more starts may find more")
+    for cell in below[:_MOST_FAILURES_SHOWN]:
+        found, could = run.cells[cell].best.outcome.efficiency, run.neighbour_efficiency(cell)
+        lines.append(f"  {cell_text(run.study, cell)}: {found:.6f}, where a neighbour's gait achieves {could:.6f}")
     failed = [(cell, state) for cell, state in run.cells.items() if not state.best]
     for cell, state in failed[:_MOST_FAILURES_SHOWN]:
         message = state.attempts[-1].outcome.message if state.attempts else state.message or "not tried yet"

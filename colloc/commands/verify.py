@@ -13,9 +13,11 @@ import json
 import sys
 from collections.abc import Sequence
 
-from colloc.commands.options import FAILED, OK, add_printing, add_result, exit_code, new_parser
+from colloc.commands.ending import FAILED, OK, run
+from colloc.commands.options import add_printing, add_result, new_parser
 from colloc.results.certificate import certify
-from colloc.results.solution import Certificate, Solution
+from colloc.results.checks import Certificate
+from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
@@ -40,9 +42,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def disagreement(recorded: Certificate | None, now: Certificate) -> str:
+def disagreement(recorded: Certificate, now: Certificate) -> str:
     """A sentence if the certificate in a file is not what a new one says; empty if they agree."""
-    if recorded is None:
+    if not recorded.replayed:
         return "the file holds no certificate."
     allowed = _AGREEMENT * (recorded.efficiency_error + now.efficiency_error) + 1e-9
     difference = now.efficiency - recorded.efficiency
@@ -61,16 +63,14 @@ def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
     ProblemError
         If there is nothing to check.
     """
-    if not solution.levels:
-        raise ProblemError("the file holds no gait: its solve failed before the first level.")
-    before = solution.certificate.instants if solution.certificate is not None else 1600
+    solution.last  # noqa: B018  raises
+    before = solution.certificate.instants or 1600
     return certify(solution, tolerance=tolerance, instants=2 * (3 * before // 8) + 2)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: _verify(options))
+    return run(_parser(), _verify, arguments)
 
 
 def _verify(options: argparse.Namespace) -> int:
@@ -84,8 +84,17 @@ def _verify(options: argparse.Namespace) -> int:
     good = certificate.passed and not complaint and solution.status == "solved"
     if options.json:
         checks = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks}
-        keys = ("efficiency", "efficiency_error", "efficiency_at_zero_delta", "distance", "work", "instants")
+        keys = (
+            "efficiency",
+            "efficiency_error",
+            "efficiency_at_zero_delta",
+            "error_at_zero_delta",
+            "distance",
+            "work",
+            "instants",
+        )
         facts = {"file": options.result, "name": solution.problem.name, "certified": good, "complaint": complaint}
+        facts["changed"] = solution.changed
         print(json.dumps({**facts, **{key: getattr(certificate, key) for key in keys}, "checks": checks}))
         return OK if good else FAILED
     print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
@@ -93,11 +102,13 @@ def _verify(options: argparse.Namespace) -> int:
         f"  efficiency d/W  {certificate.efficiency:.8f} +- {certificate.efficiency_error:.0e} by replay "
         f"({certificate.instants} instants)"
     )
-    if solution.certificate is not None:
+    if solution.certificate.replayed:
         recorded = solution.certificate
         print(f"  in the file     {recorded.efficiency:.8f} +- {recorded.efficiency_error:.0e} ({recorded.instants} instants)")
     if not options.quiet:
         print("\n".join(f"  {check.line()}" for check in certificate.checks))
+    if solution.changed:
+        print("  the file was changed after colloc wrote it; what is said here is of the file as it is now")
     if complaint:
         print(f"  {complaint}")
     if solution.status != "solved" and certificate.passed:

@@ -57,6 +57,11 @@ class Fourier:
         return 1.0
 
     @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: radians of phase per period."""
+        return 2 * np.pi
+
+    @property
     def n_harmonic(self) -> int:
         return self.cos.shape[1]
 
@@ -114,6 +119,10 @@ class Harmonic:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
 
+    def intervals(self, n_joint: int) -> int:
+        """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
+        return round(self.fraction * (30 + 10 * self.harmonics))
+
     def describe(self) -> str:
         """The class in words, for reports."""
         return f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}, symmetry {self.symmetry}"
@@ -163,11 +172,13 @@ class Harmonic:
 
     def angle_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
         """``(n_time, n_joint, n_parameter)``: joint angles at phases t per parameter."""
-        return self._sampled(t, n_joint, Fourier.angles)
+        k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
+        return self._combined(np.ones((1, t.size)), np.cos(k * t), np.sin(k * t), n_joint)
 
     def rate_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
         """``(n_time, n_joint, n_parameter)``: joint rates per period at phases t per parameter."""
-        return self._sampled(t, n_joint, Fourier.rates)
+        k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
+        return self._combined(np.zeros((1, t.size)), -k * np.sin(k * t), k * np.cos(k * t), n_joint)
 
     def mean_square_rate(self, n_joint: int) -> np.ndarray:
         """``(n_parameter, n_parameter)``: the mean square shape speed per period as a quadratic form of the parameters."""
@@ -175,9 +186,21 @@ class Harmonic:
         rates = self.rate_matrix(np.arange(n_time) / n_time, n_joint)
         return np.einsum("tjp,tjq->pq", rates, rates) / n_time
 
-    def _sampled(self, t: np.ndarray, n_joint: int, method) -> np.ndarray:
-        size = self.size(n_joint)
-        return np.stack([method(self.fourier(row, n_joint), t).T for row in np.eye(size)], axis=-1)
+    def enclosed_area(self, n_joint: int) -> np.ndarray:
+        """``(n_parameter, n_parameter)``: the area ``integral of sum_(i<j) (q_i dq_j - q_j dq_i) / 2`` that a path encloses in
+        the planes of its joints [rad^2], as a quadratic form of the parameters; 0 for retraced paths."""
+        n_time = 4 * self.harmonics + 4
+        t = np.arange(n_time) / n_time
+        angles, rates = self.angle_matrix(t, n_joint), self.rate_matrix(t, n_joint)
+        sign = np.triu(np.ones((n_joint, n_joint)), 1)
+        form = 0.5 * np.einsum("tip,ij,tjq->pq", angles, sign - sign.T, rates) / n_time
+        return 0.5 * (form + form.T)
+
+    def _combined(self, constant: np.ndarray, cos: np.ndarray, sin: np.ndarray, n_joint: int) -> np.ndarray:
+        waves = np.empty((2 * self.harmonics + 1, constant.shape[1]))
+        waves[:1], waves[1::2], waves[2::2] = constant, cos, sin
+        basis = self._basis(n_joint).reshape(n_joint, waves.shape[0], -1)
+        return np.einsum("wt,jwp->tjp", waves, basis)
 
 
 def shifted(gait: Fourier, phase: float) -> Fourier:

@@ -18,6 +18,9 @@ from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, SYMMETRIES, fraction
 from colloc.system.errors import ProblemError
 
+_ARCS, _PARAMETERS = 120, 250
+"""Arcs of a free path over a period, and at most so many parameters in them all."""
+
 
 def _check_symmetry(symmetry: object) -> None:
     if symmetry not in SYMMETRIES:
@@ -57,6 +60,11 @@ class FreePath:
     def fraction(self) -> float:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
+
+    def intervals(self, n_joint: int) -> int:
+        """Intervals that a first mesh wants, each of which is an arc: as many as a dense search can take."""
+        per_arc = 1 if n_joint == 2 else n_joint
+        return round(self.fraction * min(_ARCS, _PARAMETERS / per_arc))
 
     def describe(self) -> str:
         """The class in words, for reports."""
@@ -123,6 +131,10 @@ class Polygon:
     def fraction(self) -> float:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
+
+    def intervals(self, n_joint: int) -> int:
+        """Intervals that a first mesh wants: some on every side."""
+        return max(24, 4 * self.pieces)
 
     def describe(self) -> str:
         """The class in words, for reports."""

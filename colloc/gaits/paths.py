@@ -80,6 +80,11 @@ class ArcPath:
         """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
         return self.length
 
+    @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
+        return self.length
+
     def _at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)[k]
@@ -166,6 +171,11 @@ class Corners:
     @property
     def delta_unit(self) -> float:
         """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
+        return self.length
+
+    @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
         return self.length
 
     @property

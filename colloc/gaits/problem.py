@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait_fields import CLASSES, GAITS, AnyClass, AnyGait, class_from, fields, gait_from
+from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
@@ -20,8 +21,13 @@ from colloc.numerics.schemes import scheme
 from colloc.system.errors import ProblemError
 
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
-CONDENSED, MAP, LIFTED = "condensed", "map", "lifted"
-FORMULATIONS = (CONDENSED, MAP, LIFTED)
+FULL, IMPLICIT = "full", "implicit velocity"
+FORMULATIONS = (FULL, IMPLICIT)
+_PATH_CLASSES = (FreePath, Polygon)
+SMALLEST_DELTA = 1e-14
+"""Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
+LONGEST_NAME = 200
+"""File systems allow 255 bytes, and results of a problem add endings to its name."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
@@ -55,9 +61,10 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``.
-    guess : Fourier, ArcPath or Corners
-        An admissible gait to start from, of any class; it is projected onto the class `gait`.
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200.
+    guess : Fourier, ArcPath or Corners, optional
+        An admissible gait to start from, of any class; it is projected onto the class `gait`. By default a travelling wave
+        (`colloc.gaits.guesses`).
     body : Chain
     friction : Friction
     gait : Harmonic, FreePath or Polygon
@@ -74,17 +81,18 @@ class Problem:
         2 pi. It keeps the search away from gaits
         whose speeds sink to delta, where regularised friction is viscous and efficiency meaningless.
     intervals : int
-        Mesh intervals on the part of the period that is solved.
+        Intervals of the first mesh, on the part of the period that is solved; by default as many as the class asks for.
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
-    formulation : {"condensed", "map", "lifted"}
-        How the balance becomes constraints, see `collocation.point_equations`; "condensed" eliminates them, see `collocation.reduced_space`.
+    formulation : {"full", "implicit velocity"}
+        The nonlinear program whose solution is the answer, see `collocation.point_equations`: with tail velocities and link
+        forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     """
 
     name: str
-    guess: AnyGait
+    guess: AnyGait = None
     body: Chain = Chain()
     friction: Friction = Friction()
     gait: AnyClass = Harmonic()
@@ -92,12 +100,14 @@ class Problem:
     delta_start: float = None  # type: ignore[assignment]
     joint_limit: float = float(np.pi)
     smallest_shape_speed: float = 0.1
-    intervals: int = 30
+    intervals: int = None  # type: ignore[assignment]
     scheme: str = "gauss-3"
-    formulation: str = CONDENSED
+    formulation: str = FULL
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
+        if self.guess is None and isinstance(self.body, Chain):
+            object.__setattr__(self, "guess", travelling_wave(self.body, self.joint_limit))
         self._check_types()
         self._check_numbers()
         self._check_symmetry()
@@ -106,6 +116,10 @@ class Problem:
     def _check_types(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        if len(self.name) > LONGEST_NAME:
+            raise ProblemError(
+                f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
+            )
         for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
             if not isinstance(getattr(self, field), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)
@@ -114,17 +128,24 @@ class Problem:
     @property
     def has_path(self) -> bool:
         """Whether the class bounds the path itself (free paths, polygons) rather than its harmonics."""
-        return isinstance(self.gait, (FreePath, Polygon))
+        return isinstance(self.gait, _PATH_CLASSES)
 
     def _check_numbers(self) -> None:
         if self.delta_start is None:
             object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
+        if self.intervals is None:
+            object.__setattr__(self, "intervals", self.gait.intervals(self.body.n_joint))
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
         if self.delta <= 0:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
+        if self.delta < SMALLEST_DELTA:
+            raise ProblemError(
+                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that order are lost in rounding. "
+                "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
+            )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
         if not 0 < self.joint_limit <= np.pi + 1e-12:
@@ -147,8 +168,6 @@ class Problem:
             per_interval = collocation.s - collocation.left
             fewest, what = max(2, -(-4 * self.gait.harmonics // per_interval)), f"{self.gait.harmonics} harmonics"
         else:
-            if self.formulation == LIFTED:
-                raise ProblemError(f"the class {kind} has no formulation {LIFTED!r}: its balance is always eliminated.")
             if collocation.left:
                 raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
             fewest, what = (2 * self.gait.pieces, "the sides") if isinstance(self.gait, Polygon) else (4, "a path")
@@ -231,6 +250,7 @@ class Problem:
             stated["body"] = Chain(tuple(stated["body"]["lengths"]))
             stated["friction"] = Friction(**stated["friction"])
             stated["gait"] = class_from(stated["gait"])
+            stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
             return cls(**stated)
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
@@ -238,8 +258,16 @@ class Problem:
     @property
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
-        text = json.dumps(self.to_dict(), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return statement_hash(self.to_dict())
+
+
+_EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
+"""What earlier files call the formulations; those of paths name none."""
+
+
+def statement_hash(stated: dict) -> str:
+    """SHA-256 of what `Problem.to_dict` gave."""
+    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
 
 
 _NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

@@ -10,6 +10,8 @@ from pathlib import Path
 from colloc.gaits.problem import Problem, Reference
 from colloc.system.errors import ProblemError
 
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
 
 @dataclass(frozen=True)
 class ProblemFile:
@@ -21,11 +23,14 @@ class ProblemFile:
     reference : Reference or None
     source : str
         Its text.
+    starts : int or None
+        ``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess leads to.
     """
 
     problem: Problem
     reference: Reference | None
     source: str
+    starts: int | None = None
 
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
@@ -44,7 +49,10 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
         raise ProblemError(f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}.")
     if reference is not None and not isinstance(reference, Reference):
         raise ProblemError(f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}.")
-    return ProblemFile(problem, reference, source)
+    starts = names.get("STARTS")
+    if starts is not None and (isinstance(starts, bool) or not isinstance(starts, int) or starts < 1):
+        raise ProblemError(f"{path}: STARTS must be a whole number of at least 1, not {starts!r}.")
+    return ProblemFile(problem, reference, source, starts)
 
 
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
@@ -56,20 +64,31 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
         As for `read_problem_file`.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # Path.is_file raises for a name that is too long
         raise ProblemError(f"there is no {kind} file {path}.")
     try:
-        source = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProblemError(f"cannot read {path} as Python text: {error}.") from None
+        content = path.read_bytes()
+    except OSError as error:
+        raise ProblemError(f"cannot read {path}: {error.strerror or error}.") from None
+    if content.startswith(_HDF5):
+        raise ProblemError(
+            f"{path} is a results file (HDF5), not a {kind} file in Python; colloc report or verify reads it, and colloc solve "
+            f"MINE.py --start {path} begins with its gait."
+        )
+    try:
+        source = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ProblemError(f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file.") from None
     names: dict[str, object] = {"__name__": f"colloc_{kind}", "__file__": str(path)}
     try:
         exec(compile(source, str(path), "exec"), names)
     except SyntaxError as error:
         raise ProblemError(f"{path}, line {error.lineno}: {error.msg}.") from None
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
         where = f", line {lines[-1]}" if lines else ""
         what = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"
+        if isinstance(error, SystemExit):
+            what = f"the file ends the program ({what}); it should only state {kind.upper()}."
         raise ProblemError(f"{path}{where}: {what}") from None
     return path, names, source

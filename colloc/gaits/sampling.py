@@ -15,8 +15,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
-from colloc.mechanics.contact import crossing_depth
+from colloc.mechanics.contact import SAFE, crossing_depth, largest_factor
 from colloc.system.errors import ProblemError
 
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
@@ -26,9 +25,7 @@ BLOCK = 25
 PATH_SEED_HARMONICS = 2
 _FRACTIONS = (0.2, 0.95)
 _PHASES = 200
-_BISECTIONS = 40
 _ATTEMPTS = 200
-_SAFE = 1 - 1e-3
 _CLEARLY_MOVING = 1.5
 _ON_FLOOR = 1e-4
 
@@ -36,27 +33,12 @@ _ON_FLOOR = 1e-4
 def is_admissible(problem: Problem, gait: Fourier) -> bool:
     """Whether a gait keeps clear of its joint limits and its links apart, at phases spread over the period."""
     angles = gait.angles(np.arange(_PHASES) / _PHASES)
-    return bool(np.abs(angles).max() <= problem.joint_limit * _SAFE) and not crossing_depth(problem.body, angles / _SAFE).any()
+    return bool(np.abs(angles).max() <= problem.joint_limit * SAFE) and not crossing_depth(problem.body, angles / SAFE).any()
 
 
 def largest_amplitude(problem: Problem, gait: Fourier) -> float:
     """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for the straight body."""
     return largest_factor(problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES))
-
-
-def largest_factor(body: Chain, joint_limit: float, angles: np.ndarray) -> float:
-    """The largest factor by which shapes ``(n_joint, n)`` can be multiplied and stay admissible; inf for straight ones."""
-    peak = np.abs(angles).max()
-    if peak == 0:
-        return np.inf
-    low, high = 0.0, joint_limit / peak
-    if not crossing_depth(body, high * angles).any():
-        return high * _SAFE
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        crossing = bool(crossing_depth(body, middle * angles).any())
-        low, high = (low, middle) if crossing else (middle, high)
-    return low * _SAFE
 
 
 def shape_speed(gait: Fourier) -> float:

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
-from colloc.mechanics.friction import Friction, LinkForce, link_force, link_force_jacobian, link_moments, power
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import LinkForce, link_force, link_force_jacobian, link_moments, power
 from colloc.numerics.arrays import Array, namespace
 
 

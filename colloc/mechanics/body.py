@@ -63,6 +63,11 @@ class Chain:
             raise ProblemError(f"body.lengths must add up to the body length 1, not {sum(lengths):.12g}.")
 
     @property
+    def in_series(self) -> bool:
+        """Every link hangs on the one before it, as the compiled kernel takes for granted; a tree of links says no."""
+        return True
+
+    @property
     def n_link(self) -> int:
         return len(self.lengths)
 
@@ -89,6 +94,10 @@ class Chain:
         full = np.tril(np.ones((self.n_link, self.n_link)), -1) + 0.5 * np.eye(self.n_link)
         return full if reference is TAIL else full - full[reference]
 
+    def weighted_path(self, reference: int | None) -> np.ndarray:
+        """``(n_link, n_link)``: directions of links to midpoints, relative to the reference point."""
+        return self._path(reference) * self.lengths
+
     def tangent_angles(self, angles: Array) -> Array:
         """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles ``(n_joint, n_time)``."""
         return namespace(angles).matmul(self._joint_sum(TAIL), angles)
@@ -98,16 +107,16 @@ class Chain:
         xp = namespace(angles)
         phi = self.tangent_angles(angles)
         cos, sin = xp.cos(phi), xp.sin(phi)
-        path, length = self._path(reference), self.length_column()
-        return Posture(cos, sin, xp.matmul(path * length.T, cos), xp.matmul(path * length.T, sin))
+        path = self.weighted_path(reference)
+        return Posture(cos, sin, xp.matmul(path, cos), xp.matmul(path, sin))
 
     def velocity(self, posture: Posture, rates: Array, z: Array, reference: int | None = TAIL) -> LinkVelocity:
         """Link velocities (paper, eq. dtz0) for joint rates ``(n_joint, n_time)`` and rigid velocity z ``(3, n_time)``."""
         xp = namespace(rates, z, posture.cos)
-        weighted_path = self._path(reference) * self.length_column().T
+        path = self.weighted_path(reference)
         w = xp.matmul(self._joint_sum(reference), rates) + z[2:3, :]
-        vx = z[0:1, :] - xp.matmul(weighted_path, w * posture.sin)
-        vy = z[1:2, :] + xp.matmul(weighted_path, w * posture.cos)
+        vx = z[0:1, :] - xp.matmul(path, w * posture.sin)
+        vy = z[1:2, :] + xp.matmul(path, w * posture.cos)
         return LinkVelocity(vx * posture.cos + vy * posture.sin, vy * posture.cos - vx * posture.sin, w)
 
     def tail_velocity(self, posture: Posture, rates: np.ndarray, z: np.ndarray, reference: int | None) -> np.ndarray:

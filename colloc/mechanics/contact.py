@@ -206,3 +206,23 @@ def _end_distances(ends: np.ndarray, i: int, j: int) -> tuple[list[np.ndarray], 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[1] - a[1] * b[0]
+
+
+SAFE = 1 - 1e-3
+"""Shapes as large as may be are scaled by this, to be clearly admissible."""
+_BISECTIONS = 40
+
+
+def largest_factor(body: Chain, joint_limit: float, angles: np.ndarray) -> float:
+    """The largest factor by which shapes ``(n_joint, n)`` can be multiplied and stay admissible; inf for straight ones."""
+    peak = np.abs(angles).max()
+    if peak == 0:
+        return np.inf
+    low, high = 0.0, joint_limit / peak
+    if not crossing_depth(body, high * angles).any():
+        return high * SAFE
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        crossing = bool(crossing_depth(body, middle * angles).any())
+        low, high = (low, middle) if crossing else (middle, high)
+    return low * SAFE

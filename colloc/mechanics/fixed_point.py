@@ -1,4 +1,4 @@
-"""NumPy solver of the balance, batched over instants: tail velocities from shape and shape rates. No CasADi.
+"""Solver of the balance, batched over instants: tail velocities from shape and shape rates. No CasADi.
 
 Isotropic friction is the gradient of a strictly convex, coercive dissipation potential, so Armijo-damped Newton on that
 potential converges from any start. Unequal coefficients have no potential; there Newton steps are taken while they
@@ -8,6 +8,8 @@ reweighted least squares) is the safeguard when a Newton step fails.
 Velocities are solved for at the midpoint of the slowest link, the *anchor*: a link at stick moves at speeds of order
 delta, which the tail velocity could only represent to 1e-16 in absolute terms. So forces stay accurate down to
 delta = 1e-14.
+
+The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.native_kernel`) takes the same ones.
 """
 
 from __future__ import annotations
@@ -18,8 +20,11 @@ import numpy as np
 
 from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
 from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
+from colloc.mechanics.compiled_balance import balance
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
-from colloc.mechanics.friction import Friction, link_dissipation
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_dissipation
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.system.errors import NotConvergedError, ProblemError
 
 
@@ -177,19 +182,39 @@ def solve_balance(
         raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
     if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
         raise ProblemError("angles and rates must be finite.")
-    z = np.zeros((3, n_time))
     if start is not None:
-        z = _real("start", start)
-        if z.shape != (3, n_time) or not np.isfinite(z).all():
+        start = _real("start", start)
+        if start.shape != (3, n_time) or not np.isfinite(start).all():
             raise ProblemError(f"start must be finite with shape (3, {n_time}).")
+    arguments = (body, friction, angles, rates, float(delta), start, float(tolerance), int(max_iterations), method)
+    library = native_kernel(body)
+    solved = _numpy_balance(*arguments) if library is None else balance(library, *arguments)
+    z, residual, iterations, anchor, velocity = solved
+    return BalanceSolution(z, residual, iterations, residual <= tolerance, anchor, velocity)
 
+
+def _numpy_balance(
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    start: np.ndarray | None,
+    tolerance: float,
+    max_iterations: int,
+    method: str,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Arguments and results as those of `colloc.mechanics.compiled_balance.balance`, which it is the reference of."""
+    n_time = angles.shape[1]
     # work in units of the largest rate: the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
     speed[speed == 0] = 1.0
     scaled_rates, scaled_delta = rates / speed, relative_delta(delta, speed)
-    tail = _Batch(body, friction, angles, scaled_rates, TAIL)
     anchor = np.full(n_time, body.n_link // 2)
-    velocity = np.zeros((3, n_time)) if start is None else tail.rereferenced(z / speed, scaled_delta, anchor)
+    velocity = np.zeros((3, n_time))
+    if start is not None:
+        tail = _Batch(body, friction, angles, scaled_rates, TAIL)
+        velocity = tail.rereferenced(start / speed, scaled_delta, anchor)
     state = starting_state(anchor, velocity)
 
     def batch(members: np.ndarray, link: int) -> _Batch:
@@ -202,11 +227,4 @@ def solve_balance(
         chosen = np.flatnonzero(state.anchor == link)
         posture = body.posture(angles[:, chosen], int(link))
         tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], int(link))
-    return BalanceSolution(
-        tail_z * speed,
-        state.residual,
-        state.iterations,
-        state.residual <= tolerance,
-        state.anchor,
-        state.velocity * speed,
-    )
+    return tail_z * speed, state.residual, state.iterations, state.anchor, state.velocity * speed

@@ -19,8 +19,6 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.numerics.machine_code import machine_code
-
 
 @dataclass(frozen=True, eq=False)
 class LocalFunction:
@@ -62,7 +60,7 @@ def _packed(
         ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))], options),
         ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))], options),
     )
-    value, jac, hess = machine_code(functions)
+    value, jac, hess = functions
     return LocalFunction(
         local.shape[0],
         out.shape[0],
@@ -169,6 +167,11 @@ def _dm(matrix: sparse.spmatrix) -> ca.DM:
     coo.sort_indices()
     pattern = ca.Sparsity(coo.shape[0], coo.shape[1], coo.indptr.tolist(), coo.indices.tolist())
     return ca.DM(pattern, coo.data.tolist())
+
+
+def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
+    """A CasADi matrix as a SciPy one."""
+    return sparse.csc_matrix((matrix.nonzeros(), matrix.row(), matrix.colind()), shape=matrix.shape).tocsr()
 
 
 @dataclass(frozen=True, eq=False)

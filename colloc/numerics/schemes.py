@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -41,6 +42,8 @@ class Scheme:
     def __post_init__(self) -> None:
         object.__setattr__(self, "A", self.integrals(self.c))
         object.__setattr__(self, "b", self.integrals(np.ones(1))[0])
+        for table in (self.c, self.A, self.b):  # all who ask for a scheme share it
+            table.flags.writeable = False
 
     @property
     def s(self) -> int:
@@ -70,14 +73,20 @@ class Scheme:
     def integrals(self, tau: np.ndarray) -> np.ndarray:
         """Integrals of the Lagrange polynomials from 0 to tau ``(k,)``, as ``(k, s)``."""
         tau = np.asarray(tau, dtype=float)
-        nodes, weights = np.polynomial.legendre.leggauss(self.s)
+        nodes, weights = _gauss_rule(self.s)
         points = 0.5 * tau[:, None] * (nodes + 1.0)
         values = self.lagrange(points.ravel()).reshape(tau.size, self.s, self.s)
         return 0.5 * tau[:, None] * np.einsum("q,kqj->kj", weights, values)
 
 
+@lru_cache
+def _gauss_rule(s: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights on [-1, 1]."""
+    return np.polynomial.legendre.leggauss(s)
+
+
 def _gauss_nodes(s: int) -> np.ndarray:
-    return 0.5 * (np.polynomial.legendre.leggauss(s)[0] + 1.0)
+    return 0.5 * (_gauss_rule(s)[0] + 1.0)
 
 
 def _radau_nodes(s: int) -> np.ndarray:
@@ -97,14 +106,22 @@ def scheme(name: str) -> Scheme:
     ProblemError
         For any other name.
     """
+    known = _known(name) if isinstance(name, str) else None
+    if known is None:
+        raise ProblemError(
+            f"unknown scheme {name!r}; choose trapezoid, hermite-simpson, gauss-N or radau-N with N from 1 to {_LARGEST}."
+        )
+    return known
+
+
+@lru_cache
+def _known(name: str) -> Scheme | None:
     if name == "trapezoid":
         return Scheme(name, np.array([0.0, 1.0]), 2)
     if name == "hermite-simpson":
         return Scheme(name, np.array([0.0, 0.5, 1.0]), 4)
-    match = re.fullmatch(r"(gauss|radau)-(\d{1,3})", name) if isinstance(name, str) else None
+    match = re.fullmatch(r"(gauss|radau)-(\d{1,3})", name)
     if match and 1 <= int(match[2]) <= _LARGEST:
         s = int(match[2])
         return Scheme(name, _gauss_nodes(s), 2 * s) if match[1] == "gauss" else Scheme(name, _radau_nodes(s), 2 * s - 1)
-    raise ProblemError(
-        f"unknown scheme {name!r}; choose trapezoid, hermite-simpson, gauss-N or radau-N with N from 1 to {_LARGEST}."
-    )
+    return None

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from colloc.pictures.figure import GREY, ORANGE, RED, SKY, STYLE, draw_shape_path
+from colloc.pictures.figure import draw_shape_path
 from colloc.pictures.motion_frames import Frames, frames
+from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
 
 _ARROW = 0.12
@@ -35,7 +35,7 @@ def pictures(solution: Solution, count: int, periods: int, *, arrows: bool = Tru
         Pixels, even.
     """
     shown = frames(solution, count + 1, periods=periods)
-    with matplotlib.rc_context(STYLE):
+    with styled():
         scene = _Scene(solution, shown, arrows, width)
         for k in range(shown.periods * count):
             yield scene.picture(*divmod(k, count))
@@ -53,6 +53,7 @@ class _Scene:
         tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
         height = 2 * round((tall + 0.13 * width) / 2)
         figure = Figure(figsize=(width / 100, height / 100), dpi=100)
+        figure.set_layout_engine("none")
         self.canvas = FigureCanvasAgg(figure)
         self.size = (height, width)
         axes = figure.add_axes((0.015, 0.03, share, tall / height))
@@ -65,16 +66,15 @@ class _Scene:
         axes.grid(color="#e8ecef", lw=0.8)
         axes.tick_params(length=0, labelbottom=False, labelleft=False)
         axes.spines[:].set_visible(False)
-        certificate = solution.certificate
-        value = certificate.efficiency if certificate is not None else solution.efficiency
         verdict = "" if solution.status == "solved" else f"  ({solution.status})"
-        figure.text(0.015, 0.93, f"{solution.problem.name}   efficiency {value:.4f}{verdict}", fontsize=11, weight="bold")
+        title = f"{solution.problem.name}   efficiency {solution.measured.efficiency:.4f}{verdict}"
+        figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
         self.phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
-        self.trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, RED)]
-        (self.body,) = axes.plot([], [], "-", color="#1d2329", lw=4, solid_capstyle="round", solid_joinstyle="round")
-        (self.joints,) = axes.plot([], [], "o", color="white", mec="#1d2329", ms=5)
-        (self.head,) = axes.plot([], [], "o", color="#1d2329", ms=9)
-        (self.centre,) = axes.plot([], [], "o", color=RED, ms=5)
+        self.trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, VERMILION)]
+        (self.body,) = axes.plot([], [], "-", color=INK, lw=4, solid_capstyle="round", solid_joinstyle="round")
+        (self.joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
+        (self.head,) = axes.plot([], [], "o", color=INK, ms=9)
+        (self.centre,) = axes.plot([], [], "o", color=VERMILION, ms=5)
         self.quiver: Any = None
         if arrows:
             base = shown.arrow_base[:, :, 0]
@@ -82,7 +82,7 @@ class _Scene:
             self.quiver = axes.quiver(
                 *base,
                 *base,
-                color=RED,
+                color=VERMILION,
                 angles="xy",
                 scale_units="xy",
                 scale=1,
@@ -95,8 +95,8 @@ class _Scene:
         self.dot = None
         if planar:
             plane = figure.add_axes((0.755, 0.2, 0.235, 0.62))
-            draw_shape_path(plane, solution.problem, shown.angles, legend=False)
-            (self.dot,) = plane.plot([], [], "o", color=RED, mec="white", ms=8, zorder=5)
+            draw_shape_path(plane, solution.problem, shown.angles)
+            (self.dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
 
     def picture(self, period: int, k: int) -> np.ndarray:
         """The image at column k of a period."""

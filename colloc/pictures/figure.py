@@ -1,128 +1,155 @@
-"""Figures of a solution. The only modules that name matplotlib are called figures."""
+"""Panels about a solution, and the figure of them all. Titles are left to who places a panel."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.pictures.motion_frames import link_ends
-from colloc.results.solution import Solution
+from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours, styled
+from colloc.results.solution import SOLVED, Solution
 
-BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#777777"
-"""Okabe-Ito colours, distinguishable with any colour vision."""
-
-STYLE: Any = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "legend.frameon": False,
-    "pdf.fonttype": 42,
-    "savefig.dpi": 160,
-}
+_GAP, _NARROWEST = 0.12, 0.3
+"""Between snapshots, and the room for the words below one [body lengths]."""
+_SMALL = 1.6
+"""Extent [rad] below which a path in shape space is shown from closer than the whole plane."""
+_MOST_PERIODS = 3
+_EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
-    """The body over one period at equal time steps, side by side; below, how far its centre of mass has come."""
+    """The body at equal steps of a period, side by side and apart; below, the phase and how far its centre has come."""
     t = np.linspace(0.0, 1.0, count)
     motion = solution.sample(t)
-    ends = link_ends(solution.problem.body, motion.angles, motion.theta, motion.tail) - motion.centre[:, None, :]
-    spacing = 1.2 * max(float(np.ptp(ends[0], axis=0).max()), 0.35)
-    low = float(ends[1].min() + min(motion.centre[1].min(), 0.0)) - 0.16
-    colours = matplotlib.colormaps["cividis_r"](np.linspace(0.15, 1.0, count))
-    for k in range(count):
-        x = ends[0, :, k] + k * spacing
-        y = ends[1, :, k] + motion.centre[1, k]
-        axes.plot(x, y, "-", color=colours[k], lw=2.4, solid_capstyle="round")
-        axes.plot(x[1:-1], y[1:-1], "o", color="white", mec=colours[k], ms=3.5)
-        axes.plot(x[-1:], y[-1:], "o", color=colours[k], ms=5)
-        axes.plot(k * spacing, motion.centre[1, k], "+", color=RED, ms=6)
-        axes.text(k * spacing, low + 0.09, f"{t[k]:.1f}", ha="center", va="top", fontsize=7, color=GREY)
-    scale = (count - 1) * spacing / max(abs(motion.centre[0, -1]), 1e-12)
-    axes.plot([0, (count - 1) * spacing], [low, low], color=GREY, lw=0.8)
-    axes.plot(scale * motion.centre[0], np.full(count, low), "|", color=RED, ms=9)
-    axes.text(0, low - 0.03, "centre at x = 0", fontsize=7, va="top", ha="left", color=RED)
-    axes.text(
-        (count - 1) * spacing, low - 0.03, f"x = d = {solution.distance:.4f}", fontsize=7, va="top", ha="right", color=RED
-    )
-    axes.set_aspect("equal")
+    x, y = link_ends(solution.problem.body, motion.angles, motion.theta, motion.tail)
+    width = np.ptp(x, axis=0)
+    room = np.maximum(width, _NARROWEST) + _GAP
+    middle = np.cumsum(room) - 0.5 * room
+    shift = middle - 0.5 * (x.min(axis=0) + x.max(axis=0))
+    low = float(y.min()) - 0.04
+    for k, colour in enumerate(snapshot_colours(count)):
+        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour)
+        axes.plot(motion.centre[0, k] + shift[k], motion.centre[1, k], "+", color=VERMILION, ms=6)
+        below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
+        axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, 0), color=GREY, **below)
+        axes.annotate(f"{motion.centre[0, k]:.2f}".replace("-", "−"), (middle[k], low), (0, -10), color=VERMILION, **below)
+    axes.set(xlim=(0, float(room.sum())), ylim=(low, float(y.max()) + 0.04), aspect="equal")
     axes.set_axis_off()
 
 
+def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray) -> None:
+    """One body from the ends of its links, ``(2, n_link + 1)``: its joints hollow, its head a disc."""
+    axes.plot(*ends, "-", color=colour, lw=2.4, solid_capstyle="round", solid_joinstyle="round")
+    axes.plot(*ends[:, 1:-1], "o", color="white", mec=colour, ms=3.5)
+    axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
+
+
 def draw_lab(axes: Axes, solution: Solution) -> None:
-    """The body in the lab at the ends of a period, with the paths of its ends and its centre of mass."""
-    fine = solution.sample(np.linspace(0.0, 1.0, 601))
+    """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of them, apart.
+
+    As many periods as it takes for the body to leave the place where it began, and one body if that takes too many.
+    """
+    start = solution.sample(0.0)
+    begin = link_ends(solution.problem.body, start.angles, start.theta, start.tail)[:, :, 0]
+    step = solution.sample(1.0).centre[:, 0] - start.centre[:, 0]
+    distance = float(np.hypot(*step))
+    needed = 1.05 * float(np.ptp(step @ begin)) / max(distance**2, 1e-300)
+    apart = needed <= _MOST_PERIODS
+    periods = max(1, int(np.ceil(needed))) if apart else 1
+    fine = solution.sample(np.linspace(0.0, periods, 600 * periods + 1))
     ends = link_ends(solution.problem.body, fine.angles, fine.theta, fine.tail)
-    axes.plot(*ends[:, 0], color=BLUE, lw=0.9, label="tail")
-    axes.plot(*ends[:, -1], color=ORANGE, lw=0.9, label="head")
-    axes.plot(*fine.centre, color=RED, lw=1.2, label="centre of mass")
-    for k, shade in ((0, "#b0b0b0"), (-1, "black")):
-        axes.plot(*ends[:, :, k], "-", color=shade, lw=2.4, solid_capstyle="round")
-        axes.plot(*ends[:, -1:, k], "o", color=shade, ms=5)
-        axes.plot(*fine.centre[:, [k]], "+", color=RED, ms=7)
+    for path, colour, name in ((ends[:, 0], BLUE, "tail"), (ends[:, -1], ORANGE, "head"), (fine.centre, VERMILION, "centre")):
+        axes.plot(*path, color=colour, lw=1.1, label=name)
+    for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
+        draw_body(axes, ends[:, :, k], shade)
+        axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
-    axes.set(xlabel="x  [body length]", ylabel="y  [body length]")
-    axes.legend(loc="upper right", fontsize=7, handlelength=1.2)
+    axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]")
+    _key(axes)
+
+
+def forbidden(body: Chain, joint_limit: float, cells: int = 180) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of joint angles that joint limits or, for two joints, crossing links forbid.
+
+    Returns
+    -------
+    grid : (cells + 1,)
+        Joint angles from -pi to pi.
+    excess : (cells + 1, cells + 1)
+        Positive where forbidden; rows are the second joint. With more joints contact depends on the others and is left out.
+    """
+    grid = np.linspace(-np.pi, np.pi, cells + 1)
+    a, b = np.meshgrid(grid, grid)
+    excess = np.maximum(np.maximum(abs(a), abs(b)) - joint_limit, 0.0)
+    if body.n_joint == 2:
+        excess = np.maximum(excess, crossing_depth(body, np.stack([a.ravel(), b.ravel()])).reshape(a.shape))
+    return grid, excess
 
 
 def draw_allowed(axes: Axes, body: Chain, joint_limit: float) -> None:
-    """Grey over the pairs of joint angles that joint limits or links do not allow."""
-    grid = np.linspace(-np.pi, np.pi, 181)
-    a, b = np.meshgrid(grid, grid)
-    allowed = crossing_depth(body, np.stack([a.ravel(), b.ravel()])) < 1e-9
-    allowed &= np.maximum(abs(a), abs(b)).ravel() <= joint_limit + 1e-9
-    shade = np.where(allowed.reshape(a.shape), np.nan, 1.0)
-    axes.pcolormesh(grid, grid, shade, cmap="Greys", vmin=0, vmax=2.5, rasterized=True, shading="nearest")
+    """Grey over the pairs of joint angles that are forbidden."""
+    grid, excess = forbidden(body, joint_limit)
+    if excess.max() > 1e-9:
+        axes.contourf(grid, grid, excess, levels=[1e-9, 10.0], colors=[GREY], alpha=0.4)
 
 
-def draw_shape_path(
-    axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1, *, legend: bool = True
-) -> None:
-    """The gait in the plane of two joint angles, over the shapes that joint limits and links allow."""
-    if problem.body.n_joint == 2:
-        draw_allowed(axes, problem.body, problem.joint_limit)
+def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray) -> None:
+    """All joint angles over a period."""
+    for j, joint in enumerate(angles):
+        axes.plot(t, joint, lw=1.4, color=SERIES[j % len(SERIES)], label=f"{j + 1}")
+    axes.set(xlim=(0, 1), xlabel="phase t", ylabel="joint angle  [rad]")
+    _key(axes, "joint")
+
+
+def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
+    """The gait in the plane of two joint angles, light to dark, its start a disc, over the shapes that are allowed."""
+    draw_allowed(axes, problem.body, problem.joint_limit)
     q = angles[[first, second]]
-    segments = np.stack([q[:, :-1].T, q[:, 1:].T], axis=1)
-    lines = LineCollection(list(segments), cmap="cividis_r", lw=2.2, capstyle="round")
-    lines.set_array(np.linspace(0, 1, segments.shape[0]))
-    axes.add_collection(lines)
-    axes.plot(*q[:, 0], "o", color=RED, ms=5, label="t = 0")
+    colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # to be seen on white and on black
+    pieces = np.array_split(np.arange(q.shape[1] - 1), min(200, q.shape[1] - 1))
+    lines = [q[:, piece[0] : piece[-1] + 2].T for piece in pieces]
+    axes.add_collection(LineCollection(lines, colors=colours, lw=2.2, capstyle="round"))
+    axes.plot(*q[:, 0], "o", color=VERMILION, ms=5)
     at = angles.shape[1] // 12
-    axes.annotate(
-        "", (q[0, at + 2], q[1, at + 2]), (q[0, at], q[1, at]), arrowprops={"arrowstyle": "-|>", "color": RED, "lw": 1.4}
-    )
-    ticks = np.pi * np.array([-1, -0.5, 0, 0.5, 1])
-    labels = ["-π", "-π/2", "0", "π/2", "π"]
-    axes.set_xticks(ticks, labels)
-    axes.set_yticks(ticks, labels)
-    axes.set(xlim=(-np.pi * 1.02, np.pi * 1.02), ylim=(-np.pi * 1.02, np.pi * 1.02), aspect="equal")
+    arrow = {"arrowstyle": "-|>", "color": VERMILION, "lw": 1.4}
+    axes.annotate("", (q[0, at + 2], q[1, at + 2]), (q[0, at], q[1, at]), arrowprops=arrow)
+    middle, half = np.zeros(2), 1.02 * np.pi
+    extent = float(np.ptp(q, axis=1).max())
+    if extent < _SMALL:
+        middle, half = 0.5 * (q.min(axis=1) + q.max(axis=1)), 0.6 * max(extent, 0.05)
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.yaxis.set_major_locator(MaxNLocator(5))
+    else:
+        ticks, labels = np.pi * np.array([-1, -0.5, 0, 0.5, 1]), ["−π", "−π/2", "0", "π/2", "π"]
+        axes.set_xticks(ticks, labels)
+        axes.set_yticks(ticks, labels)
+    (x, y) = middle
+    axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
     axes.set(xlabel=f"joint angle {first + 1}  [rad]", ylabel=f"joint angle {second + 1}  [rad]")
-    if legend:
-        axes.legend(loc="lower left", handletextpad=0.2)
 
 
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
     """Speeds of the link midpoints over a period, on a logarithmic scale that shows stick, and delta."""
-    problem, motion = solution.problem, solution.sample(t)
-    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, solution.delta_per_period).velocity
-    speed = np.hypot(link.vs, link.vn)
-    for i, colour in zip(range(problem.body.n_link), [BLUE, ORANGE, GREEN, RED, PURPLE, SKY] * 2, strict=False):
-        axes.semilogy(t, speed[i], color=colour, lw=1.4, label=f"link {i + 1}")
-    axes.axhline(solution.delta_per_period, color=GREY, lw=1, ls=":")
-    axes.text(1.0, solution.delta_per_period, "δ ", color=GREY, ha="right", va="bottom")
+    problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
+    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, delta).velocity
+    speed = np.maximum(np.hypot(link.vs, link.vn), 0.1 * delta)
+    for i, along in enumerate(speed):
+        axes.plot(t, along, color=SERIES[i % len(SERIES)], lw=1.4, label=f"{i + 1}")
+    axes.axhline(delta, color=GREY, lw=1, ls=":")
+    axes.annotate("δ", (1.0, delta), (3, 0), textcoords="offset points", color=GREY, va="center")
     axes.set(xlim=(0, 1), ylabel="midpoint speed  [1/period]", xlabel="phase t")
-    axes.legend(loc="lower left", ncols=min(3, problem.body.n_link), handlelength=1.2, columnspacing=1)
+    set_log(axes, "y", (0.5 * float(min(speed.min(), delta)), 2 * float(speed.max())))
+    _key(axes, "link")
 
 
 def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
@@ -131,46 +158,74 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
     axes.plot(t, solution.power(motion), color=BLUE, lw=1.5)
     axes.set(xlim=(0, 1), xlabel="phase t", ylabel="power  [weight·length/period]")
     axes.set_ylim(bottom=0)
-    edges = solution.last.edges
-    axes.plot(edges, np.zeros_like(edges), "|", color=GREY, ms=7, clip_on=False)
+    draw_mesh_ticks(axes, solution.last.edges)
+
+
+def draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:
+    """Strokes on the time axis where mesh intervals meet."""
+    axes.plot(edges, np.zeros_like(edges), "|", color=GREY, ms=7, transform=axes.get_xaxis_transform(), clip_on=False)
+
+
+def set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
+    """A logarithmic axis with powers of ten as plain text, which costs a tenth of what typeset ones do."""
+    axes.set(**{f"{which}scale": "log", f"{which}lim": limits})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_locator(LogLocator(numticks=6))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(lambda value, _: f"10{f'{np.log10(value):.0f}'.translate(_EXPONENT)}")
+
+
+def _key(axes: Axes, of: str = "") -> None:
+    """The names of the lines in a row above the axes, where no line runs."""
+    handles, labels = axes.get_legend_handles_labels()
+    if of:
+        labels[0] = f"{of} {labels[0]}"
+    axes.legend(
+        handles, labels, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(labels), fontsize=7, handlelength=1,
+        columnspacing=0.8, handletextpad=0.3, borderpad=0, borderaxespad=0.3,
+    )  # fmt: skip
+
+
+def _headline(solution: Solution) -> str:
+    problem, mu = solution.problem, solution.problem.friction
+    verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
+    return (
+        f"{problem.name}: efficiency d/W = {solution.measured.efficiency:.5f}   "
+        f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}\n"
+        f"class: {problem.gait.describe()}"
+    )
 
 
 def solution_figure(solution: Solution) -> Figure:
-    """Filmstrip, lab paths, path in the joint plane, speeds and power of a solution."""
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11, 8.2), layout="constrained")
-        grid = figure.add_gridspec(3, 3, height_ratios=(0.75, 1.25, 0.9))
-        t = np.linspace(0.0, 1.0, 1201)
-        strip = figure.add_subplot(grid[0, :])
+    """Filmstrip, lab paths, joint angles, speeds and power of a solution."""
+    t = np.linspace(0.0, 1.0, 1201)
+    angles = solution.gait.angles(t)
+    with styled():
+        figure = Figure(figsize=(11, 8.2))
+        figure.set_layout_engine("none")  # the places are known
+        colour = INK if solution.status == SOLVED else VERMILION
+        figure.text(0.015, 0.985, _headline(solution), fontsize=11, va="top", color=colour)
+        strip = figure.add_axes((0.015, 0.76, 0.97, 0.135))
         draw_filmstrip(strip, solution)
-        strip.set_title("one period, frame by frame (phase below; the dot is the head)")
-        lab = figure.add_subplot(grid[1, :2])
+        figure.text(0.015, 0.905, "one period, frame by frame: phase, and below it how far the centre has come (disc: head)")
+        grid = figure.add_gridspec(
+            2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33, width_ratios=(2, 1),
+            height_ratios=(1.35, 1),
+        )  # fmt: skip
+        lab, plane, speeds, power = (figure.add_subplot(grid[k]) for k in range(4))
         draw_lab(lab, solution)
-        lab.set_title("in the lab, from t = 0 (grey) to t = 1 (black)")
-        plane = figure.add_subplot(grid[1, 2])
-        draw_shape_path(plane, solution.problem, solution.gait.angles(t))
-        plane.set_title("gait in shape space (grey: not allowed)")
-        speeds = figure.add_subplot(grid[2, :2])
+        if len(angles) == 2:
+            draw_shape_path(plane, solution.problem, angles)
+        else:  # no one plane shows them all
+            draw_angles(plane, t, angles)
         draw_speeds(speeds, solution, t)
-        speeds.set_title("speeds of the links; near δ they stick")
-        draw_power(figure.add_subplot(grid[2, 2]), solution, t)
-        figure.axes[-1].set_title(f"W = {solution.work:.4f} per period (ticks: mesh)")
-        mu = solution.problem.friction
-        verdict = "" if solution.status == "solved" else f"   —   {solution.status.upper()}"
-        figure.suptitle(
-            f"{solution.problem.name}: efficiency d/W = {solution.efficiency:.5f}   "
-            f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}\n"
-            f"class: {solution.problem.gait.describe()}",
-            x=0.01,
-            ha="left",
-            color="black" if solution.status == "solved" else RED,
+        draw_power(power, solution, t)
+        titles = (
+            "in the lab (black: at the end)",
+            "shape space (disc: t = 0)" if len(angles) == 2 else "joint angles",
+            "speeds of the links; near δ they stick",
+            f"W = {solution.measured.work:.4f} a period (ticks: mesh)",
         )
+        for axes, title in zip((lab, plane, speeds, power), titles, strict=True):
+            axes.set_title(title)
     return figure
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Save as PNG and PDF beside each other, whatever suffix `path` has."""
-    with matplotlib.rc_context(STYLE):
-        for suffix in (".png", ".pdf"):
-            figure.savefig(path.with_suffix(suffix))
-            figure.set_layout_engine("none")  # what the first saving laid out holds for the second

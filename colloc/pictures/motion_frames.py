@@ -8,7 +8,7 @@ import numpy as np
 
 from colloc.mechanics.balance import instant
 from colloc.mechanics.body import Chain
-from colloc.mechanics.point_friction import force_density
+from colloc.mechanics.friction import force_density
 from colloc.results.solution import Solution
 
 _STRAIGHT = 1e-2

@@ -4,53 +4,93 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colloc.pictures.figure import BLUE, RED, STYLE, draw_filmstrip, draw_lab, draw_power, draw_shape_path, draw_speeds
+from colloc.pictures.figure import (
+    draw_angles,
+    draw_filmstrip,
+    draw_lab,
+    draw_mesh_ticks,
+    draw_power,
+    draw_shape_path,
+    draw_speeds,
+    set_log,
+)
+from colloc.pictures.style import BLUE, GREY, ORANGE, VERMILION, save, styled
 from colloc.results.solution import Solution
+from colloc.verification.mesh_error import mesh_error
 
 COLUMN, PAGE = 3.4, 7.0
 """Widths of a column and of two [inches]."""
 _RESOLUTION = 300
 
 
-def draw_angles(axes: Axes, solution: Solution, t: np.ndarray) -> None:
-    """Joint angles over a period."""
-    for j, joint in enumerate(solution.sample(t).angles):
-        axes.plot(t, joint, lw=1.4, color=matplotlib.colormaps["viridis"](0.9 * j / max(solution.problem.body.n_joint - 1, 1)))
-        axes.annotate(f"{j + 1}", (1.0, joint[-1]), xytext=(3, 0), textcoords="offset points", fontsize=7, va="center")
-    axes.set(xlim=(0, 1), xlabel="phase t", ylabel="joint angle  [rad]")
+class Panel(NamedTuple):
+    """A picture about a solution: width and height [inches], and what draws it."""
+
+    width: float
+    height: float
+    draw: Callable[[Axes], None]
+
+    def figure(self) -> Figure:
+        """The panel alone."""
+        with styled(font_size=8):
+            figure = Figure(figsize=(self.width, self.height))
+            self.draw(figure.add_subplot())
+        return figure
 
 
 def draw_convergence(axes: Axes, solution: Solution) -> None:
     """Efficiency at every level of the continuation against its delta; crosses did not converge."""
     good = [level for level in solution.levels if level.optimal]
     bad = [level for level in solution.levels if not level.optimal]
-    axes.semilogx([level.delta for level in good], [level.efficiency for level in good], "o-", color=BLUE, ms=4, lw=1.2)
+    deltas = np.array([level.delta for level in solution.levels])
+    axes.plot([level.delta for level in good], [level.efficiency for level in good], "o-", color=BLUE, ms=4, lw=1.2)
     if good:
         axes.set_ylim(*axes.get_ylim())
-    axes.semilogx([level.delta for level in bad], [level.efficiency for level in bad], "x", color=RED, ms=5)
+    axes.plot([level.delta for level in bad], [level.efficiency for level in bad], "x", color=VERMILION, ms=5)
     axes.set(xlabel="δ  [length/period]", ylabel="efficiency d/W")
+    axes.ticklabel_format(axis="y", useOffset=False)
+    set_log(axes, "x", (deltas.min() / 2, deltas.max() * 2))
 
 
-def panels(solution: Solution) -> dict[str, tuple[float, float, Callable[[Axes], None]]]:
-    """Name to width, height [inches] and what draws the panel."""
+def mesh_errors(solution: Solution) -> np.ndarray:
+    """Estimated error of the efficiency from every mesh interval, ``(n,)``, magnitudes."""
+    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.delta_per_period).efficiency)
+
+
+def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
+    """Estimated error of the efficiency from every mesh interval, `mesh_errors`, and what is allowed in all."""
+    edges, shown, tolerance = solution.mesh.edges, np.maximum(errors, 1e-12), solution.problem.mesh_tolerance
+    axes.stairs(shown, edges, color=ORANGE, lw=1.2, baseline=None)
+    draw_mesh_ticks(axes, edges)
+    high = float(shown.max())
+    if tolerance > 0:
+        axes.axhline(tolerance, color=GREY, lw=1, ls=":")
+        high = max(high, tolerance)
+    axes.set(xlim=(0, float(edges[-1])), xlabel="phase t", ylabel="error of an interval")
+    set_log(axes, "y", (max(0.5 * float(shown.min()), 1e-10 * high), 3 * high))
+
+
+def panels(solution: Solution) -> dict[str, Panel]:
+    """Name to panel."""
     t = np.linspace(0.0, 1.0, 1201)
-    angles = solution.sample(t).angles
-    found: dict[str, tuple[float, float, Callable[[Axes], None]]] = {
-        "filmstrip": (PAGE, 1.9, lambda axes: draw_filmstrip(axes, solution, count=6)),
-        "lab": (PAGE, 3.0, lambda axes: draw_lab(axes, solution)),
-        "angles": (COLUMN, 2.2, lambda axes: draw_angles(axes, solution, t)),
-        "speeds": (COLUMN, 2.4, lambda axes: draw_speeds(axes, solution, t)),
-        "power": (COLUMN, 2.2, lambda axes: draw_power(axes, solution, t)),
-        "convergence": (COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),
+    angles = solution.gait.angles(t)
+    found = {
+        "filmstrip": Panel(PAGE, 1.9, lambda axes: draw_filmstrip(axes, solution, count=6)),
+        "lab": Panel(PAGE, 3.0, lambda axes: draw_lab(axes, solution)),
+        "angles": Panel(COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles)),
+        "speeds": Panel(COLUMN, 2.4, lambda axes: draw_speeds(axes, solution, t)),
+        "power": Panel(COLUMN, 2.4, lambda axes: draw_power(axes, solution, t)),
+        "convergence": Panel(COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),
+        "mesh": Panel(COLUMN, 2.2, lambda axes: draw_mesh(axes, solution, mesh_errors(solution))),
     }
-    for j in range(solution.problem.body.n_joint - 1):
-        found[f"shape-{j + 1}-{j + 2}"] = (COLUMN, 3.2, _plane(solution, angles, j))
+    for j in range(len(angles) - 1):
+        found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, _plane(solution, angles, j))
     return found
 
 
@@ -60,12 +100,5 @@ def _plane(solution: Solution, angles: np.ndarray, j: int) -> Callable[[Axes], N
 
 def save_panels(solution: Solution, stem: Path) -> list[Path]:
     """Write ``STEM-PANEL.pdf`` and ``.png`` for every panel; returns the PDFs."""
-    written = []
-    with matplotlib.rc_context({**STYLE, "font.size": 8, "savefig.dpi": _RESOLUTION}):
-        for name, (width, height, draw) in panels(solution).items():
-            figure = Figure(figsize=(width, height), layout="constrained")
-            draw(figure.add_subplot())
-            for suffix in (".png", ".pdf"):
-                figure.savefig(stem.with_name(f"{stem.name}-{name}{suffix}"))
-            written.append(stem.with_name(f"{stem.name}-{name}.pdf"))
-    return written
+    named = ((stem.with_name(f"{stem.name}-{name}"), panel) for name, panel in panels(solution).items())
+    return [save(panel.figure(), path, dpi=_RESOLUTION)[-1] for path, panel in named]

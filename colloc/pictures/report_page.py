@@ -3,31 +3,63 @@
 from __future__ import annotations
 
 import json
-from importlib import resources
+import re
+from io import StringIO
+from typing import Any, NamedTuple
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from colloc.gaits.problem import Reference
 from colloc.pictures.motion_frames import Frames, frames
-from colloc.pictures.report_charts import angles_chart, convergence_chart, mesh_chart, plane_charts, power_chart, speeds_chart
-from colloc.results.markup import Markup, element, table
+from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
+from colloc.pictures.style import INK, styled
 from colloc.results.solution import SOLVED, Solution
 
-_PHASES = 601
-_STAGE_WIDTH, _STAGE_HEIGHTS = 1040, (240, 560)
+_MOST_PLANES = 6
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """The page may run its own script and nothing else: it can fetch nothing, whatever the file held."""
+PLAIN = {
+    "KKT error": "To first order, no small change of the gait within its class is better.",
+    "constraint violation": "Every condition of the problem is met at the solver's own points.",
+    "balance at nodes": "At these points no net force or torque acts on the body.",
+    "balance in replay": "Nor does any act at all the instants in between.",
+    "closure": "The body ends a cycle in the shape in which it began.",
+    "net rotation": "It ends the cycle pointing the same way, so that it crawls straight on.",
+    "joint limits": "No joint bends further than it may, at any instant.",
+    "self-contact": "No link passes through another, at any instant.",
+    "replay gap": "An independent replay of the motion finds the same efficiency.",
+    "replay error": "The replay itself is as exact as was asked for.",
+    "work = dissipation": "All work of the joints goes into friction: energy is conserved.",
+    "mesh error": "More time steps would hardly change the efficiency.",
+    "delta influence": "Friction is smoothed a little at rest; that hardly changes the efficiency.",
+    "delta step": "Nor did the last reduction of that smoothing change it.",
+    "joins": "The pieces of the path meet without a jump.",
+    "curvature": "The path bends no more sharply than it may.",
+}
+"""What a check means for a reader who knows nothing of optimisation, by its name."""
 
 
-def asset(name: str) -> str:
-    """Text of a file in colloc/pictures/assets."""
-    return resources.files("colloc.pictures").joinpath("assets", name).read_text(encoding="utf-8")
+class Picture(NamedTuple):
+    """A panel as SVG, and where its axes lie: left, right, top, bottom as percent, and limits of both axes."""
+
+    caption: str
+    svg: Markup
+    sides: tuple[float, float, float, float]
+    limits: tuple[float, float, float, float]
+    joints: tuple[int, int] | None
+    has_phase: bool
 
 
-def json_block(identity: str, value: object) -> Markup:
-    """Data for the page's script; no text in it can end the block."""
-    text = json.dumps(value, separators=(",", ":")).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-    return element("script", Markup(text), id=identity, type="application/json")
+def environment() -> Environment:
+    """Templates of this package; they escape whatever is put into them."""
+    made = Environment(
+        loader=PackageLoader("colloc.pictures", "assets"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    made.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
+    return made
 
 
 def report_page(solution: Solution, reference: Reference | None = None, gap: str = "") -> str:
@@ -42,221 +74,104 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
     gap : str
         A sentence about the upper bound.
     """
-    parts: list[Markup | None] = [_summary(solution, reference, gap)]
+    found: dict[str, Any] = {"gait_pictures": [], "convergence_pictures": [], "motion": None, "errors": None}
     if solution.levels:
-        parts += [_animation(frames(solution)), _certificate(solution), _charts(solution), _convergence(solution)]
-    parts += [_problem(solution), _reproduce(solution)]
-    title = f"{solution.problem.name} · colloc"
-    head = element(
-        "head",
-        element("meta", charset="utf-8"),
-        Markup(f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}" />'),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("title", title),
-        element("style", Markup(asset("report.css"))),
-    )
-    footer = element("footer", f"made by colloc {solution.versions.get('colloc', '')} from one result file")
-    script = element("script", Markup(asset("report.js"))) if solution.levels else None
-    body = element("body", element("main", parts, footer), script)
-    return "<!DOCTYPE html>\n" + element("html", head, body, lang="en")
-
-
-def _summary(solution: Solution, reference: Reference | None, gap: str) -> Markup:
-    problem, certificate = solution.problem, solution.certificate
-    good = solution.status == SOLVED
-    badge = element("span", "✓ certified" if good else f"✗ {solution.status}", class_=f"badge {'good' if good else 'bad'}")
-    facts: list[tuple[str, str]] = []
-    if certificate is not None:
-        facts = [
-            (f"{certificate.efficiency:.5f}", f"efficiency d/W, ± {certificate.efficiency_error:.0e}, replayed"),
-            (f"{certificate.efficiency_at_zero_delta:.5f}", "for δ → 0, same gait"),
-            (f"{certificate.distance:.5f}", "distance d a period [body lengths]"),
-            (f"{certificate.work:.5f}", "work W a period [weight × length]"),
+        errors = mesh_errors(solution)
+        drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
+        drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
+        planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
+        captions = {"angles": "joint angles", "speeds": "speeds of the links; near δ they stick"}
+        captions["power"] = "power against friction; ticks: mesh"
+        found["gait_pictures"] = [_plane(drawn[name], j) for j, name in enumerate(planes)]
+        found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
+        found["convergence_pictures"] = [
+            _picture(drawn["convergence"], "efficiency at each level"),
+            _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
         ]
-    elif solution.levels:
-        facts = [(f"{solution.efficiency:.5f}", "efficiency of the last level, not replayed")]
-    friction = problem.friction
-    facts += [
-        (f"{problem.body.n_link}", "links"),
-        (f"{friction.mu_t:g}, {friction.mu_f:g}, {friction.mu_b:g}", "friction μt, μf, μb"),
-    ]
-    if solution.levels:
-        facts.append((f"{solution.last.delta:.0e}", "regularisation δ"))
-    lines = [gap.strip()] if gap else []
-    if reference is not None and certificate is not None:
-        agree = "agrees with" if abs(certificate.efficiency - reference.efficiency) <= reference.tolerance else "DIFFERS from"
-        lines.append(f"{agree} {reference.efficiency:g} ± {reference.tolerance:g}: {reference.source}")
-    return element(
-        "section",
-        element("h1", problem.name),
-        badge,
-        element("p", solution.message, class_="message") if solution.message else None,
-        element(
-            "div", [element("div", element("b", v), element("span", name), class_="fact") for v, name in facts], class_="facts"
-        ),
-        [_note(line) for line in lines],
+        found |= {"motion": motion_data(frames(solution)), "errors": float(errors.sum())}
+    return (
+        environment()
+        .get_template("report.html")
+        .render(
+            solution=solution,
+            problem=solution.problem,
+            certificate=solution.certificate,
+            solved=solution.status == SOLVED,
+            headline=_headline(solution),
+            gap=gap.strip(),
+            reference=_comparison(solution, reference),
+            plain=PLAIN,
+            policy=_POLICY,
+            fields={name: json.dumps(value) for name, value in solution.problem.to_dict().items()},
+            commands=_commands(solution),
+            **found,
+        )
     )
 
 
-def _fact(value: str, name: str) -> Markup:
-    return element("div", element("b", value), element("span", name), class_="fact")
+def _headline(solution: Solution) -> str:
+    if not solution.levels:
+        return "no gait was found"
+    measured = solution.measured
+    return f"moves {measured.distance:.2g} body lengths a cycle; {measured.efficiency:.2g} body lengths per unit of work"
 
 
-def _note(text: str) -> Markup:
-    return element("p", text, class_="note-line")
+def _comparison(solution: Solution, reference: Reference | None) -> str:
+    if reference is None or not solution.certificate.replayed:
+        return ""
+    agrees = abs(solution.certificate.efficiency - reference.efficiency) <= reference.tolerance
+    verb = "agrees with" if agrees else "DIFFERS from"
+    return f"{verb} {reference.efficiency:g} ± {reference.tolerance:g}: {reference.source}"
 
 
-def _scrolled(table_: Markup) -> Markup:
-    return element("div", table_, class_="scroll")
+def _commands(solution: Solution) -> str:
+    p = solution.problem
+    return (
+        f"# save the problem source above as {p.name}.py, then\n"
+        f"colloc solve {p.name}.py --delta {p.delta:g} --delta-start {p.delta_start:g} --mesh {p.intervals} "
+        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation '{p.formulation}'\n"
+        f"colloc verify results/{p.name}.h5"
+    )
 
 
-def _rounded(rows: np.ndarray, digits: int = 4) -> list:
-    return np.round(rows, digits).tolist()
+def _plane(panel: Panel, j: int) -> Picture:
+    return _picture(panel, f"joints {j + 1} and {j + 2}", joints=(j, j + 1))
 
 
-def motion_data(shown: Frames) -> dict:
+def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False) -> Picture:
+    """The panel as SVG that takes its text colour and font from the page; nothing in it comes from a file but numbers."""
+    text, figure = StringIO(), panel.figure()
+    with styled():
+        figure.savefig(text, format="svg", transparent=True, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    svg = text.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # it would style the whole page
+    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg)
+    svg = re.sub(r'<g id="[^"]*"', "<g", svg)  # the same in every panel
+    svg = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1" role="img">', svg)
+    svg = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)  # hundredths of a point
+    svg = svg.replace(INK, "currentColor")
+    axes = figure.axes[0]
+    box = 100 * axes.get_position().get_points()
+    (left, low), (right, high) = box.round(2).tolist()
+    sides = (left, right, round(100 - high, 2), round(100 - low, 2))
+    return Picture(caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase)
+
+
+def motion_data(shown: Frames) -> dict[str, Any]:
     """What report.js draws: rows over time, the window that holds all of it, the length of the arrows."""
     last = (shown.periods - 1) * shown.step
     reach = np.concatenate([shown.ends.reshape(2, -1), shown.ends.reshape(2, -1) + last[:, None]], axis=1)
     low, high = reach.min(axis=1) - 0.12, reach.max(axis=1) + 0.12
     strongest = max(float(np.hypot(*shown.arrow).max()), 1e-300)
     grid = next(step for step in (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9) if (high - low).max() / step < 16)
-    return {
-        "t": _rounded(shown.t),
-        "periods": shown.periods,
-        "step": _rounded(shown.step, 6),
-        "angles": _rounded(shown.angles),
-        "x": _rounded(shown.ends[0]),
-        "y": _rounded(shown.ends[1]),
-        "centre": _rounded(shown.centre),
-        "arrowX": _rounded(shown.arrow_base[0]),
-        "arrowY": _rounded(shown.arrow_base[1]),
-        "forceX": _rounded(shown.arrow[0], 3),
-        "forceY": _rounded(shown.arrow[1], 3),
-        "arrowScale": 0.12 / strongest,
-        "window": _rounded(np.array([low[0], high[0], low[1], high[1]])),
-        "grid": grid,
-    }
-
-
-def _animation(shown: Frames) -> Markup:
-    def box(identity: str, words: str) -> Markup:
-        return element("label", element("input", type="checkbox", id=identity, checked=True), " " + words)
-
-    controls = element(
-        "div",
-        element("button", "❚❚ pause", id="play", type="button"),
-        element("input", type="range", id="phase", min=0, max=1000, value=0, aria_label="phase"),
-        element("output", "t = 0.000", id="phase-shown"),
-        element("label", "speed ", element("input", type="range", id="rate", min=0.1, max=3, step=0.1, value=1)),
-        box("arrows", "friction"),
-        box("trails", "paths"),
-        class_="controls",
-    )
-    data = motion_data(shown)
-    left, right, low, high = data["window"]
-    height = int(np.clip(_STAGE_WIDTH * (high - low) / (right - left), *_STAGE_HEIGHTS))
-    periods = "one period" if shown.periods == 1 else f"{shown.periods} periods"
-    return element(
-        "section",
-        element("h2", "Motion in the lab frame"),
-        element("canvas", id="stage", width=_STAGE_WIDTH, height=height, class_="stage"),
-        controls,
-        element(
-            "p",
-            f"{periods}. The large disc is the head; orange arrows are friction per length on the links, the orange dot is the "
-            "centre of mass. Blue and yellow lines: tail and head. Space plays and pauses.",
-            class_="note-line",
-        ),
-        json_block("motion", data),
-    )
-
-
-def _certificate(solution: Solution) -> Markup:
-    if solution.certificate is None:
-        return element(
-            "section", element("h2", "Certificate"), element("p", "none: the solve did not converge.", class_="message")
-        )
-    rows = []
-    for check in solution.certificate.checks:
-        mark = element("td", "✓ holds" if check.passed else "✗ fails", class_="good" if check.passed else "bad")
-        rows.append([check.name, mark, f"{check.value:.1e}", f"≤ {check.threshold:.0e}", check.meaning])
-    instants = solution.certificate.instants
-    return element(
-        "section",
-        element("h2", "Certificate"),
-        _scrolled(table(rows, ["check", "", "measured", "allowed", "meaning"])),
-        element(
-            "p", f"From an independent replay of the gait on {instants} instants; colloc verify repeats it.", class_="note-line"
-        ),
-    )
-
-
-def _charts(solution: Solution) -> Markup:
-    t = np.linspace(0.0, 1.0, _PHASES)
-    angles = solution.sample(t).angles
-    n = len(angles)
-    planes = plane_charts(solution.problem, angles)
-    note = "Grey: beyond the joint limit" + (", or links would cross." if n == 2 else " (contact depends on the other joints).")
-    return element(
-        "section",
-        element("h2", "Gait"),
-        element("div", planes, class_="charts planes") if planes else None,
-        element("div", angles_chart(t, angles), speeds_chart(solution, t), power_chart(solution, t), class_="charts"),
-        _note(f"{note} Ticks on the time axis of the power: mesh."),
-    )
-
-
-def _convergence(solution: Solution) -> Markup:
-    rows = []
-    for level in solution.levels:
-        mark = element("td", "✓" if level.optimal else f"✗ {level.status}", class_="good" if level.optimal else "bad")
-        cells = [f"{level.edges.size - 1}", f"{level.efficiency:.6f}", f"{level.distance:.5f}", f"{level.work:.5f}"]
-        rows.append(
-            [f"{level.delta:.1e}", mark, *cells, f"{level.iterations}", f"{level.kkt_error:.0e}", f"{level.seconds:.2f}"]
-        )
-    header: list[object] = ["δ", "", "mesh", "efficiency", "d", "W", "iterations", "KKT error", "seconds"]
-    drawn, total = mesh_chart(solution)
-    tolerance = solution.problem.mesh_tolerance
-    allowed = f", allowed {tolerance:.0e}" if tolerance > 0 else ", no refinement asked for"
-    return element(
-        "section",
-        element("h2", "Convergence"),
-        element("div", convergence_chart(solution), drawn, class_="charts"),
-        element(
-            "p",
-            f"Estimated error of the collocated efficiency, summed over the mesh: {total:.1e}{allowed}.",
-            class_="note-line",
-        ),
-        _scrolled(table(rows, header)),
-        _note(f"{solution.seconds:.1f} s in all."),
-    )
-
-
-def _problem(solution: Solution) -> Markup:
-    rows = [[name, element("td", json.dumps(value), class_="wide")] for name, value in solution.problem.to_dict().items()]
-    source = element("pre", element("code", solution.source)) if solution.source else element("p", "stated in a program")
-    return element(
-        "section",
-        element("h2", "Problem"),
-        source,
-        element("details", element("summary", "all fields, as solved"), _scrolled(table(rows))),
-    )
-
-
-def _reproduce(solution: Solution) -> Markup:
-    p = solution.problem
-    commands = [
-        f"# save the problem source above as {p.name}.py, then",
-        f"colloc solve {p.name}.py --delta {p.delta:g} --delta-start {p.delta_start:g} --mesh {p.intervals} "
-        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation {p.formulation}",
-        f"colloc verify results/{p.name}.h5",
-    ]
-    versions = [[name, version] for name, version in solution.versions.items()]
-    return element(
-        "section",
-        element("h2", "How to reproduce"),
-        element("pre", element("code", "\n".join(commands))),
-        _scrolled(table(versions, ["package", "version"])),
-        _note(f"Problem hash {p.hash}"),
-    )
+    rows = {
+        "t": shown.t, "angles": shown.angles, "x": shown.ends[0], "y": shown.ends[1], "centre": shown.centre,
+        "arrowX": shown.arrow_base[0], "arrowY": shown.arrow_base[1], "window": np.array([low[0], high[0], low[1], high[1]]),
+    }  # fmt: skip
+    data: dict[str, Any] = {name: np.round(row, 4).tolist() for name, row in rows.items()}
+    force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
+    return data | force | {
+        "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": 0.12 / strongest, "grid": grid,
+        "shape": float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 1.2, 4.0)),
+    }  # fmt: skip

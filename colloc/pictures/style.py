@@ -1,4 +1,7 @@
-"""What all figures share: colours that colour-blind readers tell apart, sizes, saving, bodies with arrows."""
+"""What all figures share: one style, colours that colour-blind readers tell apart, saving, bodies with arrows.
+
+Figures are made without pyplot, so that drawing one neither opens a window nor changes anybody's backend.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
+
+from colloc.system.replaced_file import replaced_file
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#000000",
@@ -24,37 +27,58 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#CC79A7",
 )
 """The palette of Okabe and Ito."""
+GREY, INK = "#777777", "#1d2329"
+SERIES = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, GREY, "#8a7a00")
+"""Colours of links or joints; the palette's yellow is darkened to be read on white."""
 VELOCITY, FORCE = BLUE, VERMILION
-SEQUENTIAL, DIVERGING = "viridis", "cividis"
+SEQUENTIAL, DIVERGING, PHASE = "viridis", "cividis", "cividis_r"
+_DPI = 150
 _STYLE: Any = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
+    "text.color": INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
     "legend.fontsize": 8,
     "legend.frameon": False,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "figure.dpi": 110,
-    "savefig.dpi": 180,
     "pdf.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "colloc",
     "figure.constrained_layout.use": True,
 }
 
 
 @contextmanager
-def styled() -> Iterator[None]:
+def styled(font_size: float = 9) -> Iterator[None]:
     """The common style, for figures made inside."""
-    with plt.rc_context(_STYLE):
+    with matplotlib.rc_context({**_STYLE, "font.size": font_size, "axes.labelsize": font_size}):
         yield
 
 
-def save(figure: Any, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and PDF, close it, and return both paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"{name}.png", folder / f"{name}.pdf"]
-    for path in paths:
-        figure.savefig(path, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
-    plt.close(figure)
+def subplots(rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+    """A figure of `figsize` inches and its axes."""
+    figure = Figure(figsize=figsize)
+    return figure, figure.subplots(rows, columns, **options)
+
+
+def save(figure: Figure, stem: Path, kinds: tuple[str, ...] = ("png", "pdf"), dpi: float = _DPI) -> list[Path]:
+    """Write ``STEM.KIND`` for every kind, and return the paths.
+
+    Raises
+    ------
+    StoreError
+        If they cannot be written.
+    """
+    paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
+    for path, kind in zip(paths, kinds, strict=True):
+        with replaced_file(path) as temporary, styled():
+            figure.savefig(temporary, format=kind, dpi=dpi, metadata={"CreationDate": None} if kind == "pdf" else None)
+        figure.set_layout_engine("none")  # what the first saving laid out holds for the others
     return paths
 
 
@@ -82,4 +106,4 @@ def arrows(axes: Any, x: np.ndarray, y: np.ndarray, vx: np.ndarray, vy: np.ndarr
 
 def snapshot_colours(count: int) -> np.ndarray:
     """Colours from light (first) to dark (last)."""
-    return plt.get_cmap("cividis_r")(np.linspace(0.05, 0.95, count))
+    return matplotlib.colormaps[PHASE](np.linspace(0.15, 1.0, count))

@@ -1,34 +1,44 @@
-"""Archives of searches over many starts, as HDF5: one row a start, replaced atomically, and nothing but data.
+"""Archives of searches over many starts: a row on the disk for each start as it ends, and one HDF5 file of all for users.
 
-Layout (every dataset carries ``units`` and ``dims``)::
+An archive is about one problem. Its starts are told apart by sampler, seed and number, so searches with other seeds join it,
+also at the same time. The rows (NAME.sqlite beside NAME.h5) are what a search goes on from: they hold every gait as it is. The
+HDF5 file is made of them when a search ends, with named dimensions; a free path or polygon is there by its Fourier series::
 
-    /problem   JSON text      /versions  JSON text     attributes problem_hash, sampler, seed, command
-    /outcomes/{start,status,message,efficiency,efficiency_error,distance,work,delta,iterations,seconds,cpu_seconds}
-    /outcomes/{guess,gait}/{mean,cos,sin}
-    /basins/{best_start,count,frequency,efficiency,on_speed_floor}      the distinct optima, best first
+    start, sampler, seed, status, message                        (start)
+    efficiency, efficiency_error, distance, work, delta, iterations, seconds, cpu_seconds    (start)
+    guess_mean, gait_mean (start, joint)         guess_cos, guess_sin, gait_cos, gait_sin (start, joint, harmonic)
+    basin_{row,count,frequency,efficiency,on_speed_floor} (basin)      distinct optima, best first; row: which start is best
+    problem, versions: JSON texts; attributes problem_hash, command (the last one that added to it)
 """
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import numpy as np
 
-from colloc.gaits.harmonic import Fourier
-from colloc.gaits.problem import Problem
+from colloc.gaits.problem import Problem, statement_hash
 from colloc.gaits.sampling import on_speed_floor
-from colloc.results.distinct_optima import Outcome, basins
+from colloc.results.distinct_optima import Outcome, basins, fourier_series
+from colloc.results.outcome_fields import outcome_fields, outcome_from
 from colloc.results.solution import versions
-from colloc.system.errors import StoreError
+from colloc.system.errors import CollocError, StoreError
 from colloc.system.file_lock import locked
-from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text
+from colloc.system.row_file import put_rows, read_rows
+from colloc.system.store_file import mark, new_file, put, put_attribute
 
-FORMAT, FORMAT_VERSION = "colloc archive", 2
-_NUMBERS = {
+KIND, VERSION = "colloc archive", 4
+ROWS = "colloc starts 1"
+_PROBLEM = "problem"
+_COLUMNS = {
+    "status": "text",
+    "message": "text",
     "efficiency": "1/weight",
     "efficiency_error": "1/weight",
     "distance": "length",
@@ -40,102 +50,134 @@ _NUMBERS = {
 }
 
 
-@dataclass(eq=False)
-class Archive:
-    """A search: what was asked, and the outcomes so far by start number."""
+class StartName(NamedTuple):
+    """What decides a start of a problem; in the order in which starts are listed."""
 
-    problem: Problem
     sampler: str
     seed: int
-    command: str = ""
-    outcomes: dict[int, Outcome] = field(default_factory=dict)
-
-    def ordered(self) -> list[Outcome]:
-        """Outcomes by start number."""
-        return [self.outcomes[start] for start in sorted(self.outcomes)]
+    number: int
 
 
-def save_archive(archive: Archive, path: str | os.PathLike[str]) -> Path:
-    """Write an archive; an existing file is replaced only once the new one is complete.
+@dataclass(eq=False)
+class Archive:
+    """The starts of a problem that ended so far, whoever asked for them; `damaged` rows were left out. See `open_archive`."""
 
-    Writers wait for each other, and starts that another run of the same search has added to the file are kept and added to
-    `archive`.
+    problem: Problem
+    path: Path
+    outcomes: dict[StartName, Outcome] = field(default_factory=dict)
+    damaged: int = 0
+
+    def of_search(self, sampler: str, seed: int) -> dict[int, Outcome]:
+        """Outcomes of one sampler and seed, by start number."""
+        return {name.number: self.outcomes[name] for name in sorted(self.outcomes) if name[:2] == (sampler, seed)}
+
+    def add(self, outcomes: Mapping[StartName, Outcome]) -> None:
+        """Put starts that ended on the disk; StoreError if that is not possible."""
+        put_rows(row_path(self.path), ROWS, {" ".join(map(str, n)): [n, outcome_fields(o)] for n, o in outcomes.items()})
+        self.outcomes.update(outcomes)
+
+
+def row_path(path: str | os.PathLike[str]) -> Path:
+    """Where the rows of the archive with this HDF5 file are."""
+    return Path(path).with_suffix(".sqlite")
+
+
+def _lock(path: Path) -> Path:
+    return path.with_name(f".{path.name}.lock")
+
+
+def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], int] | None:
+    """Outcomes on the disk and the number of damaged ones; None if nothing is there."""
+    rows = read_rows(row_path(path), ROWS)
+    stated = rows.values.pop(_PROBLEM, None)
+    if stated is None:
+        if rows.values or rows.damaged:
+            raise StoreError(f"{row_path(path)} is damaged: it does not say what problem it is about; move it away.")
+        return None
+    if statement_hash(stated) != problem.hash:
+        raise StoreError(f"{row_path(path)} holds starts of another problem; choose another --output, or move it away.")
+    outcomes, damaged = {}, rows.damaged
+    for value in rows.values.values():
+        try:
+            (sampler, seed, number), entry = value
+            outcomes[StartName(str(sampler), int(seed), int(number))] = outcome_from(entry)
+        except (KeyError, TypeError, ValueError, CollocError):
+            damaged += 1
+    return outcomes, damaged
+
+
+def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
+    """The archive of a problem with all starts that are on the disk, begun if there is none.
+
+    Parameters
+    ----------
+    problem : Problem
+    path : path-like
+        Of its HDF5 file.
 
     Raises
     ------
     StoreError
-        If the folder cannot be made or written, or the file there is damaged.
+        If what is there is damaged, of an older colloc or about another problem, or the folder cannot be written.
     """
     path = Path(path)
-    with locked(path.with_name(f".{path.name}.lock"), wait=True):
-        if path.exists():
-            there = load_archive(path)
-            if (there.problem.hash, there.sampler, there.seed) == (archive.problem.hash, archive.sampler, archive.seed):
-                archive.outcomes = there.outcomes | archive.outcomes
-        with new_file(path) as file:
-            _write(file, archive)
-    return path
+    with locked(_lock(path), wait=True):
+        found = _rows_of(problem, path)
+        if found is None:
+            if path.exists():
+                raise StoreError(
+                    f"{path} is there, but not {row_path(path).name}, which a search goes on from (older ones had none); "
+                    "choose another --output, or move it away."
+                )
+            put_rows(row_path(path), ROWS, {_PROBLEM: problem.to_dict()})
+    return Archive(problem, path, *(found or ()))
 
 
-def load_archive(path: str | os.PathLike[str]) -> Archive:
-    """The archive in a file that `save_archive` wrote.
+def save_archive(archive: Archive, command: str = "") -> Path:
+    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well.
 
     Raises
     ------
     StoreError
-        If the file is missing, damaged, or not a colloc archive.
+        If the folder cannot be written; the file that was there before is left.
     """
-    with sealed_file(path, FORMAT, FORMAT_VERSION) as file:
-        return _read(file)
+    with locked(_lock(archive.path), wait=True):
+        found = _rows_of(archive.problem, archive.path)
+        archive.outcomes |= found[0] if found else {}
+        with new_file(archive.path) as file:
+            _write(file, archive, command)
+    return archive.path
 
 
-def _dataset(group: h5py.Group, name: str, value: list, units: str, dims: str = "start") -> None:
-    put(group, name, np.array(value, dtype=object if units == "text" else None), units=units, dims=dims)
-
-
-def _write(file: h5py.File, archive: Archive) -> None:
-    mark(file, FORMAT, FORMAT_VERSION)
+def _write(file: h5py.File, archive: Archive, command: str) -> None:
+    mark(file, KIND, VERSION)
     put_attribute(file, "name", archive.problem.name)
     put_attribute(file, "problem_hash", archive.problem.hash)
-    for name in ("sampler", "seed", "command"):
-        put_attribute(file, name, getattr(archive, name))
+    put_attribute(file, "command", command)
     put(file, "problem", json.dumps(archive.problem.to_dict()))
     put(file, "versions", json.dumps(versions()))
-    outcomes = archive.ordered()
-    group = file.create_group("outcomes")
-    _dataset(group, "start", [o.start for o in outcomes], "1")
-    for name in ("status", "message"):
-        _dataset(group, name, [getattr(o, name) for o in outcomes], "text")
-    for name, units in _NUMBERS.items():
-        _dataset(group, name, [getattr(o, name) for o in outcomes], units)
-    for name in ("guess", "gait"):
-        own = group.create_group(name)
-        for part, dims in (("mean", "start, joint"), ("cos", "start, joint, harmonic"), ("sin", "start, joint, harmonic")):
-            _dataset(own, part, [getattr(getattr(o, name), part) for o in outcomes], "rad", dims)
+    names = sorted(archive.outcomes)
+    outcomes = [archive.outcomes[name] for name in names]
+
+    def put_column(name: str, values: list, units: str, dims: str = "start") -> None:
+        put(file, name, np.array(values, dtype=object if units == "text" else None), units=units, dims=dims)
+
+    put_column("start", [name.number for name in names], "1")
+    put_column("seed", [name.seed for name in names], "1")
+    put_column("sampler", [name.sampler for name in names], "text")
+    for name, units in _COLUMNS.items():
+        put_column(name, [getattr(o, name) for o in outcomes], units)
+    if outcomes:
+        for name in ("guess", "gait"):
+            gaits = [fourier_series(archive.problem, getattr(o, name)) for o in outcomes]
+            gaits = [gait.resized(max(g.n_harmonic for g in gaits)) for gait in gaits]
+            put_column(f"{name}_mean", [gait.mean for gait in gaits], "rad", "start, joint")
+            for part in ("cos", "sin"):
+                put_column(f"{name}_{part}", [getattr(gait, part) for gait in gaits], "rad", "start, joint, harmonic")
     found = basins(archive.problem, outcomes)
-    group = file.create_group("basins")
-    _dataset(group, "best_start", [b.best.start for b in found], "1", "basin")
-    _dataset(group, "count", [len(b.starts) for b in found], "1", "basin")
-    _dataset(group, "frequency", [b.frequency for b in found], "share of starts", "basin")
-    _dataset(group, "efficiency", [b.best.efficiency for b in found], "1/weight", "basin")
-    _dataset(group, "on_speed_floor", [on_speed_floor(archive.problem, b.best.gait) for b in found], "1", "basin")
-
-
-def _read(file: h5py.File) -> Archive:
-    problem = Problem.from_dict(json.loads(text(file, "problem")))
-    if problem.hash != attribute(file, "problem_hash"):
-        raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
-    sampler, seed, command = (attribute(file, name) for name in ("sampler", "seed", "command"))
-    archive = Archive(problem, str(sampler), int(seed), str(command))
-    group = child(file, "outcomes")
-    starts = array(group, "start")
-    if not starts.size:
-        return archive
-    status, message = array(group, "status"), array(group, "message")
-    numbers = {name: array(group, name) for name in _NUMBERS}
-    gaits = {name: [array(child(group, name), part) for part in ("mean", "cos", "sin")] for name in ("guess", "gait")}
-    for row, start in enumerate(starts):
-        guess, gait = (Fourier(*(part[row] for part in gaits[name])) for name in ("guess", "gait"))
-        values = {name: column[row].item() for name, column in numbers.items()}
-        archive.outcomes[int(start)] = Outcome(int(start), str(status[row]), str(message[row]), guess, gait, **values)
-    return archive
+    put_column("basin_row", [next(row for row, o in enumerate(outcomes) if o is b.best) for b in found], "1", "basin")
+    put_column("basin_count", [len(b.starts) for b in found], "1", "basin")
+    put_column("basin_frequency", [b.frequency for b in found], "share of starts", "basin")
+    put_column("basin_efficiency", [b.best.efficiency for b in found], "1/weight", "basin")
+    floor = [int(on_speed_floor(archive.problem, b.best.gait)) for b in found]
+    put_column("basin_on_speed_floor", floor, "1", "basin")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.results.solution import Level, Solution
+from colloc.results.level import Level
+from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 
 RESOLVED = 1e-4
@@ -19,6 +21,31 @@ class Limit:
 
     value: float
     error: float
+
+
+_DECADE = 0.1
+_SLOWEST = 0.9
+
+
+def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limit:
+    """Limit for delta -> 0 of one gait's efficiency, from its values at delta, delta/10 and delta/100.
+
+    Regularisation acts like c delta at leading order, so a ninth of the last change remains; sticking links act like
+    delta log delta, and gaits of the size of delta like delta squared, with any signs. So the error is that ninth again; or
+    more where the two changes fall off more slowly; and no less than what is left of a linear part of the first change that
+    other parts hide in the second.
+
+    Parameters
+    ----------
+    values, errors : (3,)
+        Efficiencies and their own errors.
+    """
+    first, second = values[1] - values[0], values[2] - values[1]
+    linear = _DECADE / (1 - _DECADE)
+    falloff = min(abs(second) / max(abs(first), 1e-300), _SLOWEST)
+    left = max(max(linear, falloff / (1 - falloff)) * abs(second), linear * _DECADE * abs(first))
+    own = (1 + linear) * errors[2] + linear * errors[1]
+    return Limit(float(values[2] + linear * second), float(left + own))
 
 
 def efficiency_at_zero_delta(solution: Solution) -> Limit:
@@ -52,7 +79,7 @@ def efficiency_at_zero_delta(solution: Solution) -> Limit:
 
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Share of every mesh interval in the relative efficiency error of the last level, magnitudes, ``(n_interval,)``."""
-    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.last.delta).efficiency)
+    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.delta_per_period).efficiency)
 
 
 def resolution_warning(solution: Solution) -> str | None:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.equivalence import distance
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
 
@@ -17,6 +19,18 @@ STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, TIME_LIMIT, ERRO
 SAME_EFFICIENCY, SAME_GAIT = 1e-3, 0.05
 """Two certified optima are the same if their efficiencies differ by less than this relative amount and their paths by less
 than this root-mean-square distance [rad], modulo symmetries. Efficiency is flat at its maximum, so the path is the laxer."""
+SERIES_HARMONICS = 16
+"""Free paths and polygons are tabulated and told apart by their Fourier series in arc length."""
+
+
+def series_class(problem: Problem) -> Harmonic:
+    """The class of the Fourier series that stand for gaits of a problem: its own, if that is one of harmonics."""
+    return Harmonic(SERIES_HARMONICS, problem.gait.symmetry) if problem.has_path else problem.gait
+
+
+def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
+    """The Fourier series that stands for a gait of a problem."""
+    return fourier_through(gait, series_class(problem))
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +45,12 @@ class Outcome:
         One of `STATUSES`; only "solved" (certified by replay) is a success.
     message : str
         What went wrong, if something did.
-    guess, gait : Fourier
+    guess, gait : Fourier, ArcPath or Corners
         Where the search began and ended.
     efficiency, efficiency_error, distance, work : float
         Replayed and, failing that, collocated; NaN if there is none.
     delta : float
-        The smallest at which an optimum was found; NaN if none.
+        In the units of the problem, the smallest at which an optimum was found; NaN if none.
     iterations : int
     seconds : float
         Wall time, certificate included.
@@ -47,8 +61,8 @@ class Outcome:
     start: int
     status: str
     message: str
-    guess: Fourier
-    gait: Fourier
+    guess: AnyGait
+    gait: AnyGait
     efficiency: float = np.nan
     efficiency_error: float = np.nan
     distance: float = np.nan
@@ -85,16 +99,19 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     """
     solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.efficiency)
     found: list[list[Outcome]] = []
+    paths: list[Fourier] = []
     for outcome in solved:
-        for members in found:
+        path = fourier_series(problem, outcome.gait)
+        for members, near in zip(found, paths, strict=True):
             best = members[0]
             if best.efficiency - outcome.efficiency > SAME_EFFICIENCY * best.efficiency:
                 continue
-            if distance(best.gait, outcome.gait, problem.body, problem.friction) < SAME_GAIT:
+            if distance(near, path, problem.body, problem.friction) < SAME_GAIT:
                 members.append(outcome)
                 break
         else:
             found.append([outcome])
+            paths.append(path)
     return [Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m in found]
 
 

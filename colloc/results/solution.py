@@ -9,117 +9,20 @@ from importlib import metadata
 
 import numpy as np
 
-from colloc.collocation.layout import RADIANS, Layout, problem_layout
+from colloc.collocation.layout import Layout, problem_layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.results.alternative import Alternative
+from colloc.results.checks import UNCERTIFIED, Certificate
+from colloc.results.level import Level
 from colloc.results.solution_card import solution_card
+from colloc.system.errors import ProblemError
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
-
-
-@dataclass(frozen=True, eq=False)
-class Level:
-    """One converged or failed step of the continuation.
-
-    Attributes
-    ----------
-    delta : float
-        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit shape speed.
-    edges : (n_interval + 1,)
-        The mesh, in phases of the gait found.
-    x, lam_x : (n,)
-        Variables (see `colloc.collocation.layout`) and multipliers of their bounds.
-    lam_g : (m,)
-        Multipliers of the constraints.
-    efficiency, distance, work : float
-        Over one whole period, as collocation sees them.
-    kkt_error, violation, complementarity : float
-        Measured first-order conditions, unscaled.
-    status : str
-        The optimiser's own word.
-    optimal : bool
-        Whether the first-order conditions hold.
-    iterations : int
-    seconds, evaluation_seconds : float
-    scheme : str
-        Collocation scheme, which refinement may have raised in order; "" for the problem's.
-    """
-
-    delta: float
-    edges: np.ndarray
-    x: np.ndarray
-    lam_x: np.ndarray
-    lam_g: np.ndarray
-    efficiency: float
-    distance: float
-    work: float
-    kkt_error: float
-    violation: float
-    complementarity: float
-    status: str
-    optimal: bool
-    iterations: int
-    seconds: float
-    evaluation_seconds: float
-    scheme: str = ""
-
-
-@dataclass(frozen=True)
-class Check:
-    """One line of a certificate: what was measured, the largest value allowed, and what it means."""
-
-    name: str
-    value: float
-    threshold: float
-    meaning: str
-
-    @property
-    def passed(self) -> bool:
-        return bool(np.isfinite(self.value) and abs(self.value) <= self.threshold)
-
-    def line(self) -> str:
-        """For a terminal."""
-        return (
-            f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= {self.threshold:.0e})  {self.meaning}"
-        )
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """The verdict of an independent replay.
-
-    Attributes
-    ----------
-    checks : tuple of Check
-    efficiency, distance, work : float
-        Of the replay, over one period, at the solution's delta.
-    efficiency_error : float
-        Estimated error of that efficiency from refining the replay.
-    efficiency_at_zero_delta : float
-        Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed.
-    instants : int
-        Instants of the replay in one period.
-    """
-
-    checks: tuple[Check, ...]
-    efficiency: float
-    distance: float
-    work: float
-    efficiency_error: float
-    efficiency_at_zero_delta: float
-    instants: int
-
-    @property
-    def passed(self) -> bool:
-        return all(check.passed for check in self.checks)
-
-    @property
-    def failures(self) -> list[Check]:
-        return [check for check in self.checks if not check.passed]
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +60,8 @@ class Solution:
     problem : Problem
     levels : list of Level
         In the order they were solved; the last one is the result.
-    certificate : Certificate or None
-        None if no level converged.
+    certificate : Certificate
+        `UNCERTIFIED` if the solve did not converge.
     seconds : float
         Wall time of the whole solve.
     source : str
@@ -166,27 +69,58 @@ class Solution:
     message : str
         What went wrong and what to try, if something did.
     versions : dict
+    changed : bool
+        Whether another program changed the file that the result was loaded from; `colloc verify` decides what it is worth.
+    starts : int
+        How many the gait is the best of.
+    others : tuple of Alternative
+        Distinct gaits they led to, the one of this solution first; empty for a single start.
     """
 
     problem: Problem
     levels: Sequence[Level]
-    certificate: Certificate | None = None
+    certificate: Certificate = UNCERTIFIED
     seconds: float = 0.0
     source: str = ""
     message: str = ""
     versions: dict[str, str] = field(default_factory=lambda: versions())
+    changed: bool = False
+    starts: int = 1
+    others: tuple[Alternative, ...] = ()
+
+    def __repr__(self) -> str:
+        facts = [self.problem.name, self.status]
+        if self.levels:
+            replayed = "" if self.certificate.replayed else " (not replayed)"
+            error = f" +- {self.certificate.efficiency_error:.0e}" if self.certificate.replayed else ""
+            facts.append(f"d/W = {self.measured.efficiency:.6g}{error}{replayed} at delta = {self.last.delta:.1e}")
+        return f"<Solution {', '.join(facts)}>"
 
     @property
     def status(self) -> str:
         """One of "solved", "not converged", "certificate failed"."""
         reached = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta <= self.problem.delta * (1 + 1e-9)
-        if not reached or self.certificate is None:
+        if not reached or not self.certificate.replayed:
             return NOT_CONVERGED
         return SOLVED if self.certificate.passed else CERTIFICATE_FAILED
 
     @property
     def last(self) -> Level:
+        """The result.
+
+        Raises
+        ------
+        ProblemError
+            If the solve failed before its first level ended.
+        """
+        if not self.levels:
+            raise ProblemError(f"{self.problem.name} holds no gait: its solve failed before the first level.")
         return self.levels[-1]
+
+    @property
+    def measured(self) -> Certificate | Level:
+        """What says efficiency, distance and work best: the replay if there was one, else the last level."""
+        return self.certificate if self.certificate.replayed else self.last
 
     @property
     def efficiency(self) -> float:
@@ -230,7 +164,8 @@ class Solution:
         """Angles, rates and tail velocities per period at the collocation points."""
         x, layout, problem = self.last.x, self.layout, self.problem
         if layout.z.size:
-            return x[layout.angles], RADIANS * x[layout.rates], RADIANS * x[layout.z]
+            unit = self.gait.speed_unit
+            return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
         gait, times = self.gait, self.mesh.times
         angles, rates = gait.angles(times), gait.rates(times)
         return angles, rates, solve_balance(problem.body, problem.friction, angles, rates, self.delta_per_period).z
@@ -263,9 +198,10 @@ class Solution:
             centre = np.where(second, 2 * end[:, None] - centre, centre)
             end = 2 * end
         elif symmetry == "antipodal":
-            mirror = np.array([[1.0], [-1.0], [-1.0]])
+            mirror, x_theta = np.array([[1.0], [-1.0], [-1.0]]), self.last.x[self.layout.theta[0]]
             z = np.where(second, mirror * z, z)
-            theta = np.where(second, -theta, theta)
+            turns = 2 * np.pi * np.round((x_theta[0] + x_theta[-1]) / (2 * np.pi))
+            theta = np.where(second, turns - theta, theta)
             centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
             end = np.array([2 * end[0], 0.0])
         centre = centre + period * end[:, None]
@@ -302,29 +238,26 @@ class Solution:
         return total_power(now.velocity, now.force)[0]
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: verdict, numbers, checks and the path in shape space."""
-        return solution_card(self.problem.name, self.status, self.message, self._facts(), self._checks(), self._thumbnail())
+        """What a notebook shows: verdict, numbers and checks."""
+        return solution_card(self.problem.name, self.status, self.message, self._facts(), self._checks())
 
     def _facts(self) -> list[tuple[str, str]]:
         if not self.levels:
             return []
         certificate = self.certificate
-        if certificate is None:
+        if not certificate.replayed:
             return [("efficiency (not replayed)", f"{self.efficiency:.5f}"), ("δ", f"{self.last.delta:.0e}")]
         return [
             ("efficiency d/W", f"{certificate.efficiency:.5f} ± {certificate.efficiency_error:.0e}"),
-            ("for δ → 0", f"{certificate.efficiency_at_zero_delta:.5f}"),
+            ("for δ → 0", f"{certificate.efficiency_at_zero_delta:.5f} ± {certificate.error_at_zero_delta:.0e}"),
             ("distance d", f"{certificate.distance:.5f}"),
             ("work W", f"{certificate.work:.5f}"),
             ("δ", f"{self.last.delta:.0e}"),
         ]
 
     def _checks(self) -> list[tuple[str, bool, str]]:
-        checks = self.certificate.checks if self.certificate is not None else ()
+        checks = self.certificate.checks if self.certificate.replayed else ()
         return [(check.name, check.passed, f"{check.value:.1e} (≤ {check.threshold:.0e})") for check in checks]
-
-    def _thumbnail(self) -> np.ndarray | None:
-        return self.sample(np.linspace(0.0, 1.0, 181)).angles if self.levels else None
 
 
 def versions() -> dict[str, str]:

@@ -15,24 +15,29 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import warnings
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from colloc.gaits.gait_fields import fields
-from colloc.gaits.problem import Problem
-from colloc.results.solution import Certificate, Check, Level, Solution
-from colloc.system.errors import StoreError
-from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text
+from colloc.gaits.gait_fields import fields, gait_from
+from colloc.gaits.problem import Problem, statement_hash
+from colloc.results.alternative import Alternative
+from colloc.results.checks import UNCERTIFIED, Certificate, Check
+from colloc.results.level import Level
+from colloc.results.solution import Solution
+from colloc.system.errors import ChangedFileWarning, StoreError
+from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text, was_changed
 
 FORMAT, FORMAT_VERSION = "colloc solution", 3
 _MOTION_SAMPLES = 401
+_LAYOUT = "see colloc.collocation.layout"
 _LEVEL_ARRAYS = {
-    "edges": "period",
-    "x": "see colloc.collocation.layout",
-    "lam_x": "see colloc.collocation.layout",
-    "lam_g": "see colloc.collocation.layout",
+    "edges": ("period", "edge"),
+    "x": (_LAYOUT, "variable"),
+    "lam_x": (_LAYOUT, "variable"),
+    "lam_g": (_LAYOUT, "constraint"),
 }
 
 _GAIT_ARRAYS = {
@@ -64,13 +69,27 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
 def load(path: str | os.PathLike[str]) -> Solution:
     """The solution in a file that `save` wrote.
 
+    A file that another program has opened to write since then is read with a `ChangedFileWarning`, and the solution is marked
+    as ``changed``: `colloc verify` decides what it is worth.
+
     Raises
     ------
     StoreError
         If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
     """
-    with sealed_file(path, FORMAT, FORMAT_VERSION) as file:
-        return _read(file)
+    changed = was_changed(Path(path), FORMAT)
+    try:
+        with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:
+            solution = _read(file)
+    except StoreError as error:
+        if not changed:
+            raise
+        raise StoreError(f"{path} was changed after colloc wrote it, and cannot be read any more: {error}") from None
+    if changed:
+        solution.changed = True
+        message = f"{path} was changed after colloc wrote it; colloc verify {path} says what it is worth."
+        warnings.warn(message, ChangedFileWarning, stacklevel=2)
+    return solution
 
 
 def _write(file: h5py.File, solution: Solution) -> None:
@@ -82,16 +101,19 @@ def _write(file: h5py.File, solution: Solution) -> None:
     put(file, "problem", json.dumps(solution.problem.to_dict()))
     put(file, "source", solution.source)
     put(file, "versions", json.dumps(solution.versions))
+    put_attribute(file, "starts", solution.starts)
+    others = [{**dataclasses.asdict(other), "gait": fields(other.gait)} for other in solution.others]
+    put(file, "others", json.dumps(others))
     for index, level in enumerate(solution.levels):
         group = file.create_group(f"levels/{index:03d}")
-        for name, units in _LEVEL_ARRAYS.items():
-            put(group, name, getattr(level, name), units=units, dims="vector")
+        for name, (units, dims) in _LEVEL_ARRAYS.items():
+            put(group, name, getattr(level, name), units=units, dims=dims)
         for field in dataclasses.fields(level):
             if field.name not in _LEVEL_ARRAYS:
                 put_attribute(group, field.name, getattr(level, field.name))
     if solution.levels:
         _write_motion(file, solution)
-    if solution.certificate is not None:
+    if solution.certificate.replayed:
         _write_certificate(file.create_group("certificate"), solution.certificate)
 
 
@@ -105,14 +127,14 @@ def _write_motion(file: h5py.File, solution: Solution) -> None:
             put_attribute(gait, name, value)
     motion = solution.sample(np.linspace(0.0, 1.0, _MOTION_SAMPLES))
     group = file.create_group("motion")
-    put(group, "t", motion.t, units="period", dims="time")
-    put(group, "joint_angles", motion.angles, units="rad", dims="joint, time")
-    put(group, "joint_rates", motion.rates, units="rad/period", dims="joint, time")
-    put(group, "tail_velocity", motion.z, units="length/period, length/period, rad/period", dims="(u, v, omega), time")
-    put(group, "theta", motion.theta, units="rad", dims="time")
-    put(group, "centre", motion.centre, units="length", dims="(x, y), time")
-    put(group, "tail", motion.tail, units="length", dims="(x, y), time")
-    put(group, "power", solution.power(motion), units="weight length/period", dims="time")
+    put(group, "t", motion.t, units="period", dims="t")
+    put(group, "joint_angles", motion.angles, units="rad", dims="joint, t")
+    put(group, "joint_rates", motion.rates, units="rad/period", dims="joint, t")
+    put(group, "tail_velocity", motion.z, units="length/period, length/period, rad/period", dims="velocity, t")
+    put(group, "theta", motion.theta, units="rad", dims="t")
+    put(group, "centre", motion.centre, units="length", dims="axis, t")
+    put(group, "tail", motion.tail, units="length", dims="axis, t")
+    put(group, "power", solution.power(motion), units="weight length/period", dims="t")
 
 
 def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
@@ -120,26 +142,29 @@ def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
         if field.name != "checks":
             put_attribute(group, field.name, getattr(certificate, field.name))
     for name in ("name", "value", "threshold", "passed", "meaning"):
-        put(group, name, [getattr(check, name) for check in certificate.checks])
+        put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
 
 def _read(file: h5py.File) -> Solution:
-    problem = Problem.from_dict(json.loads(text(file, "problem")))
-    if problem.hash != attribute(file, "problem_hash"):
+    stated = json.loads(text(file, "problem"))
+    problem = Problem.from_dict(stated)
+    if statement_hash(stated) != attribute(file, "problem_hash"):
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
     levels = []
     found = child(file, "levels") if "levels" in file else ()
     for name in sorted(found):
         group = child(found, name)
         arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
-        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Level) if f.name not in _LEVEL_ARRAYS}
+        there = [f.name for f in dataclasses.fields(Level) if f.default is dataclasses.MISSING or f.name in group.attrs]
+        rest = {name: attribute(group, name) for name in there if name not in _LEVEL_ARRAYS}
         levels.append(Level(**arrays, **rest))
-    certificate = None
+    certificate = UNCERTIFIED
     if "certificate" in file:
         group = child(file, "certificate")
         columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
         checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-        rest = {f.name: attribute(group, f.name) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+        stated = [f.name for f in dataclasses.fields(Certificate) if f.default is dataclasses.MISSING or f.name in group.attrs]
+        rest = {name: attribute(group, name) for name in stated if name != "checks"}
         certificate = Certificate(checks, **rest)
     solution = Solution(
         problem,
@@ -150,6 +175,9 @@ def _read(file: h5py.File) -> Solution:
         str(attribute(file, "message")),
         json.loads(text(file, "versions")),
     )
+    if "others" in file:
+        others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(text(file, "others"))]
+        solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
     if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
         raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     return solution

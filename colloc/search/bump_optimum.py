@@ -11,7 +11,7 @@ from colloc.collocation.bump_transcription import POSITION_SCALE, BumpTranscript
 from colloc.collocation.layout import RADIANS
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
-from colloc.results.solution import Check
+from colloc.results.checks import Check
 from colloc.search.nlp import OPTIMAL_TOLERANCE, NlpResult, Solver
 from colloc.smooth.bump_balance import balance_and_power, bump_instant, solve_bump
 from colloc.smooth.bump_body import BumpBody

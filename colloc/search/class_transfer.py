@@ -1,8 +1,8 @@
 """From class to class: an optimum of one class of gaits is where the search in the next begins.
 
 Harmonics n to n + 1, a curvature bound to a larger one, harmonics to a free path to a polygon and back: any gait is laid
-into any class (`search.path_start.nearest_parameters`), and into a chain of other links (`over_links`). What does not carry
-over by itself is delta, which harmonic gaits measure per period and paths at unit shape speed.
+into any class (`reduced.spaces.nearest_parameters`), and into a chain of other links (`colloc.gaits.laid_gaits`). What
+does not carry over by itself is delta, which harmonic gaits measure per period and paths at unit shape speed.
 
 An optimum is worth keeping. Regularised friction at a large delta prefers other gaits, so a search that begins there leaves
 it: with six harmonics from the optimum of five (0.4004), one that begins at 100 times the final delta ends at 0.3998, one at
@@ -16,26 +16,17 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.path_samples import fourier_through, path_length
-from colloc.gaits.paths import Corners
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.laid_gaits import laid_into
+from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import largest_factor
-from colloc.mechanics.body import Chain
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.continuation import continue_delta
-from colloc.search.level_run import Report
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.optimise import Report, maximise_efficiency, optimum
 
 RESTARTS = (10.0, 100.0)
 """A search from an optimum of another class begins at so many times the final delta; the second if the first one lost it."""
 _KEPT = 1e-4
 """Relative loss of efficiency by which an optimum counts as lost."""
-_SHORT = 1.002
-"""An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
-_PHASES = np.linspace(0.0, 1.0, 1001)
-_CORNERS = 200
-"""Vertices by which a path of arcs is laid into a chain of other links."""
 
 
 def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float:
@@ -46,48 +37,6 @@ def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float
 def delta_at_unit_speed(problem: Problem) -> float:
     """The final delta of a problem in body lengths per radian of path, for a path as long as its guess."""
     return problem.delta / (path_length(problem.guess) if isinstance(problem.gait, Harmonic) else 1.0)
-
-
-def over_links(gait: AnyGait, body: Chain, other: Chain, joint_limit: float = float(np.pi)) -> AnyGait:
-    """A gait of a chain laid into another chain: every link gets the mean tangent angle of the part of the body it covers.
-
-    That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of arcs becomes a polygon of
-    many corners. Where links would cross, or a joint pass its limit, all angles shrink.
-    """
-    ends, others = (np.concatenate([[0.0], np.cumsum(b.lengths)]) for b in (body, other))
-    overlap = np.minimum(others[1:, None], ends[1:]) - np.maximum(others[:-1, None], ends[:-1])
-    means = np.maximum(overlap, 0.0) / other.length_column()
-    matrix = np.diff(means @ np.tril(np.ones((body.n_link, body.n_joint)), -1), axis=0)
-    angles = matrix @ gait.angles(_PHASES)
-    matrix = matrix * min(1.0, largest_factor(other, joint_limit, angles))
-    if isinstance(gait, Fourier):
-        return Fourier(matrix @ gait.mean, matrix @ gait.cos, matrix @ gait.sin)
-    if isinstance(gait, Corners):
-        return Corners(matrix @ gait.corners, gait.symmetry)
-    last = gait.edges[-1]
-    vertices = matrix @ gait.angles(np.linspace(0.0, last, _CORNERS + 1))
-    return Corners(vertices[:, :-1] if gait.symmetry == "none" else vertices, gait.symmetry)
-
-
-def laid_into(
-    gait_class: AnyClass, gait: AnyGait, body: Chain, joint_limit: float = float(np.pi), smallest_shape_speed: float = 0.1
-) -> AnyGait:
-    """The gait that starts a search in a class: its Fourier series for harmonics, else itself, made admissible.
-
-    A truncated series overshoots, and a path that touches its limits is no longer admissible then: all angles shrink. It cuts
-    corners, and a path as short as it may be becomes too short: it grows about its mean.
-    """
-    near = fourier_through(gait, gait_class) if isinstance(gait_class, Harmonic) else gait
-    growth = 2 * np.pi * smallest_shape_speed / path_length(near)
-    if growth > _SHORT and isinstance(near, Fourier):
-        near = Fourier(near.mean, growth * near.cos, growth * near.sin)
-    elif growth > _SHORT and isinstance(near, Corners):
-        mean = near.angles(_PHASES[:-1]).mean(axis=1, keepdims=True)
-        near = Corners(mean + growth * (near.corners - mean), near.symmetry)
-    if near is gait or not isinstance(near, Fourier):
-        return near
-    factor = min(1.0, largest_factor(body, joint_limit, near.angles(_PHASES)))
-    return Fourier(factor * near.mean, factor * near.cos, factor * near.sin)
 
 
 def prolonged(
@@ -131,7 +80,7 @@ def maximise_from(
     **changes
         As for `prolonged`.
     """
-    solve = maximise_efficiency if certified else continue_delta
+    solve = maximise_efficiency if certified else optimum
 
     def value(solution: Solution) -> float:
         return efficiency_of(solution) if found(solution, certified) else -np.inf
@@ -154,7 +103,7 @@ def found(solution: Solution, certified: bool) -> bool:
 
 def efficiency_of(solution: Solution) -> float:
     """The efficiency of the replay, or that of the mesh where there is no certificate."""
-    return solution.efficiency if solution.certificate is None else solution.certificate.efficiency
+    return solution.measured.efficiency
 
 
 def continue_classes(
@@ -180,7 +129,7 @@ def continue_classes(
     list of Solution
         In the order they were solved, failed ones too; a class that fails passes on what it was given.
     """
-    solve = maximise_efficiency if certified else continue_delta
+    solve = maximise_efficiency if certified else optimum
     solutions: list[Solution] = []
     gait: AnyGait = problem.guess
     known: float | None = None

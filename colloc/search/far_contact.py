@@ -7,19 +7,34 @@ then on, and the problem is solved again (a cutting-plane method). It ends after
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from colloc.collocation.program import GaitProgram
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
 from colloc.mechanics.contact import Pairs, crossing_depth, far_pairs, passing_depth
 
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs are checked; the certificate checks 20000 a period."""
 TOUCHING = 1e-8
 """Penetration [body lengths] that counts as contact, not as crossing."""
+
+
+class Members(Protocol):
+    """A class of gaits by parameters."""
+
+    @property
+    def problem(self) -> Problem: ...
+
+    def member(self, parameters: np.ndarray) -> AnyGait:
+        """The gait of a parameter vector."""
+
+
 _FRACTIONS = np.linspace(1.0, 0.0, 21)
 
 
-def crossing_pairs(program: GaitProgram, parameters: np.ndarray) -> Pairs:
+def crossing_pairs(program: Members, parameters: np.ndarray) -> Pairs:
     """Pairs of links more than two apart that cross, or pass through each other, in a gait.
 
     Judged by plain intersection: the smooth `mechanics.contact.clearance` keeps a small distance, and constraining pairs that
@@ -34,7 +49,7 @@ def crossing_pairs(program: GaitProgram, parameters: np.ndarray) -> Pairs:
     )
 
 
-def last_free(program: GaitProgram, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
+def last_free(program: Members, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
     """Gait parameters on the way from those of a free gait to those of one with crossing links, as far as links stay apart."""
     for fraction in _FRACTIONS:
         between = free + fraction * (crossing - free)

@@ -8,7 +8,7 @@ import numpy as np
 
 from colloc.collocation.modal_transcription import transcribe_modal
 from colloc.gaits.harmonic import Fourier
-from colloc.results.solution import Check
+from colloc.results.checks import Check
 from colloc.search.nlp import OPTIMAL_TOLERANCE, NlpResult, Solver
 from colloc.smooth.modal_problem import ModalProblem
 from colloc.smooth.period import Period, measured_period

@@ -11,11 +11,9 @@ import numpy as np
 from scipy import sparse
 
 from colloc.collocation.program import Program
-from colloc.collocation.reduced_program import CondensedProgram
-from colloc.collocation.transcription import Transcription
-from colloc.gaits.problem import CONDENSED
-from colloc.numerics.blocks import Oracles, oracles
+from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.search.stop_request import StopRequest
 from colloc.system.interruption import interruptible
 
 IPOPT_OPTIONS: dict[str, object] = {
@@ -37,9 +35,6 @@ IPOPT_OPTIONS: dict[str, object] = {
     "warm_start_mult_bound_push": 1e-5,
     "max_iter": 60,
 }
-CONDENSED_OPTIONS: dict[str, object] = {"alpha_red_factor": 0.2, "watchdog_shortened_iter_trigger": 3}
-"""Every trial step costs a balance, and steps are cut at kinks: cut them faster, and soon try a full one (half the time of the
-slowest starts at (1, 1, 3))."""
 LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}
 """With lifted forces theta_max_fact decides: it keeps the iterates near the balance manifold, from which a step along
 negative curvature would otherwise carry them away for good. The price is up to 120 short steps a level. The velocity map
@@ -116,23 +111,14 @@ class Solver(Generic[AnyProgram]):
     def __init__(self, transcription: AnyProgram, options: dict[str, object] | None = None) -> None:
         self.transcription = transcription
         self.oracles: Oracles = oracles(transcription.assembly)
-        self._reduced: CondensedProgram | None = None
-        if isinstance(transcription, Transcription) and transcription.problem.formulation == CONDENSED:
-            self._reduced = CondensedProgram(transcription)
-        own = CONDENSED_OPTIONS if self._reduced else LIFTED_OPTIONS if transcription.lifted else {}
+        own = LIFTED_OPTIONS if transcription.lifted else {}
         chosen = {**IPOPT_OPTIONS, **own, **(options or {})}
         settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         settings |= {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "calc_f": False, "calc_g": False}
         settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
-        program = self._reduced or self.oracles
-        self._nlp, self._settings = program.nlp, {**settings, **program.options}
-        self._solvers: dict[int | None, ca.Function] = {}
-
-    def _solver(self, iterations: int | None) -> ca.Function:
-        if iterations not in self._solvers:
-            limit = {} if iterations is None else {"ipopt.max_iter": iterations}
-            self._solvers[iterations] = ca.nlpsol("colloc", "ipopt", self._nlp, {**self._settings, **limit})
-        return self._solvers[iterations]
+        self._stop = StopRequest(self.oracles.nlp)  # held here: CasADi does not keep it alive
+        settings |= {**self.oracles.options, "iteration_callback": self._stop}
+        self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
 
     def solve(
         self,
@@ -140,7 +126,6 @@ class Solver(Generic[AnyProgram]):
         delta: float,
         multipliers: tuple[np.ndarray, np.ndarray] | None = None,
         radius: float = np.inf,
-        iterations: int | None = None,
     ) -> NlpResult:
         """Maximise efficiency from x.
 
@@ -153,10 +138,8 @@ class Solver(Generic[AnyProgram]):
             By default those of the equations that come closest to stationarity at x.
         radius : float
             Trust region: how far each gait parameter may move [rad]. A result on its edge is solved again from there.
-        iterations : int, optional
-            Give up after so many in each region; by default after the number in the options.
         """
-        result = self._solve_within(x, delta, multipliers, radius, iterations)
+        result = self.solve_within(x, delta, multipliers, radius)
         own = self.transcription.layout.parameters[:, 0]
         here, widest = radius, _WIDEST
         for count in range(_REGIONS):
@@ -165,95 +148,71 @@ class Solver(Generic[AnyProgram]):
             x = result.x
             if count >= _ALIKE:
                 here = max(radius, min(2 * here, widest))
-            result = self._solve_within(x, delta, None, here, iterations).accumulated(result)
+            result = self.solve_within(x, delta, None, here).accumulated(result)
             if not result.optimal and here > radius:
                 here = widest = radius  # kinks are too many further out
-                result = self._solve_within(x, delta, None, here, iterations).accumulated(result)
+                result = self.solve_within(x, delta, None, here).accumulated(result)
         return replace(result, complementarity=np.inf, status="still moving")
 
-    def _solve_within(
-        self,
-        x: np.ndarray,
-        delta: float,
-        multipliers: tuple[np.ndarray, np.ndarray] | None,
-        radius: float,
-        iterations: int | None,
+    def solve_within(
+        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None, radius: float
     ) -> NlpResult:
+        """The same within one trust region, on whose edge the result may lie."""
         t = self.transcription
         own = t.layout.parameters[:, 0]
-        worst = t.block_parameters(x[own])
-        parameters = self.oracles.parameter_vector(delta / t.speed_unit, worst)
+        parameters = self._parameters(x, delta)
         lower, upper = t.lower.copy(), t.upper.copy()
         lower[own], upper[own] = np.maximum(lower[own], x[own] - radius), np.minimum(upper[own], x[own] + radius)
-        solver = self._solver(iterations)
-        if self._reduced is not None:
-            return self._solve_condensed(solver, x, delta / t.speed_unit, multipliers, parameters, worst, (lower, upper))
         limits = {"lbx": lower, "ubx": upper, "lbg": t.constraint_lower, "ubg": t.constraint_upper}
-        lam_x, lam_g = multipliers or (np.zeros_like(x), self._estimated_multipliers(x, parameters))
+        lam_x, lam_g = multipliers or self._completed(x, parameters, np.zeros_like(x), np.zeros(t.assembly.m))
         duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
         with interruptible():
-            solution = solver(x0=x, p=parameters, **limits, **duals)
+            solution = self._solver(x0=x, p=parameters, **limits, **duals)
         seconds = time.perf_counter() - start
-        stats = solver.stats()
+        stats = self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
         return self._measured(x, lam_x, lam_g, parameters, (lower, upper), stats, seconds)
 
-    def _solve_condensed(
-        self,
-        solver: ca.Function,
-        x: np.ndarray,
-        delta: float,
-        multipliers: tuple[np.ndarray, np.ndarray] | None,
-        parameters: np.ndarray,
-        worst: list[np.ndarray],
-        bounds: tuple[np.ndarray, np.ndarray],
-    ) -> NlpResult:
-        """Solve with all equations eliminated; what comes back is measured as a point of the full program."""
-        reduced, own = self._reduced, self.transcription.layout.parameters[:, 0]
-        assert reduced is not None
-        at = reduced.condensed
-        free = np.full(at.n - own.size, np.inf)
-        limits = {"lbx": np.append(bounds[0][own], -free), "ubx": np.append(bounds[1][own], free)}
-        limits |= {"lbg": reduced.lower, "ubg": reduced.upper}
-        v = at.variables(x)
-        lam_x, lam_g = np.zeros(v.size), reduced.estimated_multipliers(v, delta)
-        if multipliers is not None:
-            lam_x[: own.size], lam_g = multipliers[0][own], multipliers[1][reduced.kept]
-        duals = {"lam_x0": lam_x, "lam_g0": lam_g}
-        start = time.perf_counter()
-        with interruptible():
-            solution = solver(x0=v, p=reduced.parameter_vector(delta, worst), **limits, **duals)
-        seconds = time.perf_counter() - start
-        stats = solver.stats()
-        v = np.array(solution["x"]).ravel()
-        x = at.lifted(v, delta)
-        lam_x = np.zeros(x.size)
-        lam_x[own] = np.array(solution["lam_x"]).ravel()[: own.size]
-        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel()
-        jacobian = _scipy(self.oracles.options["jac_g"](x, parameters)[1])
-        lam_g = reduced.multipliers(np.array(solution["lam_g"]).ravel(), gradient, jacobian)
-        return self._measured(x, lam_x, lam_g, parameters, bounds, stats, seconds)
-
-    def _estimated_multipliers(self, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Multipliers of the equality rows that minimise the Lagrangian's gradient at x; zero for inequalities."""
+    def _parameters(self, x: np.ndarray, delta: float) -> np.ndarray:
         t = self.transcription
-        jacobian, equality = self._equality_jacobian(x, parameters)
-        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel()[t.lower < t.upper]
-        multipliers = np.zeros(t.assembly.m)
-        multipliers[equality] = estimated_multipliers(jacobian, gradient)
-        return multipliers
+        return self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
 
-    def _equality_jacobian(self, x: np.ndarray, parameters: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
+    def measured(self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray) -> NlpResult:
+        """The first-order conditions at x, solving nothing, with multipliers of the equations that come closest to them.
+
+        Parameters
+        ----------
+        x : (n,)
+        delta : float
+        lam_x, lam_g : (n,), (m,)
+            Multipliers of the bounds and of the inequalities.
+        """
+        parameters = self._parameters(x, delta)
+        multipliers = self._completed(x, parameters, lam_x, lam_g)
+        bounds = self.transcription.lower, self.transcription.upper
+        nothing = {"return_status": "measured", "iter_count": 0}
+        return self._measured(x, *multipliers, parameters, bounds, nothing, 0.0)
+
+    def _completed(
+        self, x: np.ndarray, parameters: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's gradient, given all others."""
         t = self.transcription
-        equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
-        return _scipy(self.oracles.options["jac_g"](x, parameters)[1])[equality][:, t.lower < t.upper], equality
+        free, equality = t.lower < t.upper, np.flatnonzero(t.constraint_lower == t.constraint_upper)
+        jacobian = as_sparse(self.oracles.options["jac_g"](x, parameters)[1])
+        lam_g = np.where(t.constraint_lower == t.constraint_upper, 0.0, lam_g)
+        gradient = np.array(self.oracles.options["grad_f"](x, parameters)[1]).ravel() + jacobian.T @ lam_g + lam_x
+        lam_g[equality] = estimated_multipliers(jacobian[equality][:, free], gradient[free])
+        return lam_x, lam_g
 
     def equality_jacobian(self, x: np.ndarray, delta: float) -> tuple[sparse.csr_matrix, np.ndarray]:
         """Jacobian of the equations in the free variables at x, and their row numbers among all constraints."""
         t = self.transcription
-        parameters = self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
-        return self._equality_jacobian(x, parameters)
+        equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
+        return as_sparse(self.oracles.options["jac_g"](x, self._parameters(x, delta))[1])[equality][
+            :, t.lower < t.upper
+        ], equality
 
     def _measured(
         self,
@@ -293,10 +252,6 @@ class Solver(Generic[AnyProgram]):
             float(evaluation),
             outside,
         )
-
-
-def _scipy(matrix: ca.DM) -> sparse.csr_matrix:
-    return sparse.csc_matrix((matrix.nonzeros(), matrix.row(), matrix.colind()), shape=matrix.shape).tocsr()
 
 
 def _complementarity(multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:

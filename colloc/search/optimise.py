@@ -1,34 +1,86 @@
-"""From a problem to a certified solution: continuation, then the certificate."""
+"""From a problem to a certified solution: search in the reduced space, answer by the full program, certificate."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
+from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
-from colloc.results.solution import Level, Solution
-from colloc.search.continuation import continue_delta
-from colloc.search.level_run import TRIVIAL, Report
+from colloc.results.level import Level
+from colloc.results.solution import Solution
+from colloc.search.friction_unit import in_friction_units, restated
+from colloc.search.full_program import answer, level_found
+from colloc.search.global_search import STARTS, best_of
+from colloc.search.literal_search import literal_optimum
+from colloc.search.reduced_search import Found, descended, refined, searched
 from colloc.system.errors import NotConvergedError
 
-FINER = "more intervals or a smaller mesh_tolerance"
+TRIVIAL_EFFICIENCY = 1e-4
+"""Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
+FINER = "a smaller mesh_tolerance"
 ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
     "self-contact": "another guess or a smaller joint_limit",
     "delta influence": "a smaller delta",
-    "delta step": "a smaller delta",
 }
 """What helps against a check that failed; anything else is a matter of the mesh."""
+
+Report = Callable[[Level], None]
 
 
 def is_trivial(solution: Solution) -> bool:
     """Whether the search ended in a gait that goes nowhere, such as a retraced one: a critical point, but no optimum."""
-    return solution.last.status == TRIVIAL
+    return bool(solution.levels) and abs(solution.efficiency) * solution.problem.friction.smallest < TRIVIAL_EFFICIENCY
 
 
-def maximise_efficiency(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
+def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
+    """A local optimum of a problem, not certified yet.
+
+    Parameters
+    ----------
+    problem : Problem
+    on_level : callable, optional
+        Called with every `colloc.results.solution.Level` as it ends.
+    before : sequence of Level
+        Levels of an interrupted run of the same problem; it goes on from the last one.
+
+    Returns
+    -------
+    Solution
+        Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
+    """
+    begin, levels = time.perf_counter(), list(before)
+    scaled, unit = in_friction_units(problem)
+
+    def report(level: Level) -> None:
+        levels.append(restated(level, unit))
+        if on_level is not None:
+            on_level(levels[-1])
+
+    def ended(found: Found) -> None:
+        report(level_found(found))
+
+    if before:
+        done = Solution(problem, before)
+        space, v = space_near(scaled, done.gait, done.last.edges, done.last.scheme)
+        found, lacks = refined(descended(Found.at(space, v, done.last.delta), scaled, ended), ended)
+    else:
+        found, lacks = searched(scaled, scaled.guess, ended)
+    level, fails = answer(found)
+    report(level)
+    message = " ".join(part for part in (fails, lacks) if part)
+    return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)
+
+
+def maximise_efficiency(
+    problem: Problem, on_level: Report | None = None, before: Sequence[Level] = (), *, literal: bool = False
+) -> Solution:
     """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
 
     Parameters
@@ -37,7 +89,9 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
     on_level : callable, optional
         Called with every `colloc.results.solution.Level` as it ends.
     before : sequence of Level
-        Levels of an interrupted run of the same problem; it goes on from the last optimal one.
+        Levels of an interrupted run of the same problem; it goes on from the last one.
+    literal : bool
+        Whether IPOPT searches on the full program from the guess alone (`colloc.search.literal_search`).
 
     Returns
     -------
@@ -45,27 +99,80 @@ def maximise_efficiency(problem: Problem, on_level: Report | None = None, before
         With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
     """
     begin = time.perf_counter()
-    solution = continue_delta(problem, on_level, before=before)
+    solution = literal_optimum(problem, on_level) if literal else optimum(problem, on_level, before)
     if is_trivial(solution):
         solution.message = (
             "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
             "efficiency). Try another guess, or an imposed symmetry."
         )
-    elif solution.levels[-1].optimal:
-        try:
-            solution.certificate = certify(solution)
-        except NotConvergedError as error:
-            solution.message = f"the replay failed: {error}"
-        else:
-            failed = solution.certificate.failures
-            if failed:
-                failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
-                advice = " and ".join(dict.fromkeys(ADVICE.get(c.name, FINER) for c in failed))
-                solution.message = f"the certificate failed: {failures}. Try {advice}."
-            elif on_speed_floor(problem, solution.gait):
-                solution.message = (
-                    f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: smaller gaits are "
-                    "more efficient still. Lower the bound (and delta with it) to see how far that goes."
-                )
+    else:
+        _certified(solution)
     solution.seconds = time.perf_counter() - begin
     return solution
+
+
+def best_gait(
+    problem: Problem,
+    starts: int = STARTS,
+    on_level: Report | None = None,
+    seconds: float = np.inf,
+    before: Sequence[Level] = (),
+) -> Solution:
+    """Maximise d/W over the whole class, as far as many starts can tell, and certify the result.
+
+    Parameters
+    ----------
+    problem : Problem
+    starts : int
+        The guess, known gaits and seeded samples (`colloc.search.global_search.starting_gaits`). With 1 the guess alone, as
+        `maximise_efficiency`.
+    on_level : callable, optional
+        Called with every `colloc.results.solution.Level` of the best gait.
+    seconds : float
+        Wall time after which no other start is begun.
+    before : sequence of Level
+        Levels of an interrupted run; it goes on from the last one.
+
+    Returns
+    -------
+    Solution
+        ``solution.starts`` and ``solution.others`` say what it is the best of.
+    """
+    if starts == 1 or before:
+        return maximise_efficiency(problem, on_level, before)
+    begin = time.perf_counter()
+    scaled, unit = in_friction_units(problem)
+    try:
+        chosen = best_of(scaled, starts, seconds)
+    except NotConvergedError:  # what fails with the guess alone is said in detail
+        return maximise_efficiency(problem, on_level)
+    levels = [restated(level_found(found), unit) for found in chosen.levels]
+    for level in levels:
+        if on_level is not None:
+            on_level(level)
+    solution = maximise_efficiency(problem, on_level, levels)
+    solution.starts = chosen.starts
+    solution.others = tuple(replace(other, efficiency=other.efficiency / unit) for other in chosen.others)
+    solution.seconds = time.perf_counter() - begin
+    return solution
+
+
+def _certified(solution: Solution) -> None:
+    """Put the certificate into a solution, and what it says into its message."""
+    problem = solution.problem
+    try:
+        solution.certificate = certify(solution)
+    except NotConvergedError as error:
+        solution.message = f"the replay failed: {error}"
+        return
+    failed = solution.certificate.failures
+    if failed:
+        failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
+        advice = " and ".join(dict.fromkeys(ADVICE.get(c.name, FINER) for c in failed))
+        parts = [f"the certificate failed: {failures}. Try {advice}.", solution.message]
+        solution.message = " ".join(p for p in parts if p)
+    elif on_speed_floor(problem, solution.gait):
+        solution.message = (
+            f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: smaller gaits are "
+            "more efficient still. Lower the bound (and delta with it) to see how far that goes."
+        )

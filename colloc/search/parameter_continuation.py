@@ -14,7 +14,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
-from colloc.search.continuation import continue_delta
+from colloc.search.optimise import optimum
 from colloc.system.errors import ProblemError
 
 _SMALLEST_FRACTION = 1 / 64
@@ -95,7 +95,7 @@ def continue_parameter(
             # close to an optimum there is no need to begin at strong regularisation again
             near = 10 * here.delta if name == "delta" else 3 * here.delta
             here = here.with_(guess=guess.gait, delta_start=min(here.delta_start, near))
-        step = Step(value, continue_delta(here))
+        step = Step(value, optimum(here))
         steps.append(step)
         if on_step is not None:
             on_step(step)

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.point_friction import force_density
+from colloc.mechanics.friction import Friction, force_density
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, Panels, node_velocity
 from colloc.smooth.motion import Motion

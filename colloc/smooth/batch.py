@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.damped_newton import solve3
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.point_friction import density_jacobian, force_density, regularised_speed, secant_density
+from colloc.mechanics.friction import Friction, density_jacobian, force_density, regularised_speed, secant_density
 from colloc.smooth.curve import Curve, Panels, curve, node_velocity, pulled_back, resultant
 
 

@@ -16,8 +16,7 @@ from functools import cache
 import numpy as np
 
 from colloc.mechanics.body import LinkVelocity
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.point_friction import force_density
+from colloc.mechanics.friction import Friction, force_density
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.curve import Curve, Panels, curve, node_velocity, resultant
 from colloc.smooth.motion import Motion

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.mechanics.damped_newton import State, solve, starting_state
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.point_friction import force_density
+from colloc.mechanics.friction import Friction, force_density
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, Panels, curve, node_velocity, resultant

@@ -5,25 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import suppress
 from dataclasses import replace
 
-from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.path_samples import fourier_through
+from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import LATIN_HYPERCUBE, seed_class, start_gait
-from colloc.numerics.machine_code import compiler
+from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.results.checks import Certificate
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
-from colloc.results.solution import Certificate, Level, Solution
-from colloc.search.compiled_problem import compile_problem
+from colloc.results.level import Level
+from colloc.results.solution import Solution
 from colloc.search.optimise import is_trivial, maximise_efficiency
-from colloc.system.errors import CollocError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
-
-_MANY = 8
-"""Starts that are worth compiling for."""
-ARCHIVED_HARMONICS = 16
-"""Free paths and polygons are archived and told apart by their Fourier series in arc length."""
 
 
 class _TimeLimit(Exception):
@@ -31,7 +23,7 @@ class _TimeLimit(Exception):
 
 
 def run_start(
-    problem: Problem, sampler: str, seed: int, start: int, time_limit: float, known: Fourier | None = None
+    problem: Problem, sampler: str, seed: int, start: int, time_limit: float, known: AnyGait | None = None
 ) -> Outcome:
     """Solve and certify one start. Whatever goes wrong becomes the outcome's status and message; nothing is raised.
 
@@ -40,10 +32,10 @@ def run_start(
     return run_guess(problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit)
 
 
-def run_guess(problem: Problem, start_from: Callable[[], Fourier], start: int, time_limit: float) -> Outcome:
+def run_guess(problem: Problem, start_from: Callable[[], AnyGait], start: int, time_limit: float) -> Outcome:
     """Solve and certify a problem from the gait that `start_from` makes, as start number `start`; raises nothing."""
     begin, cpu = time.perf_counter(), time.process_time()
-    guess = fourier_through(problem.guess, seed_class(problem))
+    guess = problem.guess
     reached: list[Level] = []
     outcome = Outcome(start, ERROR, "", guess, guess)
 
@@ -70,17 +62,17 @@ def run_guess(problem: Problem, start_from: Callable[[], Fourier], start: int, t
     return replace(outcome, status=status, message=message, iterations=iterations, seconds=wall, cpu_seconds=cpu)
 
 
-def _outcome(start: int, guess: Fourier, solution: Solution) -> Outcome:
+def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
     optimal = [level for level in solution.levels if level.optimal]
-    measured: Certificate | Level | None = solution.certificate or (optimal[-1] if optimal else None)
+    certificate = solution.certificate
+    measured: Certificate | Level | None = certificate if certificate.replayed else optimal[-1] if optimal else None
     status = TRIVIAL if is_trivial(solution) else solution.status
-    gait = fourier_through(solution.gait, Harmonic(ARCHIVED_HARMONICS, solution.problem.gait.symmetry))
-    outcome = Outcome(start, status, solution.message, guess.resized(gait.n_harmonic), gait)
+    outcome = Outcome(start, status, solution.message, guess, solution.gait)
     if measured is not None:
         efficiency, distance, work = measured.efficiency, measured.distance, measured.work
         outcome = replace(outcome, delta=optimal[-1].delta, efficiency=efficiency, distance=distance, work=work)
-    if solution.certificate is not None:
-        outcome = replace(outcome, efficiency_error=solution.certificate.efficiency_error)
+    if certificate.replayed:
+        outcome = replace(outcome, efficiency_error=certificate.efficiency_error)
     return outcome
 
 
@@ -93,11 +85,9 @@ def run_starts(
     workers: int = 1,
     time_limit: float = 300.0,
     executor: Callable[[int], Executor] = process_pool,
-    known: Mapping[int, Fourier] | None = None,
+    known: Mapping[int, AnyGait] | None = None,
 ) -> Iterator[Outcome]:
     """Outcomes of the given starts, each as soon as it is there.
-
-    For 8 starts or more, what they evaluate is compiled first if there is a C compiler (see `colloc.numerics.machine_code`).
 
     Parameters
     ----------
@@ -114,13 +104,10 @@ def run_starts(
         Makes an executor for a number of workers: processes by default; threads, or the one a Dask client gives
         (``lambda n: client.get_executor()``), will do. When a worker dies (killed, out of memory) a new one is made, the
         starts under way are tried again one by one, and one that kills its worker again is recorded as crashed.
-    known : mapping of int to Fourier, optional
+    known : mapping of int to a gait, optional
         Gaits from which starts of these numbers begin instead of a sample: results of an earlier run to go on from.
     """
     starts = list(starts)
-    if len(starts) >= _MANY and compiler() is not None:
-        with suppress(CollocError):  # whatever is wrong with the problem, its starts will say
-            compile_problem(problem)
     waiting = iter(starts)
 
     def ready() -> Task | None:
@@ -129,6 +116,5 @@ def run_starts(
 
     for task, outcome in completed(run_start, ready, workers=workers, executor=executor):
         if isinstance(outcome, Lost):
-            guess = fourier_through(problem.guess, seed_class(problem))
-            outcome = Outcome(task.arguments[3], CRASHED, outcome.message, guess, guess)
+            outcome = Outcome(task.arguments[3], CRASHED, outcome.message, problem.guess, problem.guess)
         yield outcome

@@ -1,178 +1,73 @@
-"""The journal of a study: every finished cell, on disk before it is reported, one line each.
-
-A journal is a folder of text files, one a run, so that two runs cannot harm each other. A line is the SHA-256 of a JSON
-text, a blank, and the text. Lines are only ever appended, each by one write, and flushed to the disk. What a kill leaves
-of the last line is not a record, and is ignored; so is, with a warning, a line whose sum is wrong. Nothing is executed.
-"""
+"""The journal of a study: every finished visit to a cell is a row on the disk before it is reported (`system.row_file`)."""
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import json
 import math
-import os
-import uuid
-from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from colloc.gaits.harmonic import Fourier
-from colloc.results.distinct_optima import STATUSES, Outcome
+from colloc.results.outcome_fields import outcome_fields, outcome_from
 from colloc.studies.cell import Attempt
 from colloc.system.errors import CollocError, StoreError
+from colloc.system.row_file import hash_of, put_rows, read_rows
 
-FORMAT = "colloc study journal 1"
-LONGEST_LINE, LARGEST_FILE = 2**22, 2**31
-_NUMBERS = [f.name for f in fields(Outcome) if f.name not in ("guess", "gait", "status", "message")]
+KIND, NAME = "colloc journal 1", "journal.sqlite"
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """All attempts of one visit to a cell, and the hash of its problem."""
+    """What one visit to a cell gave, and the hash of its problem; see `colloc.studies.cell.Visit`."""
 
     problem_hash: str
     attempts: tuple[Attempt, ...]
+    scores: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
-class JournalText:
-    """What was read: records in order, and how many lines were damaged."""
+class Journal:
+    """What was read: records in order, and how many rows were damaged."""
 
     records: list[Record] = field(default_factory=list)
     damaged: int = 0
 
 
-def _gait_fields(gait: Fourier) -> dict[str, Any]:
-    return {name: getattr(gait, name).tolist() for name in ("mean", "cos", "sin")}
+def _record_fields(record: Record) -> dict[str, Any]:
+    return {
+        "problem": record.problem_hash,
+        "attempts": [{"origin": a.origin, "key": a.key, "outcome": outcome_fields(a.outcome)} for a in record.attempts],
+        "scores": {key: score for key, score in record.scores.items() if math.isfinite(score)},
+    }
 
 
-def _attempt_fields(attempt: Attempt) -> dict[str, Any]:
-    outcome = attempt.outcome
-    entry = {"origin": attempt.origin, "key": attempt.key, "status": outcome.status, "message": outcome.message[:1000]}
-    numbers = {name: value if math.isfinite(value := getattr(outcome, name)) else None for name in _NUMBERS}
-    return entry | numbers | {"guess": _gait_fields(outcome.guess), "gait": _gait_fields(outcome.gait)}
+def _record_from(entry: dict[str, Any]) -> Record:
+    attempts = tuple(Attempt(str(a["origin"]), str(a["key"]), outcome_from(a["outcome"])) for a in entry["attempts"])
+    return Record(str(entry["problem"]), attempts, {str(key): float(score) for key, score in entry["scores"].items()})
 
 
-def _attempt_in(entry: dict[str, Any]) -> Attempt:
-    numbers: dict[str, Any] = {name: math.nan if entry[name] is None else entry[name] for name in _NUMBERS}
-    if not all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers.values()):
-        raise ValueError("not numbers")
-    origin, key, status, message = texts = [entry[name] for name in ("origin", "key", "status", "message")]
-    if not all(isinstance(text, str) for text in texts) or status not in STATUSES:
-        raise ValueError("not texts")
-    guess, gait = (Fourier(**entry[name]) for name in ("guess", "gait"))
-    return Attempt(origin, key, Outcome(status=status, message=message, guess=guess, gait=gait, **numbers))
-
-
-def line_of(record: Record) -> bytes:
-    """A record as a line."""
-    entry = {"problem": record.problem_hash, "attempts": [_attempt_fields(attempt) for attempt in record.attempts]}
-    text = json.dumps(entry, allow_nan=False).encode()
-    return hashlib.sha256(text).hexdigest().encode() + b" " + text + b"\n"
-
-
-def record_in(line: bytes) -> Record:
-    """The record of a line.
-
-    Raises
-    ------
-    ValueError
-        If the sum is wrong or the text is no record.
-    """
-    digest, _, text = line.rstrip(b"\n").partition(b" ")
-    if hashlib.sha256(text).hexdigest().encode() != digest:
-        raise ValueError("wrong sum")
-    try:
-        entry = json.loads(text)
-        return Record(str(entry["problem"]), tuple(_attempt_in(fields) for fields in entry["attempts"]))
-    except (KeyError, TypeError, CollocError, RecursionError) as error:
-        raise ValueError(f"not a record: {error}") from None
-
-
-def _lines(path: Path) -> Iterator[bytes]:
-    """Whole lines of bounded length; one that is longer comes back empty, one without an end not at all."""
-    with open(path, "rb") as file:
-        while line := file.readline(LONGEST_LINE):
-            if line.endswith(b"\n"):
-                yield line
-                continue
-            rest = line
-            while rest and not rest.endswith(b"\n"):
-                rest = file.readline(LONGEST_LINE)
-            if rest:
-                yield b""
-
-
-def read_journal(folder: Path) -> JournalText:
+def read_journal(folder: Path) -> Journal:
     """All records of a folder; none if there is no such folder.
 
     Raises
     ------
     StoreError
-        If a file cannot be read, is too large, or is no journal.
+        If the journal cannot be read, is damaged beyond single rows, or was written by an older colloc.
     """
-    found = JournalText()
-    for path in sorted(folder.glob("journal-*.jsonl")):
+    old = next(folder.glob("journal-*.jsonl"), None)
+    if old is not None:
+        raise StoreError(f"{old} was written by an older colloc, which this one does not read; choose another --output.")
+    rows = read_rows(folder / NAME, KIND)
+    found = Journal(damaged=rows.damaged)
+    for entry in rows.values.values():
         try:
-            if path.stat().st_size > LARGEST_FILE:
-                raise StoreError(f"{path} is too large for a journal; move it away.")
-            lines = _lines(path)
-            head = next(lines, FORMAT.encode())
-            if head.strip() != FORMAT.encode():
-                raise StoreError(f"{path} is damaged, or not a journal of colloc; move it away.")
-            for line in lines:
-                try:
-                    found.records.append(record_in(line))
-                except ValueError:
-                    found.damaged += 1
-        except StoreError:
-            raise
-        except OSError as error:
-            raise StoreError(f"cannot read {path}: {error.strerror or error}.") from None
+            found.records.append(_record_from(entry))
+        except (KeyError, TypeError, ValueError, AttributeError, CollocError):
+            found.damaged += 1
     return found
 
 
-class Journal:
-    """A journal file of one run, in a folder that may hold those of others. Use as a context."""
-
-    def __init__(self, folder: Path) -> None:
-        self.path = folder / f"journal-{uuid.uuid4().hex[:12]}.jsonl"
-        self._handle: int | None = None
-
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._handle is not None:
-            os.close(self._handle)
-            self._handle = None
-
-    def append(self, records: list[Record]) -> None:
-        """Write records to the disk; when this returns, they are there.
-
-        Raises
-        ------
-        StoreError
-            If that is not possible. The file then ends with the last whole line.
-        """
-        text = b"".join(map(line_of, records))
-        try:
-            if self._handle is None:
-                self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
-                text = FORMAT.encode() + b"\n" + text
-            before = os.fstat(self._handle).st_size
-            try:
-                if os.write(self._handle, text) != len(text):
-                    raise OSError(28, "no space left on the disk, or a limit on the size of files")
-                os.fsync(self._handle)
-            except OSError:
-                with contextlib.suppress(OSError):
-                    os.ftruncate(self._handle, before)
-                raise
-        except OSError as error:
-            raise StoreError(
-                f"cannot write {self.path}: {error.strerror or error}. What was finished before is kept; make room and "
-                "give the same command again."
-            ) from None
+def append_records(folder: Path, records: Sequence[Record]) -> None:
+    """Put records on the disk; when this returns they are there. StoreError if that is not possible."""
+    entries = [_record_fields(record) for record in records]
+    put_rows(folder / NAME, KIND, {hash_of(entry): entry for entry in entries})

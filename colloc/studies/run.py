@@ -1,38 +1,38 @@
 """Run a study: a wavefront of tasks over any executor, then rounds in which good gaits spread to all their neighbours.
 
 A task waits for the cells its warm starts come from, and takes from nowhere else. So what a study finds does not depend
-on how many workers there are or which is faster.
+on how many workers there are or which is faster. Rounds end when no gait does better in a neighbouring cell, as it is,
+than what is known there; a cell of which that cannot be said although it was tried is marked (`StudyRun.neighbour_efficiency`).
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from colloc.gaits.equivalence import distance
 from colloc.gaits.problem import Problem
-from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome
-from colloc.studies.cell import GUESS, Attempt, Work, best_attempt, run_chunk, start_key
-from colloc.studies.journal import Journal, Record, read_journal
+from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT
+from colloc.studies.cell import BETTER, Attempt, Work, best_attempt, failed_visit, run_chunk, start_key
+from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.study import Index, Study
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
 
 RETRIED = (ERROR, CRASHED, TIME_LIMIT)
-_SAME_FAMILY = 0.2
-"""Gaits of neighbours closer than this root-mean-square distance [rad] are one family: nothing is gained by exchanging them."""
 
 
 @dataclass(eq=False)
 class CellState:
-    """What is known about a cell: its problem (or why there is none), and all attempts."""
+    """What is known about a cell: its problem (or why there is none), all attempts, and what gaits of others achieve there."""
 
     problem: Problem | None
     message: str = ""
     attempts: list[Attempt] = field(default_factory=list)
+    scores: dict[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Attempt | None:
@@ -76,12 +76,14 @@ class StudyRun:
 
     def __init__(self, study: Study, folder: Path, *, retry: bool = False) -> None:
         self.study, self.folder = study, folder
-        text = read_journal(folder)
-        self.damaged = text.damaged
-        by_hash: dict[str, list[Attempt]] = {}
-        for record in text.records:
+        journal = read_journal(folder)
+        self.damaged = journal.damaged
+        attempts: dict[str, list[Attempt]] = {}
+        scores: dict[str, dict[str, float]] = {}
+        for record in journal.records:
             kept = [a for a in record.attempts if not (retry and a.outcome.status in RETRIED)]
-            by_hash.setdefault(record.problem_hash, []).extend(kept)
+            attempts.setdefault(record.problem_hash, []).extend(kept)
+            scores.setdefault(record.problem_hash, {}).update(record.scores)
         self.cells: dict[Index, CellState] = {}
         for cell in study.cells():
             try:
@@ -89,19 +91,38 @@ class StudyRun:
             except ProblemError as error:
                 self.cells[cell] = CellState(None, str(error))
             else:
-                self.cells[cell] = CellState(problem, attempts=list(by_hash.get(problem.hash, [])))
+                known = problem.hash
+                self.cells[cell] = CellState(problem, "", list(attempts.get(known, [])), dict(scores.get(known, {})))
         if all(state.problem is None for state in self.cells.values()):
             raise ProblemError(f"the study {study.name} has no problem in any cell; {next(iter(self.cells.values())).message}")
 
     @property
     def missing(self) -> list[Index]:
-        """Cells with a problem and no attempt yet."""
-        return [cell for cell, state in self.cells.items() if state.problem is not None and not state.attempts]
+        """Cells with a problem whose own guess was not tried yet."""
+        cells = self.cells.items()
+        return [c for c, state in cells if state.problem is not None and start_key(state.problem.guess) not in state.tried]
+
+    def neighbours(self, cell: Index) -> list[Attempt]:
+        """The best attempts of the cells around one, as far as there are any."""
+        return [best for near in self.study.around(cell) if (best := self.cells[near].best) is not None]
+
+    def neighbour_efficiency(self, cell: Index) -> float:
+        """The most that the best gait of a neighbour, moved into the cell's class and otherwise as it is, achieves there.
+
+        NaN if there is none. Where it is more than the cell's own efficiency, the search there has missed something.
+        """
+        scores = [self.cells[cell].scores.get(near.gait_key, math.nan) for near in self.neighbours(cell)]
+        return max((score for score in scores if not math.isnan(score)), default=math.nan)
+
+    def below_neighbour(self, cell: Index) -> bool:
+        """Whether a neighbour's gait does clearly better in the cell than its own best, though it was tried there."""
+        best = self.cells[cell].best
+        return best is not None and self.neighbour_efficiency(cell) > (1 + BETTER) * best.outcome.efficiency
 
     def run(
         self, *, workers: int = 1, executor: Callable[[int], Executor] = process_pool, ahead: int | None = None
     ) -> Iterator[Progress]:
-        """Work on all that is missing; each cell is on the disk before it is yielded.
+        """Work on all that is missing; each cell is on the disk before it is yielded. Cells in which nothing was tried are not.
 
         Parameters
         ----------
@@ -109,13 +130,10 @@ class StudyRun:
             As for `colloc.system.task_pool.completed`; `ahead` is a quarter of the workers, and one, by default.
         """
         ahead = 1 + workers // 4 if ahead is None else ahead
-        with Journal(self.folder) as journal:
-            yield from self._round(0, self._first_chunks(), workers, executor, ahead, journal)
-            for number in range(1, self.study.passes + 1):
-                chunks = self._improvable()
-                if not chunks:
-                    break
-                yield from self._round(number, chunks, workers, executor, ahead, journal)
+        number, chunks = 0, self._first_chunks()
+        while number == 0 or chunks:
+            yield from self._round(number, chunks, workers, executor, ahead)
+            number, chunks = number + 1, self._improvable()
 
     def _first_chunks(self) -> list[tuple[Index, ...]]:
         """Missing cells in runs along the last axis."""
@@ -126,22 +144,12 @@ class StudyRun:
         return [tuple(cells) for cells in grouped.values()]
 
     def _improvable(self) -> list[tuple[Index, ...]]:
-        """Cells around which there is a gait of another family, or any gait if they have none."""
-        found: list[tuple[Index, ...]] = []
-        best = {cell: state.best for cell, state in self.cells.items()}
-        for cell, state in self.cells.items():
-            problem, own = state.problem, best[cell]
-            if problem is None:
-                continue
-            for near in self.study.around(cell):
-                other = best[near]
-                if other is None or other.outcome.gait.n_joint != problem.body.n_joint:
-                    continue
-                gaits = (other.outcome.gait, own.outcome.gait) if own is not None else None
-                if gaits is None or distance(*gaits, problem.body, problem.friction) > _SAME_FAMILY:
-                    found.append((cell,))
-                    break
-        return found
+        """Cells with a neighbour whose best gait was not looked at there."""
+        return [
+            (cell,)
+            for cell, state in self.cells.items()
+            if state.problem is not None and any(near.gait_key not in state.scores for near in self.neighbours(cell))
+        ]
 
     def _round(
         self,
@@ -150,7 +158,6 @@ class StudyRun:
         workers: int,
         executor: Callable[[int], Executor],
         ahead: int,
-        journal: Journal,
     ) -> Iterator[Progress]:
         waiting: dict[int, set[Index]] = {}
         free: deque[int] = deque()
@@ -174,48 +181,43 @@ class StudyRun:
 
         done = 0
         for task, result in completed(run_chunk, ready, workers=workers, executor=executor, ahead=ahead):
-            if isinstance(result, Lost):
-                result = [(work.cell, [_lost(work, result.message)]) for work in task.arguments[0]]
-            hashes = {work.cell: work.problem.hash for work in task.arguments[0]}
-            journal.append([Record(hashes[cell], tuple(attempts)) for cell, attempts in result if attempts])
-            for cell, attempts in result:
-                self.cells[cell].attempts += attempts
-                for k in unlocks.get(cell, []):
-                    waiting[k].discard(cell)
+            works = task.arguments[0]
+            visits = [failed_visit(w, CRASHED, result.message) for w in works] if isinstance(result, Lost) else result
+            hashes = {work.cell: work.problem.hash for work in works}
+            told = [v for v in visits if v.attempts or v.scores]
+            append_records(self.folder, [Record(hashes[v.cell], tuple(v.attempts), v.scores) for v in told])
+            for found in visits:
+                state = self.cells[found.cell]
+                state.attempts += found.attempts
+                state.scores |= found.scores
+                for k in unlocks.get(found.cell, []):
+                    waiting[k].discard(found.cell)
                     if not waiting[k]:
                         free.append(k)
                 done += 1
-                yield Progress(cell, self.cells[cell], attempts, number, done, len(todo))
+                if found.attempts:
+                    yield Progress(found.cell, state, found.attempts, number, done, len(todo))
 
     def _work(self, cell: Index, chunk: tuple[Index, ...], known: dict[Index, Attempt | None] | None) -> Work:
         study, state = self.study, self.cells[cell]
         assert state.problem is not None
-        if known is None:
-            inside = tuple(c for c in study.before(cell) if c in chunk)
-            near = [self.cells[c].best for c in study.before(cell) if c not in chunk]
-            gaits = tuple(a.outcome.gait for a in near if a is not None)
-            cold = study.has_cold_starts(cell) or not (inside or gaits)
-            incumbent = 0.0
-        else:
-            inside, cold = (), False
-            gaits = tuple(a.outcome.gait for c in study.around(cell) if (a := known[c]) is not None)
-            own = known[cell]
-            incumbent = 0.0 if own is None else own.outcome.efficiency
+        first = known is None
+        inside = tuple(c for c in study.before(cell) if c in chunk) if first else ()
+        near = study.before(cell) if first else study.around(cell)
+        best = (self.cells[c].best if known is None else known[c] for c in near if c not in inside)
+        gaits = tuple(a.outcome.gait for a in best if a is not None and a.gait_key not in state.scores)
+        own = state.best if known is None else known[cell]
         return Work(
             cell,
             state.problem,
+            first,
             inside,
             gaits,
-            tuple(range(study.cold_starts)) if cold else (),
-            incumbent,
+            study.cold_numbers(cell) if first else (),
+            0.0 if own is None else own.outcome.efficiency,
             state.tried,
             study.warm_starts,
             study.warm_delta_start,
             study.time_limit,
             study.seed,
         )
-
-
-def _lost(work: Work, message: str) -> Attempt:
-    guess = work.problem.guess
-    return Attempt(GUESS, start_key(guess), Outcome(0, CRASHED, message, guess, guess))

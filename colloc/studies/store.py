@@ -1,10 +1,14 @@
 """The result of a study in one file: netCDF-4 compatible HDF5 that xarray, ncdump and plain h5py open.
 
 Dimensions are the axes of the study, and ``joint`` and ``harmonic``; every dimension has its coordinate. Numbers of cells
-without a certified gait are NaN, and ``status`` and ``message`` say why. Layout::
+without a certified gait are NaN, and ``status`` and ``message`` say why. ``delta`` is per period for every class; ``mean``,
+``cos`` and ``sin`` of a free path or polygon are its Fourier series in arc length, cut (the journal has the gait itself).
+``below_neighbour`` is 1 where a neighbour's gait, as it is, does better (``neighbour_efficiency``) than the cell's own.
+Layout::
 
-    efficiency, efficiency_error, distance, work, delta, trivial_bound, upper_bound, seconds   (axes)
-    wave, forward (axes)   winding, bilateral, antipodal, retraced, at_slowest, starts, starts_certified   (axes)
+    efficiency, efficiency_error, distance, work, delta, trivial_bound, upper_bound, neighbour_efficiency, seconds   (axes)
+    wave, forward (axes)   winding, bilateral, antipodal, retraced, at_slowest, below_neighbour (axes)
+    starts, starts_certified (axes)
     status, message, origin, gait_class, problem_hash   (axes), texts
     mean (axes, joint)     cos, sin (axes, joint, harmonic)
     attributes: format, format_version, name, source, command, versions (JSON); dims and units of every variable
@@ -24,11 +28,10 @@ import numpy as np
 from colloc.results.solution import versions
 from colloc.studies.table import UNITS, StudyTable
 from colloc.system.errors import StoreError
-from colloc.system.store_file import array, attribute, mark, new_file, put, put_attribute, sealed_file
+from colloc.system.store_file import BETWEEN_DIMS, array, attribute, mark, new_file, put, put_attribute, sealed_file
 
 KIND, VERSION = "colloc study", 2
 _MOST_VARIABLES = 200
-_BETWEEN = ", "
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +60,12 @@ def save_study(table: StudyTable, path: str | os.PathLike[str], *, source: str =
             put_attribute(file, name, text)
         for name, values in table.coordinates.items():
             labels = {"units": table.units.get(name, "1"), "long_name": table.labels.get(name, name)}
-            put(file, name, _no_truth_values(values), dims=name, **labels).make_scale(name)
+            put(file, name, _no_truth_values(values), dims=name, **labels)
         for name, values in table.variables.items():
-            dimensions = table.dimensions[name]
-            dataset = put(file, name, _no_truth_values(values), dims=_BETWEEN.join(dimensions), units=UNITS.get(name, "1"))
+            dims = BETWEEN_DIMS.join(table.dimensions[name])
+            dataset = put(file, name, _no_truth_values(values), dims=dims, units=UNITS.get(name, "1"))
             if dataset.dtype.kind == "f":
                 put_attribute(dataset, "_FillValue", [np.nan])
-            # netCDF's way to say the same, which this module never reads: references of variable length
-            for k, dimension in enumerate(dimensions):
-                dataset.dims[k].attach_scale(file[dimension])
     return path
 
 
@@ -86,7 +86,7 @@ def load_study(path: str | os.PathLike[str]) -> StudyFile:
         if len(file) > _MOST_VARIABLES:
             raise StoreError(f"{path} holds {len(file)} variables, where {_MOST_VARIABLES} are allowed.")
         found = {name: array(file, name) for name in file}
-        dimensions = {name: tuple(attribute(file[name], "dims").split(_BETWEEN)) for name in file}
+        dimensions = {name: tuple(attribute(file[name], "dims").split(BETWEEN_DIMS)) for name in file}
         attributes = {name: attribute(file, name) for name in file.attrs}
     coordinates = {name: value for name, value in found.items() if dimensions[name] == (name,)}
     variables = {name: value for name, value in found.items() if name not in coordinates}

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import stated_names
 from colloc.system.errors import ProblemError
@@ -73,15 +75,13 @@ class Study:
     problem : callable
         The `Problem` of a cell, called with a keyword for every axis. A cell for which it raises is recorded and skipped.
     cold_starts : int
-        Seeded random starts besides the warm ones, in cells that have them, so that a poor basin does not spread.
-    cold_every : int
-        Cells whose indices add up to a multiple of this have cold starts; so have all cells without a warm one.
+        Seeded random starts of every cell, besides the guess of its problem and the warm ones, so that a poor basin does not
+        spread. Each cell has numbers of its own: together they are one search over the grid.
     warm_starts : int
-        Of the warm starts that reach a cell so many are solved: those whose gaits do best there as they are.
+        Of the warm starts that reach a cell first so many are solved: those whose gaits do best there as they are. Any other
+        is solved only if its gait, as it is, does better than all that was found.
     chunk : int
         Cells along the last axis that make one task, with warm starts travelling inside. More cells cost less scheduling.
-    passes : int
-        Rounds after the first, in which starts travel from all neighbours, each only where it improves a cell as it is.
     warm_delta_start : float
         Where the continuation in delta begins from a warm start.
     time_limit : float
@@ -92,11 +92,9 @@ class Study:
     name: str
     axes: tuple[Axis, ...]
     problem: Callable[..., Problem]
-    cold_starts: int = 1
-    cold_every: int = 4
+    cold_starts: int = 4
     warm_starts: int = 2
     chunk: int = 1
-    passes: int = 3
     warm_delta_start: float = 1e-3
     time_limit: float = 120.0
     seed: int = 0
@@ -113,10 +111,8 @@ class Study:
             raise ProblemError("problem must be a function from coordinates to a Problem.")
         for field, least in (
             ("cold_starts", 0),
-            ("cold_every", 1),
             ("warm_starts", 1),
             ("chunk", 1),
-            ("passes", 0),
             ("seed", 0),
         ):
             value = getattr(self, field)
@@ -178,9 +174,10 @@ class Study:
             found += [(*cell[:a], i, *cell[a + 1 :]) for i in near if 0 <= i < self.shape[a] and i != cell[a]]
         return found
 
-    def has_cold_starts(self, cell: Index) -> bool:
-        """Whether a cell has cold starts though warm ones reach it."""
-        return self.cold_starts > 0 and sum(cell) % self.cold_every == 0
+    def cold_numbers(self, cell: Index) -> tuple[int, ...]:
+        """Numbers of the seeded starts of a cell."""
+        first = self.cold_starts * int(np.ravel_multi_index(cell, self.shape))
+        return tuple(range(first, first + self.cold_starts))
 
 
 def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:

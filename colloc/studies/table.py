@@ -10,10 +10,10 @@ import numpy as np
 
 from colloc.gaits.gait_class import GaitClass, gait_class
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import shape_speed
-from colloc.results.distinct_optima import Outcome
+from colloc.gaits.sampling import on_speed_floor
+from colloc.results.distinct_optima import Outcome, fourier_series, series_class
 from colloc.results.solution import SOLVED
-from colloc.studies.run import CellState, StudyRun
+from colloc.studies.run import StudyRun
 from colloc.studies.study import Index, Study
 
 NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
@@ -22,6 +22,7 @@ UNITS = {
     "efficiency_error": "1/weight",
     "trivial_bound": "1/weight",
     "upper_bound": "1/weight",
+    "neighbour_efficiency": "1/weight",
     "distance": "length",
     "work": "weight length",
     "delta": "length/period",
@@ -30,8 +31,8 @@ UNITS = {
     "cos": "rad",
     "sin": "rad",
 }
-_NUMBERS = ("efficiency", "efficiency_error", "distance", "work", "delta")
-_AT_SLOWEST = 1.01
+_NUMBERS = ("efficiency", "efficiency_error", "distance", "work")
+_COUNTS = ("starts", "starts_certified")
 KnownBound = Callable[[Problem], float | None]
 
 
@@ -59,7 +60,7 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
     study = run.study
     axes = tuple(axis.name for axis in study.axes)
     problems = [state.problem for state in run.cells.values() if state.problem is not None]
-    joints, harmonics = max(p.body.n_joint for p in problems), max(p.gait.harmonics for p in problems)
+    joints, harmonics = max(p.body.n_joint for p in problems), max(series_class(p).harmonics for p in problems)
     variables: dict[str, np.ndarray] = {}
     dimensions: dict[str, tuple[str, ...]] = {}
 
@@ -68,17 +69,26 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
         variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), empty, dtype=kind)
         dimensions[name] = (*axes, *extra)
 
-    for name in (*_NUMBERS, "trivial_bound", "upper_bound", "seconds", "wave", "forward"):
+    for name in (*_NUMBERS, "delta", "trivial_bound", "upper_bound", "neighbour_efficiency", "seconds", "wave", "forward"):
         variable(name, float, np.nan)
-    for name in ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "starts", "starts_certified"):
+    for name in (
+        "bilateral",
+        "antipodal",
+        "retraced",
+        "at_slowest",
+        "winding",
+        "below_neighbour",
+        "starts",
+        "starts_certified",
+    ):
         variable(name, int, 0)
     for name in ("status", "message", "origin", "gait_class", "problem_hash"):
         variable(name, object, "")
     variable("mean", float, np.nan, ("joint",))
     variable("cos", float, np.nan, ("joint", "harmonic"))
     variable("sin", float, np.nan, ("joint", "harmonic"))
-    for cell, state in run.cells.items():
-        for name, value in _cell(state, known_bound).items():
+    for cell in run.cells:
+        for name, value in _cell(run, cell, known_bound).items():
             here = variables[name][cell]
             if isinstance(here, np.ndarray):
                 here[tuple(slice(0, n) for n in np.shape(value))] = value
@@ -94,7 +104,8 @@ def _coordinate(values: tuple) -> np.ndarray:
     return np.array(values, dtype=object if isinstance(values[0], str) else float)
 
 
-def _cell(state: CellState, known_bound: KnownBound) -> dict[str, Any]:
+def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]:
+    state = run.cells[cell]
     problem = state.problem
     if problem is None:
         return {"status": NO_PROBLEM, "message": state.message}
@@ -105,6 +116,7 @@ def _cell(state: CellState, known_bound: KnownBound) -> dict[str, Any]:
     row["trivial_bound"] = 1.0 / problem.friction.smallest
     bound = known_bound(problem)
     row["upper_bound"] = np.nan if bound is None else bound
+    row["neighbour_efficiency"], row["below_neighbour"] = run.neighbour_efficiency(cell), int(run.below_neighbour(cell))
     best = state.best
     if best is not None:
         row |= {"status": SOLVED, "origin": best.origin} | _gait_row(problem, best.outcome)
@@ -114,10 +126,11 @@ def _cell(state: CellState, known_bound: KnownBound) -> dict[str, Any]:
 
 
 def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
-    gait = outcome.gait
+    gait = fourier_series(problem, outcome.gait)
     row: dict[str, Any] = {name: getattr(outcome, name) for name in _NUMBERS}
+    row["delta"] = outcome.delta * outcome.gait.delta_unit
     row |= {"mean": gait.mean, "cos": gait.cos, "sin": gait.sin}
-    row["at_slowest"] = int(shape_speed(gait) < _AT_SLOWEST * problem.smallest_shape_speed)
+    row["at_slowest"] = int(on_speed_floor(problem, outcome.gait))
     if problem.body.n_joint > 1:
         kind: GaitClass = gait_class(gait, problem.body, problem.friction)
         row |= {name: getattr(kind, name) for name in ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")}

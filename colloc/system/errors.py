@@ -15,3 +15,7 @@ class NotConvergedError(CollocError, RuntimeError):
 
 class StoreError(CollocError, OSError):
     """A results file cannot be read or written."""
+
+
+class ChangedFileWarning(UserWarning):
+    """A results file is not as colloc wrote it, and was read all the same."""

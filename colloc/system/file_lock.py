@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
 
+from filelock import FileLock, SoftFileLock, Timeout
+
 from colloc.system.errors import StoreError
 
-try:
-    import fcntl
-except ImportError:  # not on Windows: there, results are still replaced whole, but two runs are not kept apart
-    fcntl = None  # type: ignore[assignment]
+_NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
+"""What a file system without locks says: results are still replaced whole, but two runs are not kept apart."""
 
 
 @contextlib.contextmanager
@@ -32,27 +33,17 @@ def locked(path: Path, *, wait: bool = False) -> Iterator[None]:
     StoreError
         If the file cannot be written, or another process holds it; the message says which.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise StoreError(f"cannot write {path}: {error.strerror or error}; choose another --output.") from None
-    try:
-        if fcntl is not None:
-            _take(handle, path, wait)
+    with contextlib.ExitStack() as held:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            lock = held.enter_context(FileLock(path, timeout=-1 if wait else 0))
+            if not isinstance(lock, SoftFileLock):  # whose file has a content of its own
+                with contextlib.suppress(OSError):  # a full disk does not matter here
+                    path.write_text(f"process {os.getpid()} on {socket.gethostname()}", encoding="utf-8")
+        except Timeout:
+            holder = path.read_text(encoding="utf-8", errors="replace")[:200].strip() or "another process"
+            raise StoreError(f"{path.parent} is in use by {holder}; wait for it, or choose another --output.") from None
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                raise StoreError(f"cannot write {path}: {error.strerror or error}; choose another --output.") from None
         yield
-    finally:
-        os.close(handle)
-
-
-def _take(handle: int, path: Path, wait: bool) -> None:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BlockingIOError:
-        holder = os.pread(handle, 200, 0).decode("utf-8", "replace").strip() or "another process"
-        raise StoreError(f"{path.parent} is in use by {holder}; wait for it, or choose another --output.") from None
-    except OSError:
-        return  # a file system without locks: results are still replaced whole
-    with contextlib.suppress(OSError):  # a full disk does not matter here
-        os.ftruncate(handle, 0)
-        os.pwrite(handle, f"process {os.getpid()} on {socket.gethostname()}".encode(), 0)

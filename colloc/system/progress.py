@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
-_TICK = 0.5
+if TYPE_CHECKING:
+    from rich.live import Live
 
 
 def duration(seconds: float) -> str:
@@ -23,8 +23,8 @@ def duration(seconds: float) -> str:
 class StatusLine:
     """A line at the bottom of the terminal: what is being done, for how long, and how long it will take.
 
-    It is redrawn twice a second by a thread of its own, since a solve reports nothing for long, and vanishes at the end.
-    Where the stream is not a terminal nothing is written.
+    Rich redraws it twice a second, since a solve reports nothing for long, and it vanishes at the end. Where the stream is
+    not a terminal nothing is written, and Rich is not loaded.
 
     Parameters
     ----------
@@ -37,51 +37,44 @@ class StatusLine:
     def __init__(self, stream: TextIO | None = None, *, enabled: bool = True) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._shown = enabled and self._stream.isatty()
-        self._lock = threading.Lock()
-        self._stop = threading.Event()
-        self._text, self._width = "", 0
-        self._left: float | None = None
+        self._live: Live | None = None
+        self._text, self._left = "", 0.0
         self._begin = self._since = time.monotonic()
-        self._thread = threading.Thread(target=self._tick, daemon=True)
 
     def __enter__(self) -> StatusLine:
-        if self._shown:
-            self._thread.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._stop.set()
-        if self._shown:
-            self._thread.join()
         self.clear()
 
     def say(self, text: str, left: float | None = None) -> None:
         """Show a text from now on; `left` are the seconds it will probably take from now."""
-        with self._lock:
-            self._text, self._left, self._since = text, left, time.monotonic()
-        self._draw()
+        self._text, self._left, self._since = text, left or 0.0, time.monotonic()
+        if not self._shown:
+            return
+        if self._live is None:
+            from rich.console import Console
+            from rich.live import Live
+
+            self._live = Live(
+                get_renderable=self._line,
+                console=Console(file=self._stream, highlight=False, markup=False),
+                refresh_per_second=2,
+                transient=True,
+                redirect_stdout=False,  # what others print goes where they send it, after `clear`
+                redirect_stderr=False,
+            )
+            self._live.start()
+        self._live.refresh()
 
     def clear(self) -> None:
-        """Wipe the line, so that something else can be printed there."""
-        with self._lock:
-            if self._shown and self._width:
-                self._stream.write("\r" + " " * self._width + "\r")
-                self._stream.flush()
-                self._width = 0
+        """Wipe the line, so that something else can be printed there; `say` shows it again."""
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
 
-    def _tick(self) -> None:
-        while not self._stop.wait(_TICK):
-            self._draw()
-
-    def _draw(self) -> None:
-        with self._lock:
-            if not self._shown or not self._text or self._stop.is_set():
-                return
-            now = time.monotonic()
-            line = f"{self._text}   {duration(now - self._begin)}"
-            left = 0.0 if self._left is None else self._left - (now - self._since)
-            if left > 0.5:  # an estimate that has run out is worth nothing
-                line += f", about {duration(left)} left"
-            self._stream.write("\r" + line.ljust(self._width))
-            self._stream.flush()
-            self._width = len(line)
+    def _line(self) -> str:
+        now = time.monotonic()
+        line = f"{self._text}   {duration(now - self._begin)}"
+        left = self._left - (now - self._since)
+        return f"{line}, about {duration(left)} left" if left > 0.5 else line  # one that has run out is worth nothing

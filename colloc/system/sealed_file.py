@@ -1,7 +1,8 @@
 """Files that carry a seal: a trailer with the SHA-256 of all that stands before it, checked before anything is parsed.
 
 HDF5 readers ignore what follows the end of their data, so a sealed HDF5 file opens everywhere. A file that was cut, whose
-bits changed, or that somebody else wrote has no seal that fits. A seal is no signature: it tells damage, not intent.
+bits changed, or that somebody else wrote has no seal that fits. A seal is no signature: it tells damage, not intent. Programs
+that open a file to write cut off what follows their data, and the seal with it, even if they write nothing.
 """
 
 from __future__ import annotations
@@ -30,14 +31,6 @@ def _digest(file: BinaryIO, size: int) -> bytes:
     return found.digest()
 
 
-def seal(path: str | os.PathLike[str]) -> None:
-    """Append the seal to a complete file."""
-    with open(path, "r+b") as file:
-        digest = _digest(file, os.fstat(file.fileno()).st_size)
-        file.seek(0, os.SEEK_END)
-        file.write(MAGIC + digest)
-
-
 def write_sealed(path: str | os.PathLike[str], content: bytes) -> None:
     """Write a whole file with its seal."""
     with open(path, "wb") as file:
@@ -45,12 +38,13 @@ def write_sealed(path: str | os.PathLike[str], content: bytes) -> None:
         file.write(MAGIC + hashlib.sha256(content).digest())
 
 
-def check_seal(path: Path, largest: int, kind: str) -> None:
-    """Refuse a file that is missing, too large, or not as colloc left it; `kind` is for the message, "colloc solution".
+def is_sealed(path: Path, largest: int, kind: str) -> bool:
+    """Whether a file is as colloc left it; False if it carries no seal at all. `kind` is for the message, "colloc solution".
 
     Raises
     ------
     StoreError
+        If the file is missing or too large, or if its seal does not fit.
     """
     try:
         if not path.is_file():
@@ -64,14 +58,26 @@ def check_seal(path: Path, largest: int, kind: str) -> None:
             file.seek(size - SEAL_SIZE)
             trailer = file.read(SEAL_SIZE)
             if not trailer.startswith(MAGIC):
-                raise StoreError(
-                    f"{path} is not a readable {kind}: it carries no checksum, so it is damaged, was changed after colloc "
-                    "wrote it, or is something else. Make it again with the command that wrote it."
-                )
+                return False
             file.seek(0)
             if _digest(file, size - SEAL_SIZE) != trailer[len(MAGIC) :]:
                 raise StoreError(f"{path} is damaged: its checksum does not fit. Make it again with the command that wrote it.")
+            return True
     except StoreError:
         raise
     except OSError as error:
         raise StoreError(f"cannot read {path}: {error.strerror or error}.") from None
+
+
+def check_seal(path: Path, largest: int, kind: str) -> None:
+    """Refuse a file that is missing, too large, or not as colloc left it.
+
+    Raises
+    ------
+    StoreError
+    """
+    if not is_sealed(path, largest, kind):
+        raise StoreError(
+            f"{path} is not a readable {kind}: it carries no checksum, so it is damaged, was changed after colloc "
+            "wrote it, or is something else. Make it again with the command that wrote it."
+        )

@@ -1,9 +1,10 @@
 """HDF5 files of results: written whole and sealed, opened only with an unbroken seal, read within limits of size and kind.
 
 The HDF5 library is no safe parser of hostile bytes. So nothing reaches it that does not carry the checksum colloc wrote
-(`system.sealed_file`). Whoever forges that checksum meets a second one: files are in the format of HDF5 1.8, whose blocks of
-metadata carry checksums that the library verifies. What is left to read is simple by construction, and anything else is
-refused by its type before its data are touched:
+(`system.sealed_file`), save a result that another program opened to write: that one is whole, but has lost it (`was_changed`).
+Whoever forges that checksum meets a second one: files are in the format of HDF5 1.8, whose blocks of metadata carry checksums
+that the library verifies. What is left to read is simple by construction, and anything else is refused by its type before its
+data are touched:
 
 - numbers in one contiguous piece: no chunks, no filters, no external or virtual data, no links out of the file, and no array
   larger than its file;
@@ -29,7 +30,7 @@ from h5py import h5d, h5s, h5t
 
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.replaced_file import replaced_file
-from colloc.system.sealed_file import check_seal, write_sealed
+from colloc.system.sealed_file import check_seal, is_sealed, write_sealed
 
 LARGEST_FILE = 2**28
 LARGEST_ARRAY = 2**27
@@ -38,7 +39,10 @@ LONGEST_TEXT = 2**20
 LONGEST_IN_ARRAY = 2000
 """Characters of a text in an array, where each takes the room of the longest. The rest is left out, and an ellipsis says so."""
 
-_SIGNATURE, _CHECKED_SUPERBLOCKS = b"\x89HDF\r\n\x1a\n", (2, 3)
+BETWEEN_DIMS = ", "
+_NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
+_SIGNATURE, _CHECKED_SUPERBLOCKS, _END_OF_FILE = b"\x89HDF\r\n\x1a\n", (2, 3), slice(28, 36)
+"""First bytes; versions of the first block whose metadata carry checksums; where that block keeps the length of the file."""
 _REMEDY = "Move it away, and make it again with the command that wrote it"
 _NUMBERS = (h5t.INTEGER, h5t.FLOAT, h5t.ENUM)  # h5py keeps truth values as enumerations
 
@@ -63,8 +67,21 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 
 
 @contextlib.contextmanager
-def sealed_file(path: str | os.PathLike[str], kind: str, version: int, *, largest: int = LARGEST_FILE) -> Iterator[h5py.File]:
+def sealed_file(
+    path: str | os.PathLike[str], kind: str, version: int, *, largest: int = LARGEST_FILE, unsealed: bool = False
+) -> Iterator[h5py.File]:
     """An HDF5 file of a kind ("colloc solution") to read.
+
+    Parameters
+    ----------
+    path : path-like
+    kind : str
+    version : int
+        Of the format.
+    largest : int
+        Bytes.
+    unsealed : bool
+        Read it without looking at its seal, since `was_changed`.
 
     Raises
     ------
@@ -72,7 +89,8 @@ def sealed_file(path: str | os.PathLike[str], kind: str, version: int, *, larges
         If it is missing, too large, damaged, of another kind or of another version, or if reading in the block fails.
     """
     path = Path(path)
-    check_seal(path, largest, kind)
+    if not unsealed:
+        check_seal(path, largest, kind)
     try:
         _check_head(path, kind, version)
         with h5py.File(path, "r") as file:
@@ -92,6 +110,22 @@ def sealed_file(path: str | os.PathLike[str], kind: str, version: int, *, larges
     except Exception as error:
         # h5py raises many kinds for a damaged file
         raise StoreError(f"{path} is not a readable {kind} ({type(error).__name__}: {error}).") from None
+
+
+def was_changed(path: Path, kind: str, largest: int = LARGEST_FILE) -> bool:
+    """Whether another program opened a file to write: it has no seal, but is as long as its own first block says.
+
+    Raises
+    ------
+    StoreError
+        If the file is missing or too large, or has a seal that does not fit.
+    """
+    if is_sealed(path, largest, kind):
+        return False
+    with open(path, "rb") as file:
+        block, size = file.read(_END_OF_FILE.stop), os.fstat(file.fileno()).st_size
+    whole = block.startswith(_SIGNATURE) and int.from_bytes(block[_END_OF_FILE], "little") == size
+    return whole and block[len(_SIGNATURE)] in _CHECKED_SUPERBLOCKS  # HDF5 checks the checksum of the block itself
 
 
 def _check_head(path: Path, kind: str, version: int) -> None:
@@ -115,6 +149,8 @@ def mark(file: h5py.File, kind: str, version: int) -> None:
 def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Dataset:
     """A new dataset of numbers or texts, with texts such as its units as attributes.
 
+    ``dims="joint, time"`` names its dimensions also in the way of netCDF (`_name_dimensions`).
+
     Raises
     ------
     TypeError
@@ -127,7 +163,23 @@ def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Data
         put_attribute(dataset, "_Encoding", "utf-8")  # for xarray, which gives bytes without it
     for key, text in described.items():
         put_attribute(dataset, key, text)
+    if described.get("dims"):
+        _name_dimensions(group, dataset, name, described["dims"].split(BETWEEN_DIMS))
     return dataset
+
+
+def _name_dimensions(group: h5py.Group, dataset: h5py.Dataset, name: str, dims: list[str]) -> None:
+    """Dimension scales of HDF5, by which netCDF and xarray know dimensions; colloc never reads them (they are references).
+
+    The dataset named like its one dimension is the coordinate; a dimension without one has a dataset with no data.
+    """
+    if dims == [name]:
+        dataset.make_scale(name)
+        return
+    for axis, (dim, size) in enumerate(zip(dims, dataset.shape, strict=True)):
+        if dim not in group:
+            group.create_dataset(dim, shape=(size,), dtype=">f4").make_scale(f"{_NO_VARIABLE}{size:10d}")
+        dataset.dims[axis].attach_scale(group[dim])
 
 
 def put_attribute(owner: h5py.Group | h5py.Dataset, name: str, value: Any) -> None:

@@ -16,6 +16,8 @@ from multiprocessing.connection import wait as wait_for_handles
 from signal import SIG_IGN, SIGINT, signal
 from typing import Any
 
+from colloc.system.errors import CollocError
+
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
@@ -32,6 +34,10 @@ class Lost:
     """In place of a result: the engine failed twice to give one (worker killed, out of memory, lost connection)."""
 
     message: str
+
+
+class EngineGone(CollocError, RuntimeError):
+    """What runs the tasks is gone as a whole, so no task is to blame."""
 
 
 @contextlib.contextmanager
@@ -106,6 +112,8 @@ def completed(
     ------
     BrokenExecutor
         If not even a first task can be handed over.
+    EngineGone
+        If the executor says that of itself: nothing is tried again, and no task recorded as lost.
     """
     suspects: list[Task] = []
     more = True
@@ -135,7 +143,7 @@ def completed(
                         break
                     for future in wait(pending, return_when=FIRST_COMPLETED).done:
                         error = _failure(future)
-                        if isinstance(error, BrokenExecutor):
+                        if isinstance(error, (BrokenExecutor, EngineGone)):
                             raise error
                         task = pending.pop(future)
                         if error is None:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.numerics.schemes import Scheme, scheme
@@ -39,11 +39,9 @@ def rates_at(body: Chain, friction: Friction, path: Path, delta: float, t: np.nd
     """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
     start = None if near is None else near.reshape(3, -1)
-    z = solve_balance(body, friction, angles, rates, delta, start=start).require().z
-    now = instant(body, friction, angles, rates, z, delta)
-    cx, cy = body.centre_velocity(now.posture, now.velocity)
-    power = total_power(now.velocity, now.force)
-    return Rates(z.reshape(3, *t.shape), (cx[0] + 1j * cy[0]).reshape(t.shape), power[0].reshape(t.shape))
+    solved = solve_balance(body, friction, angles, rates, delta, start=start).require()
+    now = chain_motion(body, friction, angles, rates, delta, solved)
+    return Rates(now.z.reshape(3, *t.shape), (now.centre[0] + 1j * now.centre[1]).reshape(t.shape), now.power.reshape(t.shape))
 
 
 Increments = tuple[np.ndarray, np.ndarray, np.ndarray]

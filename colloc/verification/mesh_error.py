@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import crossing_bounds, crossing_depth, far_pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
@@ -48,6 +49,9 @@ class MeshError:
         Relative error of the collocated efficiency as a whole: all contributions, not linearised.
     unresolved : float
         What the panels that measured all this may have missed, relative to the efficiency.
+    turning : float
+        Rotation that collocation misses over a whole period, times the body's reach (half a length) over the distance; 0 where
+        a symmetry closes the rotation. It is what makes the distance of a closed gait ambiguous.
     """
 
     rotation: np.ndarray
@@ -58,6 +62,7 @@ class MeshError:
     violation: np.ndarray
     total: float
     unresolved: float
+    turning: float
 
     @property
     def estimate(self) -> float:
@@ -67,7 +72,7 @@ class MeshError:
 
 
 def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
-    """The gait's motion on adaptive panels, see `fine_motion`."""
+    """The gait's motion on adaptive panels, see `adaptive_motion`."""
     return fine_motion(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, edges, tolerance)
 
 
@@ -105,14 +110,17 @@ def mesh_error(
         constraint_violation(problem, mesh, gait),
         _efficiency(problem, *own.increments) / _fine_efficiency(problem, fine) - 1,
         float(fine.unresolved.sum()),
+        abs(float(_turning(problem, own, fine).sum())),
     )
 
 
-def efficiency_shares(
+def interval_shares(
     problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
 ) -> np.ndarray:
-    """Relative efficiency error that collocating on each of the intervals from left to right adds, signed, ``(n,)``."""
-    return _collocated_intervals(problem, rule, left, right, gait, delta, fine).efficiency
+    """What collocating on each of the intervals from left to right adds to the relative efficiency error and to the rotation
+    that is missed (as `MeshError.turning`), magnitudes, ``(n,)``."""
+    own = _collocated_intervals(problem, rule, left, right, gait, delta, fine)
+    return np.abs(own.efficiency) + np.abs(_turning(problem, own, fine))
 
 
 class _Own(NamedTuple):
@@ -143,6 +151,11 @@ def _collocated_intervals(
     distance = float((fine.path[-1] * np.conj(direction)).real)
     efficiency = (pull * np.conj(direction)).real / distance - energy / fine.work[-1]
     return _Own(rotation, displacement, energy, efficiency, rates, (turned, moved, spent))
+
+
+def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
+    """Rotation missed by intervals, times the body's reach over the distance, ``(n,)``."""
+    return own.rotation * (0.5 / abs(fine.path[-1]) if problem.gait.symmetry == NONE else 0.0)
 
 
 def _fine_efficiency(problem: Problem, fine: FineMotion) -> float:

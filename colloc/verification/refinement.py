@@ -25,10 +25,12 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.adaptive_motion import FineMotion
 from colloc.verification.kinks import kink_phases
-from colloc.verification.mesh_error import FINER, MeshError, efficiency_shares, gait_motion, mesh_error
+from colloc.verification.mesh_error import FINER, MeshError, gait_motion, interval_shares, mesh_error
 
 VIOLATION = 5e-7
 """Largest violation of a joint limit or of self-contact between nodes that needs no refinement [rad, body lengths]."""
+TURNING = 5e-5
+"""Largest rotation that collocation may miss, times the body's reach over the distance: half of what a certificate allows."""
 MOST_POINTS = 12_000
 AIM = 0.4
 """The planned error is this fraction of the request: the gait, and its kinks with it, will still move."""
@@ -137,10 +139,11 @@ def planned_mesh(
     """
     fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
     error = mesh_error(problem, mesh, gait, delta, tolerance, fine)
-    if error.estimate <= tolerance and error.violation.max() <= VIOLATION:
+    accurate = error.estimate <= tolerance and error.turning <= TURNING
+    if accurate and error.violation.max() <= VIOLATION:
         return None
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
-    if error.estimate <= tolerance:
+    if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
     given = scheme(problem.scheme)
     kinks = kink_knots(problem, gait, delta, fine)
@@ -215,7 +218,7 @@ def _split(
 ) -> MeshPlan:
     """Cut the intervals with the largest errors until all together are small enough, or the budget is exhausted."""
     left, right = edges[:-1], edges[1:]
-    shares = np.abs(efficiency_shares(problem, rule, left, right, gait, delta, fine))
+    shares = interval_shares(problem, rule, left, right, gait, delta, fine)
     unresolved = float(fine.unresolved.sum())
     wanted = max(aim * tolerance - unresolved, 0.25 * aim * tolerance)
     while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
@@ -228,7 +231,7 @@ def _split(
             break
         middle = _cut(left[chosen], right[chosen], kinks)
         new_left, new_right = np.concatenate([left[chosen], middle]), np.concatenate([middle, right[chosen]])
-        new = np.abs(efficiency_shares(problem, rule, new_left, new_right, gait, delta, fine))
+        new = interval_shares(problem, rule, new_left, new_right, gait, delta, fine)
         left, right, shares = (
             np.concatenate([np.delete(old, chosen), added])
             for old, added in ((left, new_left), (right, new_right), (shares, new))

@@ -1,20 +1,22 @@
 """Independent replay of a gait: from the joint angles alone to distance, work and rotation, by the NumPy solver.
 
 It shares nothing with collocation but the friction law: no scheme, no mesh, no symmetry, no interpolant. Velocities are
-solved for on a uniform grid over the whole period and integrated by Simpson's rule; doubling the grid gives the error.
+solved for at five instants of every panel of the period and integrated by Simpson's rule, once over the panel and once over
+its halves; panels are halved where the two differ. The differences add up as magnitudes: kinks of stick and slip lie anywhere
+between the instants, so those of different panels may well cancel by accident, and a difference of two sums be no error.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_simpson, simpson
 
-from colloc.mechanics.balance import Instant, instant, total_power
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
@@ -22,8 +24,15 @@ from colloc.system.errors import ProblemError
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
 
-
 _ONE_SIDED = 1e-12
+_NARROWEST = 1e-10
+_HALF = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24
+"""Integrals from the first of three instants to each of them of the parabola through them, over unit distance of the outer."""
+_WHOLE = np.zeros((5, 5))
+_WHOLE[:3, :3] = 0.5 * _HALF
+_WHOLE[3:] = _WHOLE[2]
+_WHOLE[2:, 2:] += 0.5 * _HALF
+"""The same for five instants, parabola by parabola."""
 
 
 @dataclass(frozen=True)
@@ -33,63 +42,97 @@ class Replay:
     Attributes
     ----------
     distance, work, efficiency : float
+        The distance is that of the centre of mass.
     rotation : float
-        Net rotation over the period [rad]; the distance means something only if it vanishes.
+        Net rotation over the period [rad].
+    lever : float
+        Largest distance of a point of the body from its centre of mass [body lengths].
     actuator_work : float
         Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
     residual : float
-        Largest force or torque left over.
+        Largest force or torque left over, at any instant, in units of the largest friction coefficient.
     error : float
-        Estimated relative error of the efficiency, from the grid of half as many instants.
+        Relative error of the efficiency: what halving the panels changes, summed as magnitudes, and the residual.
     instants : int
+    tail : ((n,), (3, n))
+        Phases and tail velocities there.
     """
 
     distance: float
     work: float
     efficiency: float
     rotation: float
+    lever: float
     actuator_work: float
     residual: float
     error: float
     instants: int
+    tail: tuple[np.ndarray, np.ndarray] = field(repr=False, compare=False)
+
+    def tail_velocity(self, t: np.ndarray) -> np.ndarray:
+        """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
+        known, z = self.tail
+        return np.stack([np.interp(t, known, row, period=1.0) for row in z])
+
+    @property
+    def turning(self) -> float:
+        """How much the distance depends on the point of the body that is followed, relative: rotation times lever over it."""
+        return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
 
 
-def _actuator_power(body: Chain, now: Instant, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Power of the joint moments, ``(n_time,)``: moment at a joint balances the friction on all links ahead of it."""
-    x, y = body.joints(angles)
-    fx = now.force.tangential * now.posture.cos - now.force.normal * now.posture.sin
-    fy = now.force.tangential * now.posture.sin + now.force.normal * now.posture.cos
-    power = np.zeros(angles.shape[1])
-    for joint in range(body.n_joint):
-        ahead = slice(joint + 1, None)
-        arm_x, arm_y = now.posture.x[ahead] - x[joint + 1], now.posture.y[ahead] - y[joint + 1]
-        moment = (arm_x * fy[ahead] - arm_y * fx[ahead] + now.force.couple[ahead]).sum(axis=0)
-        power -= moment * rates[joint]
-    return power
+class _Panels(NamedTuple):
+    """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
+    of the centre of mass in the body frame (complex), power, power of the joints, residual and lever ``(n, 5)``."""
+
+    left: np.ndarray
+    width: np.ndarray
+    z: np.ndarray
+    centre: np.ndarray
+    power: np.ndarray
+    actuator: np.ndarray
+    residual: np.ndarray
+    lever: np.ndarray
+
+    def take(self, chosen: np.ndarray) -> _Panels:
+        return _Panels(*(a[chosen] for a in self))
+
+    def joined(self, other: _Panels) -> _Panels:
+        """These and others, in order of time."""
+        both = _Panels(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+        return both.take(np.argsort(both.left))
 
 
-def _at(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Times, rotation rate, centre velocity, power, actuator power and residual at instants t."""
-    angles, rates = path(t)
-    solved = solve_balance(body, friction, angles, rates, delta).require()
-    now = instant(body, friction, angles, rates, solved.z, delta)
-    cx, cy = body.centre_velocity(now.posture, now.velocity)
-    power = total_power(now.velocity, now.force)[0]
-    return t, solved.z[2], cx[0], cy[0], power, _actuator_power(body, now, angles, rates), solved.residual
+def _evaluated(
+    body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None
+) -> tuple[np.ndarray, ...]:
+    """The last six of `_Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``."""
+    angles, rates = path(t.ravel())
+    solved = solve_balance(body, friction, angles, rates, delta, start=near).require()
+    motion = chain_motion(body, friction, angles, rates, delta, solved)
+    (x, y), (gx, gy) = body.joints(angles), body.centre(body.posture(angles))
+    lever = np.hypot(x - gx, y - gy).max(axis=0)
+    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, solved.residual, lever)
+    return motion.z.T.reshape(*t.shape, 3), *(value.reshape(t.shape) for value in values)
 
 
-def _integrated(segments: list[tuple[np.ndarray, ...]], every: int) -> tuple[float, float, float, float, float]:
-    """Distance, work, rotation, actuator work and largest residual, by Simpson's rule on every `every`-th instant."""
-    heading, end, worked, actuated, worst = 0.0, 0j, 0.0, 0.0, 0.0
-    for segment in segments:
-        t, omega, cx, cy, power, actuator, residual = (a[::every] for a in segment)
-        theta = heading + cumulative_simpson(omega, x=t, initial=0.0)
-        c, s = np.cos(theta), np.sin(theta)
-        end += simpson(c * cx - s * cy, x=t) + 1j * simpson(s * cx + c * cy, x=t)
-        heading = float(theta[-1])
-        worked, actuated = worked + float(simpson(power, x=t)), actuated + float(simpson(actuator, x=t))
-        worst = max(worst, float(residual.max()))
-    return float(abs(end)), worked, heading, actuated, worst
+def _halves(panels: _Panels, new: tuple[np.ndarray, ...]) -> _Panels:
+    """Both halves of panels, from the values at their instants and half way between these ``(n, 4)``."""
+    fields = []
+    for old, between in zip(panels[2:], new, strict=True):
+        merged = np.empty((old.shape[0], 9, *old.shape[2:]), dtype=old.dtype)
+        merged[:, ::2], merged[:, 1::2] = old, between
+        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, *old.shape[1:]))
+    left, width = np.repeat(panels.left, 2), 0.5 * np.repeat(panels.width, 2)
+    left[1::2] += width[1::2]
+    return _Panels(left, width, *fields)
+
+
+def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rotation, displacement in the axes at the panel's begin (complex) and work of panels, on every `every`-th instant."""
+    omega, centre, power = (a[:, ::every] for a in (panels.z[..., 2], panels.centre, panels.power))
+    h, b = panels.width, rule[-1]
+    turn = np.exp(1j * h[:, None] * (omega @ rule.T))
+    return h * (omega @ b), h * ((turn * centre) @ b), h * (power @ b)
 
 
 def replay(
@@ -100,8 +143,9 @@ def replay(
     *,
     instants: int = 1600,
     tolerance: float = 1e-6,
-    most_instants: int = 25600,
+    most_instants: int = 100_000,
     breaks: np.ndarray | tuple[float, ...] = (),
+    near: Replay | None = None,
 ) -> Replay:
     """Distance, work and efficiency of a path over one period, to a relative error in the efficiency.
 
@@ -113,12 +157,15 @@ def replay(
     delta : float
         Regularisation speed, per period.
     instants : int
-        Grid to begin with (even); it doubles until the estimated error is below `tolerance`.
+        Uniform instants to begin with, about; panels are halved until the error is below `tolerance`.
     tolerance : float
         Relative error of the efficiency.
     most_instants : int
+        No panel is halved once there are so many.
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump (corners); they are integrated up to and from there.
+    near : Replay, optional
+        Of the same path or one like it: solves start from its velocities, which saves time and changes nothing else.
 
     Raises
     ------
@@ -130,32 +177,50 @@ def replay(
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
-    segments = []
-    for a, b in pairwise(ends):
-        count = 4 * max(1, round(instants * (b - a) / 4))
-        grid = np.linspace(a, b, count + 1)
-        # one-sided limits at jumps
-        inside = grid.copy()
-        inside[0] += _ONE_SIDED * (b - a) if a > 0 else 0.0
-        inside[-1] -= _ONE_SIDED * (b - a) if b < 1 else 0.0
-        segments.append((grid, *_at(body, friction, path, delta, inside)[1:]))
+    counts = [max(1, round(instants * (b - a) / 4)) for a, b in pairwise(ends)]
+    edges = np.concatenate([np.linspace(a, b, n + 1)[:-1] for (a, b), n in zip(pairwise(ends), counts, strict=True)] + [[1.0]])
+    left, width = edges[:-1], np.diff(edges)
+    t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
+    # one-sided limits at jumps
+    t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
+    t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
+    start = None if near is None else near.tail_velocity(t.ravel())
+    panels = _Panels(left, width, *_evaluated(body, friction, path, delta, t, start))
     while True:
-        fine, coarse = _integrated(segments, 1), _integrated(segments, 2)
-        if not (fine[1] > 0 and coarse[1] > 0):
+        turn, move, spent = _increments(_WHOLE, panels, 1)
+        heading = np.concatenate([[0.0], np.cumsum(turn)])
+        travelled = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
+        distance, work = float(abs(travelled[-1])), float(spent.sum())
+        if not work > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
-        # kinks at stick limit the order to two: the difference over three estimates the finer grid's error
-        efficiency, before = fine[0] / fine[1], coarse[0] / coarse[1]
-        error = abs(efficiency - before) / 3 / max(abs(efficiency), 1e-300)
-        n = sum(segment[0].size - 1 for segment in segments)
-        if error <= tolerance or 2 * n > most_instants:
-            return Replay(fine[0], fine[1], efficiency, fine[2], fine[3], fine[4], error, n)
-        segments = [_interleaved(old, _at(body, friction, path, delta, 0.5 * (old[0][1:] + old[0][:-1]))) for old in segments]
-
-
-def _interleaved(old: tuple[np.ndarray, ...], new: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    result = []
-    for a, b in zip(old, new, strict=True):
-        merged = np.empty(a.size + b.size)
-        merged[::2], merged[1::2] = a, b
-        result.append(merged)
-    return tuple(result)
+        once = _increments(_HALF, panels, 2)
+        # an error of rotation turns all that comes after it
+        reach = np.abs(travelled - travelled[-1]).max()
+        astray = np.abs(move - once[1]) + reach * np.abs(turn - once[0])
+        gap = astray / max(distance, 1e-300) + np.abs(spent - once[2]) / work
+        residual = float(panels.residual.max())
+        order = np.argsort(gap)
+        # finer panels do not make up for what the balance leaves over
+        excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
+        chosen = order[excess & (panels.width[order] > _NARROWEST)]
+        n = 4 * (panels.left.size + chosen.size)
+        if chosen.size == 0 or n > most_instants:
+            break
+        old = panels.take(chosen)
+        between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
+        start = 0.5 * (old.z[:, :-1] + old.z[:, 1:]).reshape(-1, 3).T
+        kept = np.setdiff1d(order, chosen)
+        panels = panels.take(kept).joined(_halves(old, _evaluated(body, friction, path, delta, between, start)))
+    known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
+    return Replay(
+        distance,
+        work,
+        distance / work,
+        float(heading[-1]),
+        float(panels.lever.max()),
+        float(((panels.actuator @ _WHOLE[-1]) * panels.width).sum()),
+        residual,
+        float(gap.sum()) + residual,
+        4 * panels.left.size,
+        (known, panels.z[:, :4].reshape(-1, 3).T),
+    )

@@ -32,6 +32,10 @@ class FlapBody(Chain):
 
     lengths: tuple[float, ...] = (0.8, 0.1, 0.1)
 
+    @property
+    def in_series(self) -> bool:
+        return False
+
     def _joint_sum(self, reference: int | None) -> np.ndarray:
         full = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
         return full if reference is None else full - full[reference]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from colloc.mechanics.balance import instant
@@ -71,7 +70,7 @@ def _plate(axes: Any, friction: Friction, title: str) -> None:
 def figure_3(made: Arrays, folder: Path) -> list[Path]:
     """Force on a plate; velocities and forces on a three-link body, tail held and in balance."""
     body, friction = Chain(), Friction()
-    figure, axes = plt.subplots(2, 3, figsize=(7.2, 3.6), height_ratios=(1, 1.2))
+    figure, axes = style.subplots(2, 3, figsize=(7.2, 3.6), height_ratios=(1, 1.2))
     for a, (mu_f, mu_t) in zip(axes[0], ((1, 1), (1, 2), (2, 1)), strict=True):
         _plate(a, Friction(mu_t=mu_t, mu_f=mu_f, mu_b=mu_f), rf"$\mu_f = {mu_f},\ \mu_t = {mu_t}$")
     style.letter(axes[0, 0], "A")
@@ -87,13 +86,13 @@ def figure_3(made: Arrays, folder: Path) -> list[Path]:
         style.bare(a)
         a.set_title(title)
         style.letter(a, text)
-    return style.save(figure, folder, "figure-03-velocity-and-force")
+    return style.save(figure, folder / "figure-03-velocity-and-force")
 
 
 def figure_4(made: Arrays, folder: Path) -> list[Path]:
     """The flap body: the scene, its unbalanced force against velocity, and what delta gives."""
     body, half, flap = made["lengths"], 0.06, made["lengths"][1]
-    figure, (scene, force, speed) = plt.subplots(1, 3, figsize=(7.4, 2.5), width_ratios=(1.1, 1, 1))
+    figure, (scene, force, speed) = style.subplots(1, 3, figsize=(7.4, 2.5), width_ratios=(1.1, 1, 1))
     scene.plot([0, body[0]], [0, 0], color=style.BLACK, lw=2.5)
     for sign in (1, -1):
         for angle, line in ((0.35, "-"), (float(made["example"]), "--"), (1.2, "--")):
@@ -123,7 +122,7 @@ def figure_4(made: Arrays, folder: Path) -> list[Path]:
     speed.set(xlabel="opening [degrees]", ylabel=r"$V/\delta$", title="what the regularisation gives")
     speed.legend()
     style.letter(speed, "C")
-    return style.save(figure, folder, "figure-04-flap-body")
+    return style.save(figure, folder / "figure-04-flap-body")
 
 
 def _wave(axes: Any, made: Arrays, name: str, title: str, drop: float = 0.0) -> None:
@@ -144,20 +143,20 @@ def _wave_title(made: Arrays, name: str) -> str:
 
 def figure_5(made: Arrays, folder: Path) -> list[Path]:
     """Waves with anisotropy 100."""
-    figure, axes = plt.subplots(2, 1, figsize=(6.5, 4.6))
+    figure, axes = style.subplots(2, 1, figsize=(6.5, 4.6))
     for a, name, what in zip(axes, ("5A", "5B"), (r"$\mu_f = \mu_b = 100\,\mu_t$", r"$\mu_t = 100\,\mu_f$"), strict=True):
         _wave(a, made, name, f"{what}: {_wave_title(made, name)}")
         style.letter(a, name[1])
-    return style.save(figure, folder, "figure-05-waves-anisotropic")
+    return style.save(figure, folder / "figure-05-waves-anisotropic")
 
 
 def figure_6(made: Arrays, folder: Path) -> list[Path]:
     """The same waves, and a standing one, with isotropic friction."""
-    figure, axes = plt.subplots(1, 3, figsize=(9, 5.2), width_ratios=(0.8, 1.2, 1.2))
+    figure, axes = style.subplots(1, 3, figsize=(9, 5.2), width_ratios=(0.8, 1.2, 1.2))
     for a, name, drop in zip(axes, ("6A", "6B", "6C"), (0.07, 0.12, 0.12), strict=True):
         _wave(a, made, name, _wave_title(made, name).replace(", d/W", "\nd/W"), drop)
         style.letter(a, name[1])
-    return style.save(figure, folder, "figure-06-waves-isotropic")
+    return style.save(figure, folder / "figure-06-waves-isotropic")
 
 
 def draw_cases(figure_axes: Any, made: Arrays, group: str, names: str) -> None:
@@ -175,7 +174,7 @@ def draw_cases(figure_axes: Any, made: Arrays, group: str, names: str) -> None:
 
 def figure_10(made: Arrays, folder: Path) -> list[Path]:
     """Symmetric cases: fields, and what stays unbalanced as the middle link's one velocity varies."""
-    figure, axes = plt.subplots(2, 3, figsize=(9.5, 5.4), height_ratios=(1.2, 1))
+    figure, axes = style.subplots(2, 3, figsize=(9.5, 5.4), height_ratios=(1.2, 1))
     draw_cases(axes[0], made, "symmetric", "ABC")
     V = made["symmetric_velocity"]
     for a, name in zip(axes[1], "ABC", strict=True):
@@ -192,7 +191,7 @@ def figure_10(made: Arrays, folder: Path) -> list[Path]:
         a.set(xlabel=f"middle link: {'rotation rate' if couple else 'velocity'} [1e-3]")
         a.set_ylabel("net torque" if couple else "net force")
     axes[1, 0].legend()
-    return style.save(figure, folder, "figure-10-symmetric-cases")
+    return style.save(figure, folder / "figure-10-symmetric-cases")
 
 
 def draw_motion(axes: Any, made: Arrays, name: str, phases: np.ndarray, rows: int) -> None:
@@ -234,7 +233,7 @@ def draw_speeds(axes: Any, made: Arrays, name: str, until: float) -> None:
 
 def figure_12_motion(made: Arrays, folder: Path) -> list[Path]:
     """The two best gaits: end-point speeds, snapshots, lab frame."""
-    figure, axes = plt.subplots(2, 3, figsize=(10, 5.4), width_ratios=(1, 1.5, 1))
+    figure, axes = style.subplots(2, 3, figsize=(10, 5.4), width_ratios=(1, 1.5, 1))
     phases = np.arange(21) / 20
     for row, (name, until, times) in enumerate((("D", 0.5, (0, 0.12, 0.38, 0.5, 1)), ("F", 1.0, (0, 0.2, 0.5, 0.8, 1)))):
         lab_phases = np.array(times)
@@ -244,4 +243,4 @@ def figure_12_motion(made: Arrays, folder: Path) -> list[Path]:
         style.letter(axes[row, 0], name)
         style.letter(axes[row, 2], "E" if name == "D" else "G")
         axes[row, 1].set_title("snapshots (time below)")
-    return style.save(figure, folder, "figure-12-best-motions")
+    return style.save(figure, folder / "figure-12-best-motions")

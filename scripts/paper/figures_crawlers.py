@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from colloc.pictures import style
 from scripts.paper.study import Arrays
@@ -32,7 +32,7 @@ def _at(made: Arrays, name: str, times: tuple[float, ...]) -> list[int]:
 
 def figure_13(made: Arrays, folder: Path) -> list[Path]:
     """Snapshots, work and distance, efficiency, and the crawler with two bumps."""
-    figure = plt.figure(figsize=(10, 6.2))
+    figure = Figure(figsize=(10, 6.2))
     grid = figure.add_gridspec(2, 3, width_ratios=(1.1, 1, 1.1))
     one, two = "isotropic", "transverse easiest"
     first = _at(made, one, (0, 1 / 12, 1 / 6, 1 / 4, 1 / 3, 5 / 12, 1 / 2))
@@ -71,4 +71,4 @@ def figure_13(made: Arrays, folder: Path) -> list[Path]:
     # this crawler lies across its path, which goes along x
     _stages(axes, made, two, _at(made, two, (0, 0.25, 0.5, 0.75, 1)), "two bumps, moving sideways", 0.25 + 0j)
     style.letter(axes, "E")
-    return style.save(figure, folder, "figure-13-crawlers")
+    return style.save(figure, folder / "figure-13-crawlers")

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.colors import ListedColormap
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from colloc.mechanics.body import Chain
@@ -36,7 +38,7 @@ def _label_angles(axes: Any) -> None:
 
 def figure_7(made: Arrays, folder: Path) -> list[Path]:
     """Non-self-intersecting shapes, and the ellipses of the local maxima of the efficiency."""
-    figure, axes = plt.subplots(figsize=(6.2, 4.4))
+    figure, axes = style.subplots(figsize=(6.2, 4.4))
     nodes = np.linspace(-np.pi, np.pi, 401)
     axes.contourf(nodes, nodes, _admissible_square(nodes).T, levels=[0.5, 1.5], colors=["#e4edf2"])
     t = np.linspace(0, 1, 400)
@@ -54,7 +56,7 @@ def figure_7(made: Arrays, folder: Path) -> list[Path]:
     axes.set_aspect("equal")
     axes.set_title("admissible shapes (shaded), locally most efficient ellipses")
     axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1), title="efficiency")
-    return style.save(figure, folder, "figure-07-paths")
+    return style.save(figure, folder / "figure-07-paths")
 
 
 def figure_8(made: Arrays, folder: Path) -> list[Path]:
@@ -66,7 +68,7 @@ def figure_8(made: Arrays, folder: Path) -> list[Path]:
     ratios = np.linspace(-1, 1, n_ratio)
     chosen = [round(f * (n_ratio - 1)) for f in (0, 0.25, 0.5, 0.75, 1)]
     inside = _admissible_square(angles)
-    figure = plt.figure(figsize=(9.5, 6.4))
+    figure = Figure(figsize=(9.5, 6.4))
     figure.set_layout_engine("none")
     names = (r"$\dot x_0$", r"$\dot y_0$", r"$\dot\theta_0$")
     a1, a2 = np.meshgrid(angles, angles, indexing="ij")
@@ -76,7 +78,7 @@ def figure_8(made: Arrays, folder: Path) -> list[Path]:
             field = values[face, :, :, 1:-1, component]
             shown = np.where(inside[:, :, None], field, np.nan)
             low, high = np.nanmin(shown[:, :, chosen]), np.nanmax(shown[:, :, chosen])
-            colours = plt.get_cmap(style.SEQUENTIAL)((shown - low) / (high - low))
+            colours = colormaps[style.SEQUENTIAL]((shown - low) / (high - low))
             colours[np.isnan(shown)] = (1, 1, 1, 0)
             for k in chosen:
                 axes.plot_surface(
@@ -89,15 +91,15 @@ def figure_8(made: Arrays, folder: Path) -> list[Path]:
             axes.patch.set_visible(False)  # or it covers the colour bar beside it
             axes.set_box_aspect((1, 1, 1.5))
             axes.set_title(rf"{names[component]}, $\dot{{\Delta\theta}}_{1 + face} = 1$", y=1.05)
-            mappable = plt.cm.ScalarMappable(plt.Normalize(low, high), style.SEQUENTIAL)
+            mappable = ScalarMappable(Normalize(low, high), style.SEQUENTIAL)
             bar = figure.add_axes((0.268 + 0.33 * component, 0.58 - 0.5 * face, 0.008, 0.3))
             figure.colorbar(mappable, cax=bar)
-    return style.save(figure, folder, "figure-08-velocity-map")
+    return style.save(figure, folder / "figure-08-velocity-map")
 
 
 def figure_9(made: Arrays, folder: Path) -> list[Path]:
     """Where a link is slower than 1e-3: slices of both spaces, and the worked cases."""
-    figure = plt.figure(figsize=(10, 6.6))
+    figure = Figure(figsize=(10, 6.6))
     grid = figure.add_gridspec(4, 6, height_ratios=(1, 1, 0.12, 1.5))
     nodes, ratios = made["angles"], made["ratios"]
     chosen = np.unique(np.round(np.interp((-1, -0.5, -0.05, 0, 0.05, 0.5), ratios, np.arange(ratios.size))).astype(int))
@@ -119,7 +121,7 @@ def figure_9(made: Arrays, folder: Path) -> list[Path]:
         figure.text(0.3 + 0.16 * index, 0.385, f"link {index + 1} slow", color=colour, fontsize=9, fontweight="bold")
     below = grid[3, :].subgridspec(1, 4)
     draw_cases([figure.add_subplot(below[0, i]) for i in range(4)], made, "worked", "CDEF")
-    return style.save(figure, folder, "figure-09-static-friction")
+    return style.save(figure, folder / "figure-09-static-friction")
 
 
 def _filled(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, levels: int = 20) -> Any:
@@ -128,7 +130,7 @@ def _filled(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, levels:
 
 def figure_11(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
     """Distance, work and efficiency at A0 = 0."""
-    figure, axes = plt.subplots(1, 3, figsize=(9.5, 3.1))
+    figure, axes = style.subplots(1, 3, figsize=(9.5, 3.1))
     for a, (key, name), text in zip(axes, _MEASURES, "ABC", strict=True):
         drawn = _filled(a, made["A1"], made["B1"], made[key])
         figure.colorbar(drawn, ax=a, shrink=0.85)
@@ -140,7 +142,7 @@ def figure_11(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
         if abs(gait[0]) < 0.05:
             axes[2].plot(gait[1], gait[2], "*", color=style.VERMILION, ms=8, clip_on=False)
             axes[2].annotate(label, gait[1:], xytext=(-10, -12), textcoords="offset points", color="white", fontweight="bold")
-    return style.save(figure, folder, "figure-11-no-offset")
+    return style.save(figure, folder / "figure-11-no-offset")
 
 
 def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
@@ -148,7 +150,7 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
     wanted = (0.0, 0.55, 1.1, 1.65, 2.2, 2.59)
     slices = [int(np.argmin(np.abs(made["A0"] - a))) for a in wanted]
     margins = {"left": 0.05, "right": 0.92, "bottom": 0.1, "top": 0.93, "hspace": 0.25, "wspace": 0.1}
-    figure, axes = plt.subplots(3, len(slices), figsize=(11, 4.8), sharex=True, sharey=True, gridspec_kw=margins)
+    figure, axes = style.subplots(3, len(slices), figsize=(11, 4.8), sharex=True, sharey=True, gridspec_kw=margins)
     figure.set_layout_engine("none")  # many axes of equal scale collapse under it
     for row, ((key, name), text) in enumerate(zip(_MEASURES, "ABC", strict=True)):
         field = made[f"{key}_direct"]
@@ -166,4 +168,4 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
         axes[row, 0].set_ylabel(r"$B_1$")
         style.letter(axes[row, 0], text)
         figure.colorbar(drawn, ax=axes[row], label=name, fraction=0.02, pad=0.01, ticks=MaxNLocator(4))
-    return style.save(figure, folder, "figure-12-maps-with-offset")
+    return style.save(figure, folder / "figure-12-maps-with-offset")

@@ -1,43 +1,19 @@
-"""Map a function over tasks on several processes, in order, with a progress bar on the terminal."""
+"""Map a function over tasks on several processes, in order, with a bar on the terminal."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import sys
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, TextIO, TypeVar
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import TypeVar
+
+from rich.console import Console
+from rich.progress import track
+
+from colloc.system.processors import available_processes
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-
-_WIDTH = 30
-
-
-def available_processes() -> int:
-    """Processors this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Linux
-        return os.cpu_count() or 1
-
-
-def progress(items: Iterable[Result], total: int, label: str, stream: TextIO | None = None) -> Iterator[Result]:
-    """Pass `items` on, drawing a bar with the time left; silent where the stream is not a terminal."""
-    stream = sys.stderr if stream is None else stream
-    if not stream.isatty():
-        yield from items
-        return
-    start = time.monotonic()
-    for done, item in enumerate(items, start=1):
-        spent = time.monotonic() - start
-        bar = "#" * (_WIDTH * done // total)
-        left = spent * (total - done) / done
-        stream.write(f"\r{label:<28.28} [{bar:<{_WIDTH}}] {done}/{total}  {spent:5.0f} s, {left:4.0f} s left ")
-        stream.flush()
-        yield item
-    stream.write("\n")
 
 
 def parallel_map(
@@ -48,31 +24,20 @@ def parallel_map(
     Parameters
     ----------
     function : callable
-        Picklable: a module-level function, or a partial of one.
+        Picklable: a module-level function, or a partial of one. It travels with every chunk of tasks.
     tasks : sequence
     processes : int, optional
         1 stays in this process.
     label : str
-        Heads the progress bar; none is drawn without it.
+        Heads the bar; none is drawn without it, nor where nobody watches.
     """
     count = min(available_processes() if processes is None else processes, len(tasks))
 
-    def shown(results: Iterable[Any]) -> list[Any]:
-        return list(progress(results, len(tasks), label) if label else results)
+    def watched(results):
+        hidden = not label or not sys.stderr.isatty()
+        return list(track(results, label, total=len(tasks), console=Console(stderr=True), disable=hidden))
 
     if count <= 1:
-        return shown(map(function, tasks))
-    # the function may carry much data (a velocity map): it travels once to each process, not with every task
-    with multiprocessing.get_context().Pool(count, _hold, (function,)) as pool:
-        return shown(pool.imap(_apply_held, tasks))
-
-
-_HELD: list[Callable[[Any], Any]] = []
-
-
-def _hold(function: Callable[[Any], Any]) -> None:
-    _HELD[:] = [function]
-
-
-def _apply_held(task: Any) -> Any:
-    return _HELD[0](task)
+        return watched(map(function, tasks))
+    with ProcessPoolExecutor(count) as pool:
+        return watched(pool.map(function, tasks, chunksize=max(1, len(tasks) // (8 * count))))

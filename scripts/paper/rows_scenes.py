@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction, link_force
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_force
 from scripts.paper.rows import Row, number_row, statement_row
 from scripts.paper.study import Study
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from scripts import rows_scenes, rows_three_link
+from scripts.paper import rows_scenes, rows_three_link
 from scripts.paper.rows import Row
 from scripts.paper.study import Study
 

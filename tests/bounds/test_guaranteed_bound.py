@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from colloc.bounds import guaranteed as bound_margin
 from colloc.bounds.coulomb_motion import balanced_motion
 from colloc.bounds.guaranteed import _KAPPA, _cell_bounds, _Reference, certify, with_guarantee
 from colloc.bounds.loaded_balance import loaded_balance
@@ -45,6 +46,24 @@ def test_loaded_forces_bound_the_power_from_below():
         assert np.all(other.potential >= beta_r + (load * other.velocity).sum(axis=0) - 1e-7)
 
 
+def _rate_of_the_forces(q, r, state):
+    """sum phi_i . B_i r: power of the forces if the middle link rests."""
+    held = BODY.velocity(BODY.posture(q, 1), r, np.zeros((3, q.shape[1])), 1)
+    return sum((state.forces[:, k] * part).sum(axis=0) for k, part in enumerate(held))
+
+
+@pytest.mark.parametrize("steps", [0, 2, 40])
+def test_what_is_left_unbalanced_is_counted_however_early_the_solver_stops(steps):
+    """Power of the forces on all links = their power with the middle link held + (load - leftover) . z, identically."""
+    rng = np.random.default_rng(36)
+    n = 50
+    q, r = rng.uniform(-3, 3, (2, n)), np.stack([np.ones(n), rng.uniform(-1, 1, n)])
+    load = rng.uniform(-0.1, 0.1, (3, n))
+    state = loaded_balance(BODY, q, r, load, rng.uniform(-1, 1, (3, n)), 1e-6, steps=steps)
+    expected = state.power - (load * state.velocity).sum(axis=0) + state.leftover_power
+    np.testing.assert_allclose(_rate_of_the_forces(q, r, state), expected, rtol=1e-8, atol=1e-8)
+
+
 def test_speed_of_a_link_end_is_bounded_by_its_dissipation():
     rng = np.random.default_rng(33)
     sigma = (np.arange(2000) + 0.5) / 2000
@@ -71,6 +90,45 @@ def test_cell_bounds_hold_at_random_motions_inside(bound, n):
     assert np.all(ratio.max(axis=1) <= value)
     # and they are not vacuous; most of the excess is the roughness of this coarse reference point
     assert np.median(value - ratio.max(axis=1)) < (0.3 if n == 64 else 0.15)
+
+
+@pytest.fixture(scope="module")
+def some_cells():
+    rng, n = np.random.default_rng(37), 64
+    size = np.array([2 * np.pi / n, 2 * np.pi / n, 4 / n])
+    low = rng.integers([n // 2, 0, 0], [n, n, n // 2], (40, 3)).T * size[:, None] - np.array([np.pi, np.pi, 1.0])[:, None]
+    inside = low[:, :, None] + size[:, None, None] * rng.uniform(0, 1, (3, 40, 20))
+    return low, size, balanced_motion(BODY, Friction(), inside[:2].reshape(2, -1), np.stack([np.ones(800), inside[2].ravel()]))
+
+
+def test_cell_bounds_hold_for_whatever_the_loaded_solver_returns(bound, some_cells, monkeypatch):
+    """Far from balance the forces prove less, but nothing false: here they belong to a wild motion and no step is taken."""
+    low, size, motion = some_cells
+    ratio = Samples(bound.potential_space(BODY), motion).ratio(np.array(bound.coefficients))[0].reshape(40, 20)
+
+    def wild(body, angles, rates, load, start, delta):
+        return loaded_balance(body, angles, rates, load, start + 1e3 * load.any(), delta, steps=0 if load.any() else 40)
+
+    monkeypatch.setattr(bound_margin, "loaded_balance", wild)
+    value, _ = _cell_bounds(BODY, _Reference(bound, BODY), low, size, 8.0, 1e-7)
+    assert np.all(ratio.max(axis=1) <= value)
+
+
+def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, some_cells, monkeypatch):
+    low, size, _ = some_cells
+
+    def broken(*arguments):
+        state = loaded_balance(*arguments)
+        return state._replace(power=np.full_like(state.power, np.nan))
+
+    monkeypatch.setattr(bound_margin, "loaded_balance", broken)
+    value, _ = _cell_bounds(BODY, _Reference(bound, BODY), low, size, 8.0, 1e-7)
+    assert np.all(value == np.inf)
+    everywhere = lambda body, reference, low, *rest: (np.full(low.shape[1], np.nan), np.full(low.shape[1], np.nan))  # noqa: E731
+    monkeypatch.setattr(bound_margin, "_cell_bounds", everywhere)
+    certificate = certify(BODY, Friction(), bound, 0.95, deepest=0)
+    assert certificate.open_cells == certificate.cells > 0
+    assert certificate.guaranteed == np.inf
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.minimax_program import smallest_maximum
 from colloc.numerics.spline import TensorSpline
-from colloc.system.errors import ProblemError
+from colloc.system.errors import ProblemError, StoreError
 
 FRICTIONS = [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0)]
 
@@ -158,7 +158,7 @@ def test_climbs_find_the_summit_of_a_crease():
 
 def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     tiny = Budget(intervals=3, harmonics=(1,), shapes=6, directions=6, rounds=1, starts=10)
-    cache = tmp_path / "bounds.json"
+    cache = tmp_path / "bounds.sqlite"
     first = efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
     monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: pytest.fail("not taken from the cache"))
     assert efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache) == first
@@ -172,7 +172,7 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     }
     assert len(keys) == 8
     cache.write_text("{")
-    with pytest.raises(ProblemError, match="cannot be read"):
+    with pytest.raises(StoreError, match="cannot be read"):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
 
 

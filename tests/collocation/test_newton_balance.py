@@ -10,9 +10,17 @@ from colloc.collocation.point_equations import balance_steps
 from colloc.mechanics.balance import instant, net_force, secant_matrix
 from colloc.mechanics.body import TAIL
 from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.native_kernel import numpy_instead
 
 THIRD = Chain((1 / 3,) * 3)
+pytestmark = pytest.mark.usefixtures("without_the_kernel")
 LAWS = [(1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3)]
+
+
+@pytest.fixture
+def without_the_kernel():
+    with numpy_instead():
+        yield
 
 
 def instants(n, seed):

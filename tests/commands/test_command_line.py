@@ -25,12 +25,13 @@ def problem(tmp_path):
     return write
 
 
-def test_a_good_problem_is_solved_saved_and_drawn(problem, tmp_path, capsys):
-    code = main([problem(GOOD), "--output", str(tmp_path / "out")])
+@pytest.mark.parametrize(("options", "kinds"), [([], {"h5", "png"}), (["--pdf"], {"h5", "png", "pdf"})])
+def test_a_good_problem_is_solved_saved_and_drawn(options, kinds, problem, tmp_path, capsys):
+    code = main([problem(GOOD), "--output", str(tmp_path / "out"), *options])
     printed = capsys.readouterr().out
     assert code in (0, 4)  # at delta = 0.3 the delta check may refuse the result
     name = "quick" if code == 0 else "quick.failed"
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {f"{name}.h5", f"{name}.png", f"{name}.pdf"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {f"{name}.{kind}" for kind in kinds}
     assert "efficiency d/W" in printed
     assert "delta 3e-01" in printed
 
@@ -88,16 +89,14 @@ def test_bad_options_and_files(problem, tmp_path, capsys):
     ):
         assert main([good, *options]) == 2
         assert message in capsys.readouterr().err
-    with pytest.raises(SystemExit) as stop:
-        main([good, "--turbo"])
-    assert stop.value.code == 2
+    assert main([good, "--turbo"]) == 2
     assert "unrecognized arguments: --turbo" in capsys.readouterr().err
 
 
 def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(problem, tmp_path, capsys, monkeypatch):
     good = tmp_path / "quick.h5"
     good.write_bytes(b"a good result")
-    monkeypatch.setitem(__import__("colloc.search.nlp", fromlist=["x"]).IPOPT_OPTIONS, "max_iter", 1)
+    monkeypatch.setattr("colloc.search.nlp.OPTIMAL_TOLERANCE", 1e-30)
     assert main([problem(GOOD), "--output", str(tmp_path), "--no-figure"]) == 3
     assert "not converged" in capsys.readouterr().out
     assert good.read_bytes() == b"a good result"
@@ -105,7 +104,7 @@ def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(problem, 
 
 
 def test_help_is_quick_and_does_not_need_casadi():
-    code = "import sys; from colloc.commands.solve import main\ntry: main(['--help'])\nexcept SystemExit: print('casadi' in sys.modules)"
+    code = "import sys; from colloc.solve import main\ntry: main(['--help'])\nexcept SystemExit: print('casadi' in sys.modules)"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.rstrip().endswith("False")
     assert "Exit codes" in result.stdout

@@ -15,9 +15,9 @@ from colloc.gaits.path_samples import (
 )
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.certificate import _largest_jump, corner_phases
 from colloc.search.class_transfer import delta_at_unit_speed, prolonged
-from colloc.search.path_start import nearest_parameters, transcribed
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.replay import replay
 
@@ -198,7 +198,6 @@ def test_delta_keeps_its_meaning_from_class_to_class():
 @pytest.mark.parametrize(
     ("gait", "changes", "words"),
     [
-        (FreePath(4.0), {"formulation": "lifted"}, "formulation"),
         (FreePath(4.0), {"scheme": "trapezoid"}, "gauss-N or radau-N"),
         (FreePath(4.0), {"intervals": 2}, "mesh is too small"),
         (Polygon(6), {"intervals": 8}, "mesh is too small"),

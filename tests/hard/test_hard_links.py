@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from benchmarks import reference
-from colloc.mechanics.friction import Friction, link_dissipation, link_force, link_moments, power
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_dissipation, link_force, link_moments, power
 
 LENGTH = 1 / 3
 SPEEDS = (0.0, 1e-300, 1e-160, 1e-14, 1e-9, 1e-4, 1.0, 1e4)

@@ -130,7 +130,7 @@ def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed(case, 
 @given(instants(), log_delta)
 def test_isotropic_balance_minimises_the_dissipation(case, exponent):
     """Doing better than any other rigid velocity is what the balance means there; the other is drawn close and far."""
-    from colloc.mechanics.friction import link_dissipation
+    from colloc.mechanics.link_friction import link_dissipation
 
     body, angles, rates = case
     delta = 10.0**exponent

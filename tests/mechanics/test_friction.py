@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from colloc.mechanics.friction import Friction, link_dissipation, link_force, link_force_jacobian, link_moments, power
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import link_dissipation, link_force, link_force_jacobian, link_moments, power
 from colloc.system.errors import ProblemError
 
 

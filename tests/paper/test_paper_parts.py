@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from colloc.system.errors import ProblemError, StoreError
-from scripts import paper_table, reproduce_paper
+from scripts import reproduce_paper
 from scripts.models.motion_record import third_slowest_dips
 from scripts.paper import figures as figures_paper
+from scripts.paper import table as paper_table
 from scripts.paper.array_store import read_arrays, read_attribute, write_arrays
 from scripts.paper.parallel import parallel_map
 from scripts.paper.rows import number_row, statement_row

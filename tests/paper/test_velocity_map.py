@@ -7,7 +7,6 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
-from scripts.models.map_store import read_map, write_map
 from scripts.models.velocity_map import STENCILS, VelocityMap, map_error, velocity_map
 
 DELTA = 1e-3
@@ -112,15 +111,6 @@ def test_kink_where_a_joint_rests():
     assert abs(jumps[2]) > 0.05
     assert jumps[1] == pytest.approx(jumps[2], rel=0.1)  # a smooth function's would fall with h
     assert 0.0 in velocity_map(Chain(), Friction(), DELTA, n_angle=4, n_ratio=5).ratios
-
-
-def test_store_round_trip(directional, tmp_path):
-    write_map(tmp_path / "map.h5", directional)
-    again = read_map(tmp_path / "map.h5")
-    assert again.body == directional.body
-    assert again.friction == directional.friction
-    assert again.delta == directional.delta
-    np.testing.assert_array_equal(again.values, directional.values)
 
 
 def test_unusable_requests_are_refused(isotropic):

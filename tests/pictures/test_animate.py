@@ -97,7 +97,8 @@ def test_a_solve_without_levels_has_nothing_to_show(three_link, tmp_path, capsys
 def test_publication_figures_are_pdf_and_png_of_journal_width(three_link, tmp_path):
     written = save_panels(three_link, tmp_path / "x")
     names = {path.name for path in written}
-    assert names == {f"x-{n}.pdf" for n in ("filmstrip", "lab", "angles", "speeds", "power", "convergence", "shape-1-2")}
+    shown = ("filmstrip", "lab", "angles", "speeds", "power", "convergence", "mesh", "shape-1-2")
+    assert names == {f"x-{n}.pdf" for n in shown}
     assert all(path.read_bytes().startswith(b"%PDF") for path in written)
     with Image.open(tmp_path / "x-power.png") as image:
         assert image.size[0] == pytest.approx(3.4 * 300, abs=1)

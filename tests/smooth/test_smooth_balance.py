@@ -6,8 +6,8 @@ from scipy import integrate, optimize
 
 from colloc.mechanics.body import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction, link_force
-from colloc.mechanics.point_friction import density_jacobian, force_density
+from colloc.mechanics.friction import Friction, density_jacobian, force_density
+from colloc.mechanics.link_friction import link_force
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.curve import Panels, curve, node_velocity, resultant
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave

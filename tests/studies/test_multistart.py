@@ -5,25 +5,30 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
 from colloc.commands import multistart
 from colloc.gaits.equivalence import distance, images, irreversibility, phase_distance, reversed_in_time
+from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.path_samples import arcs_through
+from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, shape_speed, start_gait
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
-from colloc.results.archive import Archive, load_archive, save_archive
-from colloc.results.delta_limit import efficiency_at_zero_delta, resolution_warning
+from colloc.results.archive import StartName, open_archive, row_path, save_archive
+from colloc.results.certificate import corner_phases
+from colloc.results.delta_limit import efficiency_at_zero_delta, mesh_errors, resolution_warning
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.results.solution import SOLVED
-from colloc.search import continuation, level_run
-from colloc.search.closure import closed_parameters, enclosed_area, net_rotations, opened_parameters
-from colloc.search.continuation import continue_delta
-from colloc.search.optimise import is_trivial, maximise_efficiency
+from colloc.search import optimise
+from colloc.search.optimise import is_trivial, maximise_efficiency, optimum
 from colloc.search.parameter_continuation import continue_parameter, with_parameter
 from colloc.studies import campaign
 from colloc.system.errors import ProblemError, StoreError
@@ -73,7 +78,6 @@ def test_a_retraced_gait_goes_nowhere_unless_friction_tells_forward_from_backwar
     retraced = Fourier([0.4, -0.9], [[0.9], [0.5]], [[0.0], [0.0]])
     assert irreversibility(retraced) < 1e-7
     assert irreversibility(GAIT) > 0.1
-    assert enclosed_area(retraced) == 0
     assert replayed(retraced, REVERSIBLE).efficiency < 1e-9
     assert replayed(retraced, IRREVERSIBLE).efficiency > 1e-2
 
@@ -118,32 +122,9 @@ def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, 
         start_gait(stated, "dice", 0, 0)
 
 
-@pytest.mark.parametrize("friction", [REVERSIBLE, IRREVERSIBLE])
-def test_closing_the_rotation_keeps_the_enclosed_area(friction):
-    stated = problem(friction=friction, gait=Harmonic(1, "none"))
-    start = stated.gait.parameters(start_gait(stated, SAMPLERS[0], 0, 3))
-    closed = closed_parameters(stated, start, 0.1)
-    (before, after), _ = net_rotations(stated, np.array([start, closed]), 0.1)
-    assert abs(before) > 1e-3
-    assert abs(after) < 1e-6
-    areas = [enclosed_area(stated.gait.fourier(p, 2)) for p in (start, closed)]
-    assert areas[1] == pytest.approx(areas[0], rel=0.2)
-
-
-def test_an_almost_retraced_gait_is_opened_without_turning_it_round():
-    stated = problem(friction=Friction(10, 1, 1), gait=Harmonic(1, "none"))
-    for sign in (1.0, -1.0):
-        narrow = stated.gait.parameters(Fourier([0.5, -0.3], [[0.9], [0.7]], [[0.0], [0.01 * sign]]))
-        opened = opened_parameters(stated, narrow, 0.1)
-        before, after = (enclosed_area(stated.gait.fourier(p, 2)) for p in (narrow, opened))
-        assert after * before > 0
-        assert abs(after) > 3 * abs(before)
-        assert abs(net_rotations(stated, opened[None], 0.1)[0][0]) < 1e-3
-
-
-def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retraced_one():
+def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
     stated = problem(gait=Harmonic(1, "none"), intervals=20)
-    solution = continue_delta(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
+    solution = optimum(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
     assert solution.last.optimal
     assert not is_trivial(solution)
     assert irreversibility(solution.gait) > 0.1
@@ -151,8 +132,7 @@ def test_the_start_of_a_free_gait_is_closed_before_it_can_collapse_onto_a_retrac
 
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
-    monkeypatch.setattr(level_run, "TRIVIAL_EFFICIENCY", 2.0)
-    monkeypatch.setattr(continuation, "_FIRST_DELTAS", 2)
+    monkeypatch.setattr(optimise, "TRIVIAL_EFFICIENCY", 2.0)
     solution = maximise_efficiency(problem())
     assert is_trivial(solution)
     assert solution.status != SOLVED
@@ -160,14 +140,15 @@ def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
 
 
 def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
-    # where friction resists backwards sliding five times as much, small gaits beat large ones
-    stated = problem(friction=Friction(0.5, 1, 5), delta=1e-3, delta_start=1e-2, guess=ellipse(0.5, 0.12, 0.12), intervals=14)
+    # without the bound the best gait has a shape speed of 1.86
+    bounds = {"smallest_shape_speed": 2.0, "delta": 1e-3, "mesh_tolerance": 1e-4}
+    stated = problem(friction=Friction(0.5, 1, 5), guess=ellipse(0, 1.8, 1.2), **bounds)
     solution = maximise_efficiency(stated)
     assert solution.status == SOLVED
     assert on_speed_floor(stated, solution.gait)
-    assert "smallest_shape_speed = 0.1" in solution.message
-    assert not on_speed_floor(stated, ellipse(0.2, 1.2, 0.8))
-    found = [outcome(0, solution.gait), outcome(1)]
+    assert "smallest_shape_speed = 2" in solution.message
+    assert not on_speed_floor(stated, ellipse(0.0, 2.0, 1.2))
+    found = [outcome(0, solution.gait), outcome(1, ellipse(0.0, 2.0, 1.2))]
     lines = multistart.summary_lines(stated, found, basins(stated, found))
     assert sum("on the bound smallest_shape_speed" in line for line in lines) == 1
 
@@ -190,19 +171,63 @@ def test_basins_join_images_of_one_gait_and_nothing_else():
 
 
 def test_an_archive_comes_back_as_it_was_written(tmp_path):
-    archive = Archive(problem(), SAMPLERS[0], 7, "command", {k: outcome(k) for k in (4, 1)})
-    assert load_archive(save_archive(Archive(problem(), SAMPLERS[0], 7), tmp_path / "empty.h5")).outcomes == {}
-    back = load_archive(save_archive(archive, tmp_path / "sub" / "a.h5"))
-    assert (back.problem.hash, back.sampler, back.seed, back.command) == (problem().hash, SAMPLERS[0], 7, "command")
-    assert sorted(back.outcomes) == [1, 4]
+    path = tmp_path / "sub" / "a.h5"
+    names = {k: StartName(SAMPLERS[0], 7, k) for k in (4, 1)}
+    assert open_archive(problem(), path).outcomes == {}
+    archive = open_archive(problem(), path)
+    archive.add({names[4]: outcome(4, efficiency=1 / 3), names[1]: outcome(1, efficiency=np.nan, status=ERROR)})
+    back = open_archive(problem(), path)
+    assert (sorted(back.outcomes), back.damaged) == (sorted(names.values()), 0)
     for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
-        assert getattr(back.outcomes[4], name) == getattr(archive.outcomes[4], name)
-    np.testing.assert_array_equal(back.outcomes[1].gait.sin, GAIT.sin)
-    assert [p.name for p in (tmp_path / "sub").glob("[!.]*")] == ["a.h5"]
-    (tmp_path / "bad.h5").write_bytes(b"not HDF5")
-    for name in ("bad.h5", "missing.h5"):
-        with pytest.raises(StoreError):
-            load_archive(tmp_path / name)
+        assert getattr(back.outcomes[names[4]], name) == getattr(archive.outcomes[names[4]], name)
+    assert np.isnan(back.outcomes[names[1]].efficiency)
+    np.testing.assert_array_equal(back.outcomes[names[1]].gait.sin, GAIT.sin)
+    save_archive(back)
+    assert sorted(p.name for p in path.parent.glob("[!.]*")) == ["a.h5", "a.sqlite"]
+
+
+@pytest.mark.parametrize(
+    "gait",
+    [arcs_through(ellipse(0.2, 1.2, 0.8), FreePath(4), np.linspace(0, 1, 9)), Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]])],
+    ids=["path", "polygon"],
+)
+def test_gaits_that_are_no_series_are_kept_to_the_bit(gait, tmp_path):
+    stated = problem(gait=FreePath(4) if hasattr(gait, "length") else Polygon(3), guess=gait)
+    name = StartName(SAMPLERS[0], 0, 0)
+    open_archive(stated, tmp_path / "a.h5").add({name: outcome(0, gait)})
+    back = open_archive(stated, tmp_path / "a.h5").outcomes[name].gait
+    assert type(back) is type(gait)
+    assert fields(back) == fields(gait)
+
+
+def test_an_archive_that_cannot_be_gone_on_from_is_refused_and_left_alone(tmp_path):
+    path = tmp_path / "a.h5"
+    path.write_bytes(b"results of an older colloc")
+    with pytest.raises(StoreError, match="choose another --output"):
+        open_archive(problem(), path)
+    assert path.read_bytes() == b"results of an older colloc"
+    path.unlink()
+    row_path(path).write_bytes(b"not SQLite" * 100)
+    with pytest.raises(StoreError, match="cannot be read as a colloc starts"):
+        open_archive(problem(), path)
+    assert row_path(path).read_bytes() == b"not SQLite" * 100
+
+
+def test_xarray_opens_an_archive_with_named_dimensions(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    archive = open_archive(problem(), tmp_path / "a.h5")
+    with xarray.open_dataset(save_archive(archive), engine="h5netcdf") as data:
+        assert dict(data.sizes) == {"start": 0, "basin": 0}
+    archive.add({StartName(SAMPLERS[0], seed, k): outcome(k) for seed in (0, 1) for k in range(2)})
+    with xarray.open_dataset(save_archive(archive, "command"), engine="h5netcdf") as data:
+        assert dict(data.sizes) == {"start": 4, "joint": 2, "harmonic": 2, "basin": 1}
+        assert data.gait_cos.dims == ("start", "joint", "harmonic")
+        assert data.start.values.tolist() == [0, 1, 0, 1]
+        assert data.seed.values.tolist() == [0, 0, 1, 1]
+        assert set(data.status.values) == {SOLVED}
+        assert data.basin_count.item() == 4
+        assert data.attrs["command"] == "command"
 
 
 def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
@@ -210,7 +235,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
         solve.calls += 1
         if solve.calls == 2:
             raise ZeroDivisionError("one bad start")
-        solution = continue_delta(stated, watch)
+        solution = optimum(stated, watch)
         if solve.calls == 3:
             monkeypatch.setattr(campaign.time, "perf_counter", lambda: 1e12)
             watch(solution.last)
@@ -264,8 +289,8 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     multistart.main([str(path), "--starts", "2", "--output", str(out)])
     printed = capsys.readouterr().out
     assert "0 starts done already, 2 to go" in printed
-    archive = load_archive(out / "quick.starts.h5")
-    assert sorted(archive.outcomes) == [0, 1]
+    kept = lambda: open_archive(read_problem_file(path).problem, out / "quick.starts.h5")  # noqa: E731
+    assert sorted(kept().of_search(SAMPLERS[0], 0)) == [0, 1]
     asked = []
 
     def run(stated, starts, **settings):
@@ -280,8 +305,36 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert summary["starts"] == 4
     assert sum(summary["counts"].values()) == 4
     assert summary["optima"][0]["efficiency"] >= 0.2 - 1e-12
-    assert multistart.main([str(path), "--starts", "4", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 2
-    assert "another problem, sampler or seed" in capsys.readouterr().err
+    # another seed joins the same archive, and says what else is there
+    assert multistart.main([str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 0
+    assert asked == [2, 3, 0, 1]
+    assert "starts in the file besides: 4; the best of all, 0.200000" in capsys.readouterr().out
+    archive = kept()
+    assert sorted(archive.of_search(SAMPLERS[0], 0)) == [0, 1, 2, 3]
+    assert sorted(archive.of_search(SAMPLERS[0], 1)) == [0, 1]
+    # another problem of the same name does not
+    path.write_text(FILE.replace("delta=0.1", "delta=0.2"), encoding="utf-8")
+    assert multistart.main([str(path), "--output", str(out)]) == 2
+    assert "holds starts of another problem" in capsys.readouterr().err
+    assert asked == [2, 3, 0, 1]
+    path.write_text(FILE, encoding="utf-8")
+    assert len(kept().outcomes) == 6
+
+
+def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the_other(tmp_path):
+    runs = [open_archive(problem(), tmp_path / "a.h5") for _ in (0, 1)]
+    for k in range(3):
+        for seed, archive in enumerate(runs):
+            archive.add({StartName(SAMPLERS[0], seed, k): outcome(k, efficiency=0.1 * (seed + 1))})
+    assert len(runs[0].outcomes) == 3
+    save_archive(runs[0])
+    expected = {(SAMPLERS[0], seed, k): 0.1 * (seed + 1) for seed in (0, 1) for k in range(3)}
+    assert {name: o.efficiency for name, o in runs[0].outcomes.items()} == expected
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file["start"].size == 6
+    with pytest.raises(StoreError, match="another problem"):
+        open_archive(problem(delta=0.2), tmp_path / "a.h5")
+    assert len(open_archive(problem(), tmp_path / "a.h5").outcomes) == 6
 
 
 def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
@@ -297,7 +350,7 @@ def test_continuation_in_a_friction_coefficient_meets_the_direct_solution():
     steps = continue_parameter(problem(delta=0.03), "friction.mu_t", 2.0, first_step=0.5)
     assert [s.value for s in steps] == [1.0, 1.5, 2.0]
     assert all(s.optimal for s in steps)
-    direct = continue_delta(problem(delta=0.03, friction=Friction(2, 1, 1), guess=steps[-1].solution.gait))
+    direct = optimum(problem(delta=0.03, friction=Friction(2, 1, 1), guess=steps[-1].solution.gait))
     assert steps[-1].solution.efficiency == pytest.approx(direct.efficiency, rel=1e-6)
     assert with_parameter(problem(), "intervals", 15.2).intervals == 15
     for name in ("friction.mu_x", "viscosity", "name"):
@@ -314,7 +367,7 @@ def test_a_failed_step_is_halved_and_kept(monkeypatch):
         return SimpleNamespace(last=SimpleNamespace(optimal=not far, delta=0.1), problem=stated, gait=stated.guess)
 
     solve.last = 3.0
-    monkeypatch.setattr(homotopy, "continue_delta", solve)
+    monkeypatch.setattr(homotopy, "optimum", solve)
     steps = continue_parameter(problem(joint_limit=3.0), "joint_limit", 2.5)
     assert [(s.value, s.optimal) for s in steps] == [(3.0, True), (2.5, False), (2.75, True), (2.5, True)]
 
@@ -326,8 +379,18 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
     assert resolution_warning(three_link) is None
 
 
+def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
+    stated = Problem("p", ellipse(0.1, 2.0, 1.0), gait=Polygon(3, "bilateral"), delta=1e-2, intervals=24, mesh_tolerance=0.0)
+    solution = optimum(stated)
+    gait = solution.gait
+    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
+    exact = replay(stated.body, stated.friction, path, stated.delta * gait.length, breaks=corner_phases(gait), tolerance=1e-8)
+    # at the problem's own number, which is at unit shape speed, it would come out 40 times too large
+    assert mesh_errors(solution).sum() == pytest.approx(abs(solution.efficiency / exact.efficiency - 1), rel=0.2)
+
+
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
-    coarse = continue_delta(problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait))
+    coarse = optimum(problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait))
     assert "under-resolved by 5 intervals" in resolution_warning(coarse)
     with pytest.raises(ValueError, match="at least two converged levels"):
         efficiency_at_zero_delta(coarse)

@@ -1,6 +1,7 @@
 """Ctrl-C: what was reached is kept, the same command goes on from there, and compiled code does not swallow it."""
 
 import contextlib
+import re
 import signal
 import subprocess
 import sys
@@ -9,8 +10,13 @@ import time
 import numpy as np
 import pytest
 
+from colloc.collocation.transcription import transcribe
+from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.problem import Problem
 from colloc.results.store import load
-from colloc.system.interruption import interruptible
+from colloc.search.nlp import Solver
+from colloc.system.interruption import interrupted, interruptible
 
 PROBLEM = """
 from colloc import *
@@ -28,15 +34,19 @@ def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "colloc", "solve", str(tmp_path / "long.py"), "--output", str(out), "--no-figure"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    limit = time.monotonic() + 60
-    while not (out / "long.partial.h5").exists() and time.monotonic() < limit:
+    limit = time.monotonic() + 120
+    while not (begun := (out / "long.partial.h5").exists()) and process.poll() is None and time.monotonic() < limit:
         time.sleep(0.01)
+    assert begun, f"no level ended: {process.communicate()[1] if process.poll() is not None else 'still at the first'}"
+    time.sleep(0.1)  # into the next level, where Ctrl-C meets IPOPT
     process.send_signal(signal.SIGINT)
     printed, complaint = process.communicate(timeout=60)
     assert process.returncode == 130
     assert printed == ""
-    assert "levels are kept in" in complaint
-    assert "Traceback" not in complaint
+    kept = out / "long.partial.h5"
+    assert re.fullmatch(
+        rf"colloc: interrupted; \d levels are kept in {kept}; the same command goes on from there.\n", complaint
+    )
     assert not (out / "long.h5").exists()
     partial = load(out / "long.partial.h5")
     assert partial.status == "not converged"
@@ -57,15 +67,83 @@ def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
     assert solution.certificate.efficiency == pytest.approx(0.26003, abs=2e-5)
 
 
-def swallow():
-    with interruptible(), contextlib.suppress(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
+def pressed(times, seen, **options):
+    with interruptible(**options):
+        for _ in range(times):
+            seen["pressed"] += 1
+            signal.raise_signal(signal.SIGINT)
+        seen["known"] = interrupted()
 
 
-def test_a_swallowed_interrupt_is_raised_at_the_end_of_the_block():
+def press(times=1, **options):
+    """What Ctrl-C does in a block: how often it was pressed before an exception came, and whether the block knew."""
+    seen = {"pressed": 0, "known": False}
     with pytest.raises(KeyboardInterrupt):
-        swallow()
+        pressed(times, seen, **options)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    return seen["pressed"], seen["known"]
+
+
+def test_a_block_that_asks_is_left_to_stop_by_itself_and_interrupted_at_its_end():
+    assert press() == (1, True)
+    assert press() == (1, True)  # a new block begins anew
+
+
+def test_a_second_ctrl_c_is_raised_at_once():
+    assert press(times=3) == (2, False)
+
+
+def test_in_a_command_every_ctrl_c_is_raised_at_once():
+    assert press(times=3, polled=False) == (1, False)
+
+
+def fail(*, after_ctrl_c):
+    with interruptible():
+        if after_ctrl_c:
+            signal.raise_signal(signal.SIGINT)
+        raise NotImplementedError
+
+
+def test_an_error_that_an_interruption_became_is_an_interruption_and_other_errors_are_not():
+    with pytest.raises(KeyboardInterrupt):
+        fail(after_ctrl_c=True)
+    with pytest.raises(NotImplementedError):
+        fail(after_ctrl_c=False)
+
+
+def begin_after_a_swallowed_ctrl_c(begun):
+    with interruptible(polled=False):
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        with interruptible():
+            begun.append(True)
+
+
+def test_no_solve_begins_after_an_interruption_that_was_swallowed():
+    begun = []
+    with pytest.raises(KeyboardInterrupt):
+        begin_after_a_swallowed_ctrl_c(begun)
+    assert begun == []
+
+
+def test_ipopt_stops_between_iterations_and_says_nothing(capfd):
+    problem = Problem("p", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral"), intervals=20)
+    solver, calls = Solver(transcribe(problem)), []
+    x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
+    balanced = solver._reduced.condensed._balanced
+
+    def pressed(*arguments):
+        calls.append(arguments)
+        if len(calls) == 10:
+            signal.raise_signal(signal.SIGINT)
+        return balanced(*arguments)
+
+    solver._reduced.condensed._balanced = pressed
+    with pytest.raises(KeyboardInterrupt):
+        solver.solve(x, 0.1)
+    assert 10 <= len(calls) < 20
+    printed = capfd.readouterr()
+    assert printed.out + printed.err == ""
 
 
 def test_a_handler_of_somebody_else_is_left_alone():

@@ -21,13 +21,16 @@ import pytest
 
 from colloc.commands import multistart, solve
 from colloc.commands import sweep as sweep_study
-from colloc.results import archive as store_archive
+from colloc.gaits.problem_file import read_problem_file
 from colloc.results import store
+from colloc.results.archive import Archive, open_archive
 from colloc.studies import campaign
-from colloc.studies import journal as study_journal
+from colloc.studies import run as study_run
 from colloc.studies import store as _  # noqa: F401  imported before any fork
+from colloc.studies.journal import read_journal
 from colloc.studies.store import load_study
 from colloc.system import task_pool
+from colloc.system.sealed_file import check_seal
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="forks and kills")]
 CYCLES = 120
@@ -42,7 +45,7 @@ from colloc.studies.study import Axis, Study
 def problem(mu_t):
     return Problem("tiny", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t, 1, 1),
                    delta=1e-2, delta_start=1e-2, intervals=8, mesh_tolerance=0.0)
-STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.05, 1.1, 1.15)),), problem, cold_starts=0, passes=0, warm_starts=1)
+STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.05, 1.1, 1.15)),), problem, cold_starts=0, warm_starts=1)
 """
 
 
@@ -72,12 +75,10 @@ def child(kind, folder, pipe):
         return solve.main([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
-        facts = lambda archive, path: {str(k): o.gait.cos.sum() for k, o in archive.outcomes.items()}  # noqa: E731
-        store_archive.save_archive = told(say, kind, store_archive.save_archive, facts)
+        Archive.add = told(say, kind, Archive.add, lambda archive, outcomes: start_facts(archive.outcomes))
         return multistart.main([str(folder / "p.py"), "--output", str(folder), "--starts", "4", "--quiet"])
     task_pool.process_pool = ThreadPoolExecutor
-    append = study_journal.Journal.append
-    study_journal.Journal.append = told(say, kind, append, lambda journal, records: attempt_facts(records))
+    study_run.append_records = told(say, kind, study_run.append_records, lambda folder, records: attempt_facts(records))
     return sweep_study.main([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 
 
@@ -85,6 +86,11 @@ def solve_facts(solution, path):
     """What a file of one solve holds: its first level, be the run under way or finished, and the result if it is finished."""
     facts = {"first level": solution.levels[0].x.sum()}
     return facts if path.name.endswith(".partial.h5") else facts | {"result": solution.last.x.sum()}
+
+
+def start_facts(outcomes):
+    """What an archive holds: the gait of each start."""
+    return {str(name): outcome.gait.cos.sum() for name, outcome in outcomes.items()}
 
 
 def attempt_facts(records):
@@ -101,14 +107,16 @@ def kept(kind, folder):
                 facts |= solve_facts(store.load(folder / name), folder / name)
         return facts
     if kind == "multistart":
-        path = folder / "tiny.starts.h5"
-        outcomes = store_archive.load_archive(path).outcomes if path.exists() else {}
-        return {str(k): o.gait.cos.sum() for k, o in outcomes.items()}
+        found = open_archive(read_problem_file(folder / "p.py").problem, folder / "tiny.starts.h5")
+        assert found.damaged == 0
+        if (folder / "tiny.starts.h5").exists():
+            check_seal(folder / "tiny.starts.h5", 10**7, "archive")
+        return start_facts(found.outcomes)
     if (folder / "tiny.nc").exists():
         load_study(folder / "tiny.nc")
-    text = study_journal.read_journal(folder / "tiny.study")
-    assert text.damaged == 0
-    return attempt_facts(text.records)
+    journal = read_journal(folder / "tiny.study")
+    assert journal.damaged == 0
+    return attempt_facts(journal.records)
 
 
 def cycle(kind, folder, rng, longest, at_a_write):

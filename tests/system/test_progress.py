@@ -1,6 +1,8 @@
 """What a person sees while they wait, and that a log sees nothing."""
 
 import io
+import subprocess
+import sys
 import time
 from dataclasses import replace
 
@@ -10,6 +12,9 @@ from colloc.commands.solve import levels_left
 from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
 from colloc.system.progress import StatusLine, duration
+
+WIPED = "\x1b[1A\x1b[2K"
+"""Up to the line, and the line erased."""
 
 
 class Terminal(io.StringIO):
@@ -30,12 +35,23 @@ def test_the_line_says_what_and_how_long_and_vanishes():
         line.say("solving", left=20.0)
         line.say("drawing")
     printed = stream.getvalue()
-    assert "\rsolving   0 s, about 20 s left" in printed
-    assert "\rdrawing   0 s" in printed
-    assert printed.endswith("\r")
-    last = printed.rstrip("\r").rsplit("\r", 1)[-1]
-    assert last.strip() == ""
-    assert len(last) >= len("drawing   0 s")
+    assert "solving   0 s, about 20 s left" in printed
+    assert "drawing   0 s" in printed
+    assert printed.endswith(WIPED)
+
+
+def test_what_is_printed_in_between_stands_on_a_line_of_its_own():
+    stream = Terminal()
+    with StatusLine(stream) as line:
+        line.say("0 of 2 [starts]")
+        line.clear()
+        stream.write("a row\n")
+        line.say("1 of 2 [starts]")
+    before, after = stream.getvalue().split("a row\n")
+    assert before.endswith(WIPED)
+    assert "0 of 2 [starts]   0 s" in before
+    assert "1 of 2 [starts]   0 s" in after
+    assert after.endswith(WIPED)
 
 
 def test_the_line_ticks_by_itself_and_the_time_left_falls():
@@ -54,6 +70,14 @@ def test_nothing_is_written_where_nobody_watches():
             line.clear()
     assert log.getvalue() == ""
     assert muted.getvalue() == ""
+
+
+def test_nothing_is_loaded_to_draw_where_nobody_watches():
+    code = "import sys\nfrom colloc.system.progress import StatusLine\nwith StatusLine() as line: line.say('x')\n"
+    said = subprocess.run(
+        [sys.executable, "-c", code + "print('rich' in sys.modules)"], capture_output=True, text=True, check=True
+    )
+    assert (said.stdout, said.stderr) == ("False\n", "")
 
 
 def test_levels_left_counts_decades_and_a_refined_mesh(three_link):

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -10,7 +12,9 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from colloc.system.task_pool import Lost, Task, completed, process_pool
+from colloc.system.dask_pool import connected
+from colloc.system.errors import ProblemError
+from colloc.system.task_pool import EngineGone, Lost, Task, completed, process_pool
 
 
 def listed(tasks):
@@ -29,6 +33,35 @@ def dying_once(x, folder):
         open(flag, "w").close()
         os.kill(os.getpid(), signal.SIGKILL)
     return 2 * x
+
+
+def slowly_doubled(x):
+    time.sleep(x)
+    return 2 * x
+
+
+def dask_processes(folder):
+    """A scheduler and a worker in processes of their own, and the address in a file."""
+    program = (
+        "import asyncio, sys, distributed\n"
+        "async def main():\n"
+        "    kind, address = sys.argv[1:]\n"
+        "    node = distributed.Scheduler(port=0, dashboard_address=':0') if kind == 'scheduler' else "
+        "distributed.Worker(address, nthreads=1)\n"
+        "    async with node:\n"
+        "        print(node.address, flush=True)\n"
+        "        await node.finished()\n"
+        "asyncio.run(main())\n"
+    )
+
+    def started(kind, address):
+        command = [sys.executable, "-c", program, kind, address]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        return process, process.stdout.readline().strip()
+
+    scheduler, address = started("scheduler", "")
+    (folder / "address").write_text(address)
+    return scheduler, started("worker", address)[0]
 
 
 def threads_in_use(n):
@@ -139,3 +172,46 @@ def test_workers_do_not_outlive_a_parent_that_is_killed():
             break
         time.sleep(0.05)
     assert gone
+
+
+@pytest.fixture
+def cluster():
+    """A Dask cluster in this process, without workers; its port is one that is free."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=0, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster:
+        yield cluster
+
+
+def test_a_dask_scheduler_without_workers_is_waited_for_a_stated_time_only(cluster):
+    said = []
+    with pytest.raises(ProblemError, match=r"had no workers for 1 s; start some, for example: dask worker"):
+        connected(cluster.scheduler_address, 1, said.append, patience=1.0)
+    assert "waiting for one, 1 s at most" in said[0]
+
+
+def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_task(cluster):
+    cluster.scale(1)
+    executor, workers = connected(cluster.scheduler_address, 1, patience=1.0)
+    assert workers == 1
+    run = completed(slowly_doubled, listed([Task(0, (0.0,)), Task(1, (0.0,)), Task(2, (30.0,))]), workers=1, executor=executor)
+    assert [next(run)[1] for _ in range(2)] == [0.0, 0.0]
+    cluster.scale(0)
+    with pytest.raises(EngineGone, match="no workers for 1 s"):
+        list(run)
+
+
+def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task(tmp_path):
+    pytest.importorskip("distributed")
+    scheduler, worker = dask_processes(tmp_path)
+    try:
+        executor, _ = connected((tmp_path / "address").read_text(), 1)
+        # a function that other processes know as well
+        run = completed(time.sleep, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor)
+        assert next(run)[1] is None
+        scheduler.kill()
+        with pytest.raises(EngineGone, match="is gone; what is done is kept"):
+            list(run)
+    finally:
+        for process in (scheduler, worker):
+            process.kill()
+            process.communicate()

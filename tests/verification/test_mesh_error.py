@@ -15,9 +15,8 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.search import continuation
-from colloc.search.continuation import continue_delta
-from colloc.search.optimise import maximise_efficiency
+from colloc.search import reduced_search
+from colloc.search.optimise import maximise_efficiency, optimum
 from colloc.verification import refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
 from colloc.verification.kinks import kink_phases
@@ -149,7 +148,7 @@ def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     assert not plan.reached
     assert plan.estimate > 1e-7
     small = planned_mesh
-    monkeypatch.setattr(continuation, "planned_mesh", lambda *a, **k: small(*a, **k, most_points=60))
+    monkeypatch.setattr(reduced_search, "planned_mesh", lambda *a, **k: small(*a, **k, most_points=60))
     solution = maximise_efficiency(stated)
     assert solution.status == "certificate failed"
     assert "mesh error" in solution.message
@@ -158,7 +157,7 @@ def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
 
 def test_a_refined_solution_knows_its_scheme_and_its_error():
     stated = problem("gauss-2", mesh_tolerance=1e-5)
-    solution = continue_delta(stated)
+    solution = optimum(stated)
     assert solution.last.optimal
     assert solution.last.scheme == solution.mesh.scheme.name != "gauss-2"
     gait = solution.gait

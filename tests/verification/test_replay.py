@@ -1,11 +1,16 @@
 """The replay against motions whose distance and work are known exactly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import ellipse
+from colloc.gaits.harmonic import Fourier, ellipse
 from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.verification import replay as path_replay
+from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import replay
 
 
@@ -29,14 +34,73 @@ def test_a_scallop_with_directional_friction_crawls_and_obeys_the_bound():
     assert abs(result.actuator_work / result.work - 1) < 1e-9
 
 
-def test_error_estimate_covers_the_true_error_and_shrinks_with_the_grid():
-    gait = ellipse(0.0, 2.8, 1.3)
-    path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
-    exact = replay(Chain(), Friction(), path, 1e-4, instants=25600, most_instants=25600).efficiency
-    coarse, fine = (replay(Chain(), Friction(), path, 1e-4, instants=n, most_instants=n) for n in (800, 3200))
-    for result in (coarse, fine):
-        assert abs(result.efficiency / exact - 1) < 20 * result.error + 1e-8
-    assert fine.error < 0.3 * coarse.error < 3e-4
+LAWS = [(1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0), (10.0, 1.0, 1.0)]
+
+
+def random_path(seed):
+    """A wave of two harmonics through three to five links, and a law."""
+    rng = np.random.default_rng(seed)
+    n_joint = int(rng.integers(2, 5))
+    gait = Fourier(rng.uniform(-1, 1, n_joint), rng.normal(0, 0.4, (n_joint, 2)), rng.normal(0, 0.4, (n_joint, 2)))
+    return Chain((1 / (n_joint + 1),) * (n_joint + 1)), Friction(*LAWS[seed % 4]), lambda t: (gait.angles(t), gait.rates(t))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_stated_error_holds_against_another_quadrature(seed):
+    """Against Gauss nodes on adaptive panels, from grids of any size: their kinks lie anywhere between the instants."""
+    body, friction, path = random_path(seed)
+    fine = fine_motion(body, friction, path, 1e-4, np.linspace(0, 1, 21), 1e-9)
+    exact = abs(fine.path[-1]) / fine.work[-1]
+    for instants, tolerance in ((100, 1.0), (200, 1e-3), (328, 1e-3), (1600, 1e-6)):
+        result = replay(body, friction, path, 1e-4, instants=instants, tolerance=tolerance)
+        assert abs(result.efficiency / exact - 1) <= result.error <= tolerance
+        assert result.rotation == pytest.approx(fine.theta[-1], abs=result.error)
+
+
+def test_panels_gather_at_kinks():
+    body, friction, path = random_path(0)
+    loose, tight = (replay(body, friction, path, 1e-4, instants=400, tolerance=tol) for tol in (1e-4, 1e-8))
+    assert tight.error < 1e-8
+    assert tight.instants < 20 * loose.instants
+
+
+def test_the_largest_residual_of_all_instants_is_reported(monkeypatch):
+    """Between breaks the replay runs in pieces; an instant out of balance counts in whichever of them it is."""
+    body, friction, path = random_path(1)
+    for where in (0.1, 0.5, 0.9):
+
+        def poor(body, friction, angles, rates, delta, start=None, where=where):
+            solved = solve_balance(body, friction, angles, rates, delta)
+            here = np.abs(angles - path(np.array([where]))[0]).max(axis=0) < 1e-2
+            return replace(solved, residual=np.where(here, 3e-8, solved.residual))
+
+        monkeypatch.setattr(path_replay, "solve_balance", poor)
+        result = replay(body, friction, path, 1e-4, instants=800, tolerance=1e-3, breaks=(0.3, 0.7))
+        assert result.residual == 3e-8
+        assert result.error > 3e-8
+
+
+def test_an_accuracy_beyond_that_of_the_balance_is_not_claimed():
+    body, friction, path = random_path(0)
+    assert replay(body, friction, path, 1e-4, tolerance=1e-15).error > 1e-13
+
+
+def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_lever():
+    """The ends of the body against its centre of mass, for gaits that turn: first order in the rotation."""
+    for seed in range(4):
+        body, friction, path = random_path(seed)
+        result = replay(body, friction, path, 1e-4, tolerance=1e-4)
+        assert abs(result.rotation) > 1e-3
+        angles, _ = path(np.zeros(1))
+        gx, gy = body.centre(body.posture(angles))
+        x, y = body.joints(angles)
+        arms = (x - gx + 1j * (y - gy)).ravel()
+        assert np.abs(arms).max() <= result.lever <= 1
+        # in any direction of travel the centre of mass may have had
+        headings = np.exp(1j * np.linspace(0, 2 * np.pi, 60))
+        moved = np.abs(result.distance * headings[:, None] + (np.exp(1j * result.rotation) - 1) * arms)
+        change = np.abs(moved / result.distance - 1).max()
+        assert 0.3 * result.turning < change <= result.turning
 
 
 def triangle(c, e):

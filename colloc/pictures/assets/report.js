@@ -11,15 +11,26 @@
   const trails = document.getElementById("trails");
   const context = canvas.getContext("2d");
   const frames = data.t.length - 1, total = frames * data.periods;
-  const scale = Math.max(1, Math.min(3, window.devicePixelRatio || 1));
-  const width = canvas.width, height = canvas.height;
-  canvas.width = width * scale;
-  canvas.height = height * scale;
-  const box = data.window, unit = Math.min(width / (box[1] - box[0]), height / (box[3] - box[2]));
-  const left = (width - unit * (box[1] - box[0])) / 2, low = (height - unit * (box[3] - box[2])) / 2;
+  const box = data.window;
+  let scale, width, height, unit, left, low, colours;
   const px = x => left + unit * (x - box[0]), py = y => height - low - unit * (y - box[2]);
-  const blue = "#0072B2", red = "#D55E00", ink = "#1d2329";
+  const red = "#d55e00";
   let position = 0, playing = !window.matchMedia("(prefers-reduced-motion: reduce)").matches, before = null;
+
+  // the size and the colours that the page gives it now
+  function fit() {
+    scale = Math.max(1, Math.min(3, window.devicePixelRatio || 1));
+    width = canvas.clientWidth;
+    height = canvas.clientHeight;
+    canvas.width = width * scale;
+    canvas.height = height * scale;
+    unit = Math.min(width / (box[1] - box[0]), height / (box[3] - box[2]));
+    left = (width - unit * (box[1] - box[0])) / 2;
+    low = (height - unit * (box[3] - box[2])) / 2;
+    const style = window.getComputedStyle(document.documentElement), named = name => style.getPropertyValue("--" + name).trim();
+    colours = { ink: named("ink"), paper: named("paper"), soft: named("soft"), line: named("line") };
+    draw();
+  }
 
   // a value between two frames; column k of the period it falls in
   function at(rows, frame, axis) {
@@ -63,13 +74,15 @@
 
   function grid() {
     const step = data.grid;
-    context.strokeStyle = "#eef1f4";
+    context.strokeStyle = colours.line;
+    context.globalAlpha = 0.5;
     context.lineWidth = 1;
     context.beginPath();
     for (let x = Math.ceil((box[0] - left / unit) / step) * step; px(x) < width; x += step) { context.moveTo(px(x), 0); context.lineTo(px(x), height); }
     for (let y = Math.ceil((box[2] - low / unit) / step) * step; py(y) > 0; y += step) { context.moveTo(0, py(y)); context.lineTo(width, py(y)); }
     context.stroke();
-    context.strokeStyle = context.fillStyle = "#5b6670";
+    context.globalAlpha = 1;
+    context.strokeStyle = context.fillStyle = colours.soft;
     context.lineWidth = 2;
     context.beginPath();
     context.moveTo(14, height - 14);
@@ -97,13 +110,13 @@
     grid();
     const x = at(data.x, position, 0), y = at(data.y, position, 1), last = x.length - 1;
     if (trails.checked) {
-      trail([data.x[0], data.y[0]], "#9cc7e2", 1);
-      trail([data.x[last], data.y[last]], "#f0cf8e", 1);
+      trail([data.x[0], data.y[0]], "#56b4e9", 1);
+      trail([data.x[last], data.y[last]], "#e69f00", 1);
       trail(data.centre, red, 1.5);
     }
-    line(x, y, ink, 5);
-    for (let k = 1; k < last; k++) disc(x[k], y[k], 3.2, "white", ink);
-    disc(x[last], y[last], 6, ink);
+    line(x, y, colours.ink, 5);
+    for (let k = 1; k < last; k++) disc(x[k], y[k], 3.2, colours.paper, colours.ink);
+    disc(x[last], y[last], 6, colours.ink);
     disc(at([data.centre[0]], position, 0)[0], at([data.centre[1]], position, 1)[0], 3.5, red);
     if (arrows.checked) {
       const ax = at(data.arrowX, position, 0), ay = at(data.arrowY, position, 1);
@@ -114,17 +127,15 @@
     shown.textContent = "t = " + (position / frames).toFixed(3);
     slider.value = Math.round(1000 * position / total);
     document.querySelectorAll(".cursor").forEach(mark => {
-      const value = Number(mark.dataset.low) + phase * (Number(mark.dataset.high) - Number(mark.dataset.low));
-      mark.setAttribute("x1", value);
-      mark.setAttribute("x2", value);
+      mark.style.left = Number(mark.dataset.low) + phase * (Number(mark.dataset.high) - Number(mark.dataset.low)) + "%";
     });
     const angles = at(data.angles, position, -1);
     document.querySelectorAll(".dot").forEach(mark => {
-      // pixels of the limits (x, x, y, y), then the limits in radians
-      const box = mark.dataset.box.split(",").map(Number);
-      const place = (k, angle) => box[k] + (angle - box[k + 4]) / (box[k + 5] - box[k + 4]) * (box[k + 1] - box[k]);
-      mark.setAttribute("cx", place(0, angles[Number(mark.dataset.first)]));
-      mark.setAttribute("cy", place(2, angles[Number(mark.dataset.second)]));
+      // percent of left, right, top and bottom, which show these angles
+      const side = mark.dataset.sides.split(",").map(Number), limit = mark.dataset.limits.split(",").map(Number);
+      const part = (joint, k) => (angles[Number(joint)] - limit[k]) / (limit[k + 1] - limit[k]);
+      mark.style.left = side[0] + part(mark.dataset.first, 0) * (side[1] - side[0]) + "%";
+      mark.style.top = side[3] - part(mark.dataset.second, 2) * (side[3] - side[2]) + "%";
     });
   }
 
@@ -151,7 +162,9 @@
   // page.html#t=1.25 opens at that phase, at rest
   const wanted = /^#t=([0-9.]+)$/.exec(window.location.hash);
   if (wanted) { position = Math.min(Number(wanted[1]) * frames, total); playing = false; }
-  draw();
+  window.addEventListener("resize", fit);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", fit);
+  fit();
   play(playing);
   document.documentElement.dataset.ready = "yes";
 })();

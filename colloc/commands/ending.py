@@ -1,0 +1,101 @@
+"""How every command ends: an exit code, one sentence for people where something is wrong, and no traceback for it.
+
+Exit codes: 0 well; 2 bad problem, option or file; 3 not converged or none found; 4 a certificate failed; 130 interrupted.
+Nothing heavy is imported here, so that Ctrl-C ends a command well from its first moments on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import codecs
+import contextlib
+import io
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from colloc.system.errors import ChangedFileWarning, CollocError
+from colloc.system.interruption import interruptible
+
+OK, BAD_PROBLEM, NONE_FOUND, FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+_IN_WORDS = {"π": " pi ", "δ": "delta", "μ": "mu", "±": "+-", "→": "->", "·": "*", "…": "..."}
+
+
+def run(parser: argparse.ArgumentParser, command: Callable[[argparse.Namespace], int], arguments: Sequence[str] | None) -> int:
+    """Parse the arguments (None: those of the process) and run a command on them; returns the exit code."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    return exit_code(lambda: command(parser.parse_args(words)), as_json="--json" in words)
+
+
+def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
+    """Run a command; errors made for people, and those of the system, become one sentence on standard error and an exit code.
+
+    A KeyboardInterrupt may carry a sentence about what was kept. With `as_json` the sentence is also one JSON object on
+    standard output.
+    """
+    _print_in_words()
+    try:
+        with interruptible(polled=False), _notes():
+            try:
+                return command()
+            finally:
+                sys.stdout.flush()
+    except CollocError as error:
+        return _ended(BAD_PROBLEM, "error", str(error), as_json)
+    except BrokenPipeError:
+        _leave_output()  # the reader of a pipe left; results are saved
+        return BAD_PROBLEM
+    except OSError as error:
+        where = error.filename or "the output"
+        if error.filename is None:
+            _leave_output()
+        return _ended(BAD_PROBLEM, "error", f"cannot read or write {where}: {error.strerror or error}.", as_json)
+    except KeyboardInterrupt as stop:
+        return _ended(INTERRUPTED, "interrupted", f"interrupted; {str(stop) or 'nothing was written.'}", as_json)
+
+
+def _ended(code: int, status: str, message: str, as_json: bool) -> int:
+    if as_json:
+        with contextlib.suppress(OSError):
+            print(json.dumps({"status": status, "message": message, "exit_code": code}), flush=True)
+    print(f"colloc: {message}", file=sys.stderr)
+    return code
+
+
+def _leave_output() -> None:
+    """Let what is still to be printed go nowhere, so that Python does not try again as it ends."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _words_for(error: UnicodeError) -> tuple[str | bytes, int]:
+    assert isinstance(error, UnicodeEncodeError)
+    letters = error.object[error.start : error.end]
+    return "".join(_IN_WORDS.get(c) or c.encode("ascii", "backslashreplace").decode() for c in letters), error.end
+
+
+def _print_in_words() -> None:
+    """Letters that the output's encoding does not have are printed as words, or escaped."""
+    codecs.register_error("colloc.words", _words_for)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="colloc.words")
+
+
+@contextlib.contextmanager
+def _notes() -> Iterator[None]:
+    """Within it, warnings made for people are one line on standard error."""
+    with warnings.catch_warnings():
+        before = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+            if issubclass(category, ChangedFileWarning):
+                print(f"colloc: {message}", file=sys.stderr)
+            else:
+                before(message, category, *where, **more)
+
+        warnings.simplefilter("always", ChangedFileWarning)
+        warnings.showwarning = show
+        yield

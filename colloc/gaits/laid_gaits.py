@@ -1,0 +1,60 @@
+"""A gait laid into another class of gaits, or into a chain of other links: where a search there begins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyClass, AnyGait
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.path_samples import fourier_through, path_length
+from colloc.gaits.paths import Corners
+from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import largest_factor
+
+_SHORT = 1.002
+"""An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
+_PHASES = np.linspace(0.0, 1.0, 1001)
+_CORNERS = 200
+"""Vertices by which a path of arcs is laid into a chain of other links."""
+
+
+def over_links(gait: AnyGait, body: Chain, other: Chain, joint_limit: float = float(np.pi)) -> AnyGait:
+    """A gait of a chain laid into another chain: every link gets the mean tangent angle of the part of the body it covers.
+
+    That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of arcs becomes a polygon of
+    many corners. Where links would cross, or a joint pass its limit, all angles shrink.
+    """
+    ends, others = (np.concatenate([[0.0], np.cumsum(b.lengths)]) for b in (body, other))
+    overlap = np.minimum(others[1:, None], ends[1:]) - np.maximum(others[:-1, None], ends[:-1])
+    means = np.maximum(overlap, 0.0) / other.length_column()
+    matrix = np.diff(means @ np.tril(np.ones((body.n_link, body.n_joint)), -1), axis=0)
+    angles = matrix @ gait.angles(_PHASES)
+    matrix = matrix * min(1.0, largest_factor(other, joint_limit, angles))
+    if isinstance(gait, Fourier):
+        return Fourier(matrix @ gait.mean, matrix @ gait.cos, matrix @ gait.sin)
+    if isinstance(gait, Corners):
+        return Corners(matrix @ gait.corners, gait.symmetry)
+    last = gait.edges[-1]
+    vertices = matrix @ gait.angles(np.linspace(0.0, last, _CORNERS + 1))
+    return Corners(vertices[:, :-1] if gait.symmetry == "none" else vertices, gait.symmetry)
+
+
+def laid_into(
+    gait_class: AnyClass, gait: AnyGait, body: Chain, joint_limit: float = float(np.pi), smallest_shape_speed: float = 0.1
+) -> AnyGait:
+    """The gait that starts a search in a class: its Fourier series for harmonics, else itself, made admissible.
+
+    A truncated series overshoots, and a path that touches its limits is no longer admissible then: all angles shrink. It cuts
+    corners, and a path as short as it may be becomes too short: it grows about its mean.
+    """
+    near = fourier_through(gait, gait_class) if isinstance(gait_class, Harmonic) else gait
+    growth = 2 * np.pi * smallest_shape_speed / path_length(near)
+    if growth > _SHORT and isinstance(near, Fourier):
+        near = Fourier(near.mean, growth * near.cos, growth * near.sin)
+    elif growth > _SHORT and isinstance(near, Corners):
+        mean = near.angles(_PHASES[:-1]).mean(axis=1, keepdims=True)
+        near = Corners(mean + growth * (near.corners - mean), near.symmetry)
+    if near is gait or not isinstance(near, Fourier):
+        return near
+    factor = min(1.0, largest_factor(body, joint_limit, near.angles(_PHASES)))
+    return Fourier(factor * near.mean, factor * near.cos, factor * near.sin)

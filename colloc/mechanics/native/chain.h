@@ -1,0 +1,162 @@
+/* A chain of straight links at one instant, seen from one of its links, the reference: colloc/mechanics/body.py and
+   colloc/mechanics/balance.py. Positions and velocities are added up from the reference outwards, so that links that rest
+   beside it keep the relative precision of their speed. */
+
+#pragma once
+
+#include <stddef.h>
+
+#include "link_friction.h"
+
+typedef struct {
+    double length, cos, sin; /* direction in the body frame */
+    double x, y;             /* midpoint, seen from that of the reference */
+    double rate;             /* of the joint behind the link (0 at the tail) */
+} Link;
+
+/* Net force and torque, and what a step has to reduce: the potential, or half the squared residual without one. */
+typedef struct {
+    double force[3], merit;
+} Total;
+
+/* Directions of the links, from joint angles that lie `stride` apart; and rates in units of `speed`. */
+static inline void find_directions(
+    const int n, Link *link, const double *length, const double *angle, const double *rate, double speed, ptrdiff_t stride)
+{
+    double phi = 0.0;
+    for (int i = 0; i < n; ++i) {
+        if (i > 0)
+            phi += angle[(i - 1) * stride];
+        link[i].length = length[i];
+        link[i].cos = i > 0 ? cos(phi) : 1.0;
+        link[i].sin = i > 0 ? sin(phi) : 0.0;
+        link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
+    }
+}
+
+static inline void find_midpoints(const int n, Link *link, const int reference)
+{
+    link[reference].x = link[reference].y = 0.0;
+    for (int i = reference + 1; i < n; ++i) {
+        link[i].x = link[i - 1].x + 0.5 * (link[i - 1].length * link[i - 1].cos + link[i].length * link[i].cos);
+        link[i].y = link[i - 1].y + 0.5 * (link[i - 1].length * link[i - 1].sin + link[i].length * link[i].sin);
+    }
+    for (int i = reference - 1; i >= 0; --i) {
+        link[i].x = link[i + 1].x - 0.5 * (link[i + 1].length * link[i + 1].cos + link[i].length * link[i].cos);
+        link[i].y = link[i + 1].y - 0.5 * (link[i + 1].length * link[i + 1].sin + link[i].length * link[i].sin);
+    }
+}
+
+/* Velocity of link `to` in body-frame axes from that of its neighbour `from`, one further (side 1) or back (-1). */
+static inline void pass_on(double v[3], const Link *from, const Link *to, int side)
+{
+    const double w = side > 0 ? v[2] + to->rate : v[2] - from->rate;
+    const double a = 0.5 * side * from->length * v[2], b = 0.5 * side * to->length * w;
+    v[0] -= a * from->sin + b * to->sin;
+    v[1] += a * from->cos + b * to->cos;
+    v[2] = w;
+}
+
+static inline void set_velocity(Sliding *k, const Link *link, const double v[3])
+{
+    k->vs = v[0] * link->cos + v[1] * link->sin;
+    k->vn = v[1] * link->cos - v[0] * link->sin;
+    k->w = v[2];
+}
+
+/* Velocities of all links from that of the reference. */
+static inline void find_velocities(const int n, const Link *link, Sliding *k, const int reference, const double z[3])
+{
+    double v[3] = {z[0], z[1], z[2]};
+    set_velocity(&k[reference], &link[reference], v);
+    for (int i = reference + 1; i < n; ++i) {
+        pass_on(v, &link[i - 1], &link[i], 1);
+        set_velocity(&k[i], &link[i], v);
+    }
+    v[0] = z[0], v[1] = z[1], v[2] = z[2];
+    for (int i = reference - 1; i >= 0; --i) {
+        pass_on(v, &link[i + 1], &link[i], -1);
+        set_velocity(&k[i], &link[i], v);
+    }
+}
+
+/* Velocity of a link in body-frame axes. */
+static inline void link_velocity(const Link *link, const Sliding *k, double v[3])
+{
+    v[0] = k->vs * link->cos - k->vn * link->sin;
+    v[1] = k->vs * link->sin + k->vn * link->cos;
+    v[2] = k->w;
+}
+
+/* Velocity of the tail, the free end of link 0, which points along +x. */
+static inline void tail_velocity(const Link *link, const Sliding *k, double v[3])
+{
+    v[0] = k[0].vs;
+    v[1] = k[0].vn - 0.5 * link[0].length * k[0].w;
+    v[2] = k[0].w;
+}
+
+/* The other way round: velocity of the links from that of the tail. */
+static inline void find_velocities_from_tail(const int n, const Link *link, Sliding *k, const double tail[3])
+{
+    const double z[3] = {tail[0], tail[1] + 0.5 * link[0].length * tail[2], tail[2]};
+    find_velocities(n, link, k, 0, z);
+}
+
+/* Everything at velocity z of the reference. */
+static inline Total evaluate(
+    const int n, const Link *link, Sliding *k, const int reference, const double z[3], const Law *law, double delta)
+{
+    Total total = {{0.0, 0.0, 0.0}, 0.0};
+    find_velocities(n, link, k, reference, z);
+    for (int i = 0; i < n; ++i) {
+        find_roots(&k[i], link[i].length, delta);
+        find_force(&k[i], law, link[i].length);
+        const double fx = k[i].fs * link[i].cos - k[i].fn * link[i].sin;
+        const double fy = k[i].fs * link[i].sin + k[i].fn * link[i].cos;
+        total.force[0] += fx;
+        total.force[1] += fy;
+        total.force[2] += link[i].x * fy - link[i].y * fx + k[i].couple;
+        if (law->isotropic)
+            total.merit += dissipation(&k[i], link[i].length);
+    }
+    if (law->isotropic)
+        total.merit *= law->mu_t;
+    else
+        total.merit = 0.5 * (total.force[0] * total.force[0] + total.force[1] * total.force[1] + total.force[2] * total.force[2]);
+    return total;
+}
+
+/* Sum over links of G^T K G, with G = d(vs, vn, w)/dz and K the slopes or the secants of friction. */
+static inline void pull_back(
+    const int n, const Link *link, const Sliding *k, const Law *law, double delta, bool newton, Matrix3 total)
+{
+    for (int j = 0; j < 9; ++j)
+        total[j / 3][j % 3] = 0.0;
+    for (int i = 0; i < n; ++i) {
+        const double c = link[i].cos, s = link[i].sin;
+        const double arm_s = link[i].x * s - link[i].y * c, arm_n = link[i].x * c + link[i].y * s;
+        Matrix3 K;
+        if (newton)
+            find_slopes(&k[i], law, link[i].length, delta, K);
+        else
+            find_secants(&k[i], law, link[i].length, delta, K);
+        for (int j = 0; j < 3; ++j) {
+            double column[3];
+            for (int row = 0; row < 3; ++row)
+                column[row] = j == 0   ? K[row][0] * c - K[row][1] * s
+                              : j == 1 ? K[row][0] * s + K[row][1] * c
+                                       : K[row][0] * arm_s + K[row][1] * arm_n + K[row][2];
+            total[0][j] += c * column[0] - s * column[1];
+            total[1][j] += s * column[0] + c * column[1];
+            total[2][j] += arm_s * column[0] + arm_n * column[1] + column[2];
+        }
+    }
+}
+
+/* Largest magnitude; infinite if any of them is not a number. */
+static inline double largest_of(const double v[3])
+{
+    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    return isfinite(v[0] + v[1] + v[2]) ? largest : INFINITY;
+}

@@ -1,0 +1,171 @@
+/* What the library offers: chains in balance, instant by instant, as colloc/mechanics/fixed_point.py and colloc/mechanics/chain_motion.py
+   find them for batches in NumPy.
+
+   Arrays are (rows, n_time), row by row; a call treats the instants from `first` to `last`, so that threads share a batch.
+   An instant's answer depends on nothing but its own data. */
+
+#include <stdlib.h>
+
+#include "loaded.h"
+#include "motion.h"
+
+/* The largest rate: the law is homogeneous once delta scales along. */
+static inline double speed_of(const int n, const double *rate, ptrdiff_t stride)
+{
+    double speed = 0.0;
+    for (int j = 0; j < n - 1; ++j)
+        speed = fmax(speed, fabs(rate[j * stride]));
+    return speed > 0 ? speed : 1.0;
+}
+
+static inline double scaled_delta_of(double delta, double speed)
+{
+    return fmin(fmax(delta / speed, DRY), VISCOUS);
+}
+
+static inline void balance_instants(
+    const int n, State *s, const double *length, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
+    double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
+{
+    for (ptrdiff_t t = first; t < last; ++t) {
+        const double speed = speed_of(n, rates + t, n_time);
+        double tail[3];
+        find_directions(n, s->link, length, angles + t, rates + t, speed, n_time);
+        s->anchor = n / 2;
+        s->iterations = 0;
+        if (start) {
+            for (int i = 0; i < 3; ++i)
+                tail[i] = start[i * n_time + t] / speed;
+            find_velocities_from_tail(n, s->link, s->now, tail);
+            link_velocity(&s->link[s->anchor], &s->now[s->anchor], s->velocity);
+        } else
+            memset(s->velocity, 0, sizeof s->velocity);
+        solve(n, s, scaled_delta_of(delta, speed), tolerance, budget, method);
+        find_velocities(n, s->link, s->now, s->anchor, s->velocity);
+        tail_velocity(s->link, s->now, tail);
+        for (int i = 0; i < 3; ++i) {
+            z[i * n_time + t] = tail[i] * speed;
+            anchor_velocity[i * n_time + t] = s->velocity[i] * speed;
+        }
+        residual[t] = s->residual;
+        iterations[t] = s->iterations;
+        anchor[t] = s->anchor;
+    }
+}
+
+/* Returns 0, or 1 without memory. */
+int colloc_balance(
+    int n, const double *length, const double mu[3], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
+    double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
+{
+    Link *link = malloc((size_t)n * sizeof *link);
+    Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
+    if (link && sliding) {
+        State s = {.law = law_of(mu), .link = link, .now = sliding, .trial = sliding + n};
+        balance_instants(
+            n, &s, length, n_time, first, last, angles, rates, delta, start, tolerance, budget, method, z, residual, iterations,
+            anchor, anchor_velocity);
+    }
+    free(link);
+    free(sliding);
+    return link && sliding ? 0 : 1;
+}
+
+/* Rows of `find_values`, (ROWS, n_time), for chains whose anchors move as given; and, unless `slopes` is NULL, the
+   derivatives of the first of them with respect to joint angles and rates, (DIFFERENTIATED_ROWS, 2 (n - 1), n_time). */
+int colloc_motion(
+    int n, const double *length, const double mu[3], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    const double *rates, double delta, const long long *anchor, const double *anchor_velocity, double *values, double *slopes)
+{
+    const Law law = law_of(mu);
+    const int n_joint = n - 1;
+    Link *link = malloc((size_t)n * sizeof *link);
+    Sliding *k = malloc((size_t)n * sizeof *k);
+    Matrix3 *K = malloc((size_t)n * sizeof *K);
+    Change *d = malloc((size_t)n * sizeof *d);
+    for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
+        const double speed = speed_of(n, rates + t, n_time), own_delta = scaled_delta_of(delta, speed);
+        const int a = (int)anchor[t];
+        double z[3], value[ROWS], net[3], dz[3], change[DIFFERENTIATED_ROWS];
+        for (int i = 0; i < 3; ++i)
+            z[i] = anchor_velocity[i * n_time + t] / speed;
+        find_directions(n, link, length, angles + t, rates + t, speed, n_time);
+        find_midpoints(n, link, a);
+        evaluate(n, link, k, a, z, &law, own_delta);
+        find_values(n, link, k, value);
+        for (int row = 0; row < ROWS; ++row)
+            values[row * n_time + t] = value[row] * speed;
+        if (!slopes)
+            continue;
+        Matrix3 left;
+        pull_back(n, link, k, &law, own_delta, true, left);
+        for (int i = 0; i < n; ++i)
+            find_slopes(&k[i], &law, link[i].length, own_delta, K[i]);
+        for (int column = 0; column < 2 * n_joint; ++column) {
+            const bool of_rate = column >= n_joint;
+            find_changes(n, link, k, a, of_rate ? column - n_joint : column, of_rate, d);
+            net_change(n, link, k, K, d, net);
+            solve3(left, net, 0.0, dz);
+            follow(n, link, d, dz);
+            value_changes(n, link, k, K, d, change);
+            for (int row = 0; row < DIFFERENTIATED_ROWS; ++row)
+                slopes[(row * 2 * n_joint + column) * n_time + t] = of_rate ? change[row] : change[row] * speed;
+        }
+    }
+    const bool done = link && k && K && d;
+    free(link);
+    free(k);
+    free(K);
+    free(d);
+    return done ? 0 : 1;
+}
+
+/* Chains under unit friction and loads (3, n_time) on the middle link, whose velocity is given to start from and found;
+   velocities and loads in the middle link's axes. Then potential and power (n_time), minus the friction on each link in its own
+   axes (n, 3, n_time), force and torque left over (2, n_time), and what power these have (n_time). */
+int colloc_loaded(
+    int n, const double *length, const double mu[3], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    const double *rates, const double *load, const double *start, double delta, int steps, double *velocity, double *potential,
+    double *power, double *forces, double *residual, double *leftover_power)
+{
+    Link *link = malloc((size_t)n * sizeof *link);
+    Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
+    const int middle = n / 2;
+    if (link && sliding) {
+        State s = {.law = law_of(mu), .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
+        for (ptrdiff_t t = first; t < last; ++t) {
+            double own[3] = {load[t], load[n_time + t], load[2 * n_time + t]};
+            find_directions(n, link, length, angles + t, rates + t, 1.0, n_time);
+            find_midpoints(n, link, middle);
+            const double c = link[middle].cos, q = link[middle].sin;
+            const double body_load[3] = {c * own[0] - q * own[1], q * own[0] + c * own[1], own[2]};
+            s.velocity[0] = c * start[t] - q * start[n_time + t];
+            s.velocity[1] = q * start[t] + c * start[n_time + t];
+            s.velocity[2] = start[2 * n_time + t];
+            const Total at = loaded_solve(n, &s, body_load, delta, steps);
+            velocity[t] = c * s.velocity[0] + q * s.velocity[1];
+            velocity[n_time + t] = c * s.velocity[1] - q * s.velocity[0];
+            velocity[2 * n_time + t] = s.velocity[2];
+            potential[t] = at.merit;
+            power[t] = leftover_power[t] = 0.0;
+            for (int i = 0; i < 3; ++i) {
+                potential[t] += body_load[i] * s.velocity[i];
+                leftover_power[t] += at.force[i] * s.velocity[i];
+            }
+            for (int i = 0; i < n; ++i) {
+                const Sliding *k = &s.now[i];
+                power[t] -= k->fs * k->vs + k->fn * k->vn + k->couple * k->w;
+                forces[(3 * i) * n_time + t] = -k->fs;
+                forces[(3 * i + 1) * n_time + t] = -k->fn;
+                forces[(3 * i + 2) * n_time + t] = -k->couple;
+            }
+            residual[t] = hypot(at.force[0], at.force[1]);
+            residual[n_time + t] = fabs(at.force[2]);
+        }
+    }
+    free(link);
+    free(sliding);
+    return link && sliding ? 0 : 1;
+}

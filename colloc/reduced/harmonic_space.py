@@ -1,0 +1,122 @@
+"""Harmonic gaits as a search sees them: shapes on a mesh and rows that keep them admissible, in terms of their parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.collocation.layout import problem_mesh
+from colloc.collocation.shape_checks import ShapeCheck, shape_checks
+from colloc.collocation.worst_instants import check_values, held_shares, peaks
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.path_samples import fourier_through
+from colloc.gaits.problem import Problem
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.mesh import Mesh
+
+
+class HarmonicSpace:
+    """Members of a class of harmonics by their parameters v, in which angles and rates are linear.
+
+    Rows: shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed.
+
+    Parameters
+    ----------
+    problem : Problem
+    edges : (n_interval + 1,), optional
+        Of the mesh; uniform by default.
+    scheme : str, optional
+        By default the problem's.
+    far : pairs of links more than two apart that are kept from crossing.
+    """
+
+    def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
+        self.problem, self.far = problem, far
+        self.mesh = problem_mesh(problem.with_(scheme=scheme or problem.scheme), edges)
+        self.checks = shape_checks(problem.body, far)
+        gait, n_joint, limit = problem.gait, problem.body.n_joint, problem.joint_limit
+        angles, rates = gait.angle_matrix(self.mesh.times, n_joint), gait.rate_matrix(self.mesh.times, n_joint)
+        self._matrix = np.concatenate([angles, rates], axis=1)
+        self.n = self._matrix.shape[2]
+        self._pace = np.ones(self.mesh.n_point)
+        self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
+        # a function bounded by L has Fourier coefficients of at most 4 L / pi
+        self.upper = np.full(self.n, 4 * limit / np.pi)
+        self.lower = -self.upper
+        self.own = np.arange(self.n)
+        self.move_checks(np.zeros(self.n))
+
+    def member(self, v: np.ndarray) -> Fourier:
+        """The gait of parameters v."""
+        return self.problem.gait.fourier(v, self.problem.body.n_joint)
+
+    def parameters(self, gait: AnyGait) -> np.ndarray:
+        """Parameters ``(n,)`` of the member nearest to a gait."""
+        return self.problem.gait.parameters(fourier_through(gait, self.problem.gait))
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        """The parameters as the full program has them."""
+        return v
+
+    def phase_mesh(self, gait: Fourier) -> Mesh:
+        """The mesh in phases of a member: it is the same for all."""
+        return self.mesh
+
+    def remeshed(self, gait: Fourier, edges: np.ndarray, scheme: str) -> HarmonicSpace:
+        """The class on another mesh."""
+        return HarmonicSpace(self.problem, edges, scheme, self.far)
+
+    def with_far(self, far: Pairs) -> HarmonicSpace:
+        """The class with other pairs of links kept apart."""
+        return HarmonicSpace(self.problem, self.mesh.edges, self.mesh.scheme.name, far)
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
+        y = (self._matrix @ v).T
+        angles, rates = np.split(y, 2)
+        return angles, rates, self._pace
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        """See `colloc.reduced.motion.Shapes`."""
+        return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
+
+    def move_checks(self, v: np.ndarray) -> float:
+        """Place the checks at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+        gait, n_joint, limit = self.member(v), self.problem.body.n_joint, self.problem.joint_limit
+        self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
+        for check, (cells, times) in zip(self.checks, peaks(gait, self.mesh, self.checks, limit), strict=True):
+            self.watched[check.name] = cells
+            if not cells.size:
+                continue
+            values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
+            self._placed.append((check, held_shares(check, gait, times), matrix))
+            excess = max(excess, float((np.abs(values) - limit if check.on_joint else values).max()))
+            # of the two bounds on a joint the nearer one
+            below = check.on_joint & (values < 0)
+            low.append(np.where(below, -limit, -np.inf))
+            high.append(np.where(below, np.inf, limit if check.on_joint else 0.0))
+        self.watched["shape speed"] = np.zeros(1, dtype=int)
+        self.row_lower = np.concatenate([*low, [self.problem.smallest_shape_speed**2]])
+        self.row_upper = np.concatenate([*high, [np.inf]])
+        return excess
+
+    def rows(self, v: np.ndarray) -> np.ndarray:
+        """Values of the rows."""
+        values = [self._value(v, *placed) for placed in self._placed]
+        return np.concatenate([*values, [v @ self._square @ v]])
+
+    @staticmethod
+    def _value(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        if check.on_joint:
+            return matrix[:, check.joint] @ v
+        return check.cut((matrix @ v).T, shares[None]).full().ravel()
+
+    @staticmethod
+    def _slope(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        if check.on_joint:
+            return matrix[:, check.joint]
+        return np.einsum("jt,tjp->tp", check.slope((matrix @ v).T, shares[None]).full(), matrix)
+
+    def row_slopes(self, v: np.ndarray) -> np.ndarray:
+        """Derivatives of the rows, ``(n_row, n)``."""
+        return np.vstack([*(self._slope(v, *placed) for placed in self._placed), 2 * self._square @ v])

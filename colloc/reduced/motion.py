@@ -1,0 +1,160 @@
+r"""Efficiency and net rotation of a collocated gait as functions of the gait alone, with exact gradients.
+
+On a mesh with nodes (A, b) and intervals of length h every equation of the collocation fixes one unknown: the balance the
+tail velocity, its rotation rate omega the orientation theta, both the displacement D and the work W,
+
+    theta_ki = sum_(l<k) h_l b.omega_l + h_k (A omega_k)_i,
+    D = sum_ki h_k b_i e^(i theta_ki) c_ki,      W = sum_ki h_k b_i P_ki,
+
+c being the velocity of the centre of mass in the body frame and P the power. What is left is a program of the gait's
+parameters v alone: minimise -|D|/W where the rotation closes. Gradients take one sweep back through theta.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from colloc.gaits.symmetry import ANTIPODAL
+from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.fixed_point import BalanceSolution, solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.numerics.mesh import Mesh
+
+_TOLERANCE = 1e-12
+_ACCEPTED = 1e3
+"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
+_OMEGA, _OUTPUTS = 2, slice(2, 6)
+"""Among the rows of `colloc.mechanics.chain_motion.chain_slopes`: rotation rate; the same, velocity of the centre, power."""
+
+
+class Shapes(Protocol):
+    """A class of gaits on the points of a mesh."""
+
+    @property
+    def n(self) -> int:
+        """Number of parameters v."""
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are multiplied."""
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        """Derivatives ``(k, n)`` of k numbers, from those with respect to ``(angles, rates)``, ``(k, n_point, 2 n_joint)``,
+        and to the pace, ``(k, n_point)``."""
+
+
+@dataclass(eq=False)
+class _State:
+    """The collocated motion of one v at one delta."""
+
+    v: np.ndarray
+    delta: float
+    angles: np.ndarray
+    rates: np.ndarray
+    pace: np.ndarray
+    solved: BalanceSolution
+    out: np.ndarray
+    turn: np.ndarray
+    turned: np.ndarray
+    displacement: complex
+    work: float
+    rotation: float
+
+
+class ReducedMotion:
+    """-d/W and rotation of gaits on a mesh as functions of their parameters.
+
+    Parameters
+    ----------
+    body, friction
+    symmetry : {"none", "bilateral", "antipodal"}
+    mesh : Mesh
+        Of the part of the period that is solved.
+    shapes : Shapes
+    """
+
+    def __init__(self, body: Chain, friction: Friction, symmetry: str, mesh: Mesh, shapes: Shapes) -> None:
+        self.body, self.friction, self.shapes, self.mesh = body, friction, shapes, mesh
+        self._centred = symmetry == ANTIPODAL
+        self._weight = mesh.h[:, None] * mesh.scheme.b
+        self._last: _State | None = None
+        self._near: tuple[_State, np.ndarray] | None = None
+        self.solves = 0
+
+    def at(self, v: np.ndarray, delta: float) -> _State:
+        """The collocated motion; NaN where the balance cannot be solved."""
+        last = self._last
+        if last is not None and last.delta == delta and np.array_equal(last.v, v):
+            return last
+        angles, rates, pace = self.shapes.at(v)
+        at = (self.body, self.friction, angles, rates, delta)
+        solved = solve_balance(*at, start=self._start(angles, rates), tolerance=_TOLERANCE)
+        self.solves += 1
+        now = chain_motion(*at, solved)
+        out = np.vstack([now.z[_OMEGA], now.centre, now.power])
+        out[:, ~(solved.residual < _ACCEPTED * _TOLERANCE)] = np.nan
+        mesh, points = self.mesh, self.mesh.points
+        omega, c, power = ((row * pace)[points] for row in (out[0], out[1] + 1j * out[2], out[3]))
+        before = np.concatenate([[0.0], np.cumsum((self._weight * omega).sum(axis=1))])
+        theta = before[:-1, None] + mesh.h[:, None] * (omega @ mesh.scheme.A.T)
+        turn = np.exp(1j * theta)
+        turned = turn * c
+        displacement, work = complex((self._weight * turned).sum()), float((self._weight * power).sum())
+        self._last = _State(
+            v.copy(), delta, angles, rates, pace, solved, out, turn, turned, displacement, work, float(before[-1])
+        )  # fmt: skip
+        return self._last
+
+    def _start(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray | None:
+        """Tail velocities to start from: those of the last gait differentiated, moved along their slopes."""
+        if self._near is None:
+            return None if self._last is None else self._last.solved.z
+        near, slopes = self._near
+        moved = np.concatenate([angles - near.angles, rates - near.rates])
+        return near.solved.z + np.einsum("ijt,jt->it", slopes[:3], moved)
+
+    def _direction(self, s: _State) -> complex:
+        """Unit vector along which the displacement counts."""
+        if not self._centred:
+            return s.displacement / max(abs(s.displacement), 1e-300)
+        half = np.exp(0.5j * s.rotation)
+        return complex(half if (s.displacement * np.conj(half)).real >= 0 else -half)
+
+    def values(self, v: np.ndarray, delta: float) -> tuple[float, float]:
+        """-d/W and the net rotation over the part of the period that is solved [rad]."""
+        s = self.at(v, delta)
+        return -(s.displacement * np.conj(self._direction(s))).real / s.work, s.rotation
+
+    def gradients(self, v: np.ndarray, delta: float) -> np.ndarray:
+        """Derivatives of `values`, ``(2, n)``."""
+        s, mesh, rule, h = self.at(v, delta), self.mesh, self.mesh.scheme, self.mesh.h[:, None]
+        slopes = chain_slopes(self.body, self.friction, s.angles, s.rates, delta, s.solved)[1]
+        self._near = (s, slopes)
+        back = np.conj(self._direction(s))
+        distance = (s.displacement * back).real
+
+        # distance: directly through c, and through every theta
+        on_theta = self._weight * (1j * s.turned * back).real
+        later = np.concatenate([np.cumsum(on_theta.sum(axis=1)[::-1])[::-1][1:], [0.0]])
+        on_omega = h * (on_theta @ rule.A + rule.b * later[:, None])
+        if self._centred:
+            on_omega += 0.5 * (s.displacement * back).imag * self._weight
+        on_c = self._weight * np.conj(s.turn * back)
+        zero = np.zeros_like(self._weight)
+        rows = np.array(
+            [
+                [on_omega, on_c.real, on_c.imag, zero],
+                [zero, zero, zero, self._weight],
+                [self._weight, zero, zero, zero],
+            ]
+        )
+        on_out = np.zeros((*rows.shape[:2], s.pace.size))
+        for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
+            on_out[:, :, points] += rows[..., stage]
+        on_pace = np.einsum("krt,rt->kt", on_out, s.out)
+        on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[_OUTPUTS])
+        d, w, rotation = self.shapes.pulled_back(v, on_shape, on_pace)
+        return np.stack([(distance / s.work * w - d) / s.work, rotation])

@@ -1,0 +1,248 @@
+"""Paths as a search sees them: arcs or straight pieces on a mesh, and rows that keep them in their class, by few parameters.
+
+A free path is its mean shape speed, the tangents where arcs meet, and the shape at its start: all other shapes follow, arc by
+arc. Tangents of more than two joints are divided by their length, so that they may be any vectors, and the last one is that
+of the first where the path closes smoothly. A polygon is its vertices.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from colloc.collocation.layout import problem_layout
+from colloc.collocation.path_equations import chord
+from colloc.collocation.path_transcription import path_through, transcribe_fit
+from colloc.collocation.worst_instants import check_values, held_shares, peaks
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.path_classes import FreePath
+from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import BILATERAL, NONE
+from colloc.mechanics.contact import Pairs
+from colloc.numerics.blocks import as_sparse, oracles
+from colloc.numerics.constraint_rows import selector
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.sqp import minimised, remembered
+from colloc.system.errors import NotConvergedError
+
+_FOLLOWS = ("path", "unit tangent", "smooth closure")
+"""Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
+
+_EXACT, _FITTED, _SETTLED, _ROUNDS = 1e-7, 1e-10, 1e-5, 12
+"""Violation at which a gait is a member; accuracy of the squared distance of a new one; violation of a start, where the worst
+instant of a cell swings between two; rounds of moving the checks to the worst instants: three joints need up to 8."""
+
+
+class PathSpace:
+    """Members of a class of paths near one of them; attributes as `colloc.reduced.program.SearchSpace`.
+
+    Parameters
+    ----------
+    problem : Problem
+    near : AnyGait
+        Fixes winding, start phase, and which interval lies on which side.
+    edges : (n_interval + 1,), optional
+        Of the mesh, in phases of `near`.
+    scheme : str, optional
+    far : pairs of links
+    """
+
+    def __init__(
+        self, problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+    ) -> None:
+        self.problem, self.near, self.far = problem, near, far
+        stated = problem.with_(scheme=scheme or problem.scheme)
+        self._fit = fit = transcribe_fit(stated, near, edges, far)
+        self.mesh, self._geometry = fit.mesh, fit.geometry
+        self.layout = problem_layout(problem, self.mesh)
+        self._oracles = oracles(fit.assembly)
+        nlp = self._oracles.nlp
+        self._row_values = ca.Function("rows", [nlp["x"], nlp["p"]], [nlp["g"]])
+        free = fit.lower < fit.upper
+        self._fixed = np.where(free, 0.0, fit.lower)
+        gait, n_joint = problem.gait, problem.body.n_joint
+        self.shapes, self._arcs = np.arange(fit.lower.size), isinstance(gait, FreePath)
+        self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
+        self.own = np.arange(fit.lower.size)
+        if self._arcs:
+            speed, tangents, shapes = gait.split(self.own, n_joint)
+            self._speed, self._tangents, self.shapes = speed[0, 0], tangents, shapes
+            last = tangents[:, : -1 if self._closed else None]
+            self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
+            self.own = self.own[free[self.own]]
+            self._chord = chord(self._geometry.piece)
+        self.n = self.own.size
+        self.lower, self.upper = fit.lower[self.own], fit.upper[self.own]
+        dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
+        checked = [check.name for check in fit.checks]
+        self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in fit.groups.items() if n not in (*dropped, *checked)}
+        self._kept = np.empty(0, dtype=int)
+        self._place()
+        self._followed, self._framed = remembered(self._follow), remembered(self._frame)
+        laid = problem.gait.parameters(path_through(problem, near, self.mesh.edges)[0])
+        self.move_checks(laid[self.own])
+
+    def _place(self) -> None:
+        """Where the collocation points lie, as functions of the parameters."""
+        mesh, piece = self.mesh, self._geometry.piece
+        out = ca.vertcat(piece.angles, piece.direction, piece.speed)
+        arguments = [piece.shape, piece.given]
+        slope = ca.densify(ca.vec(ca.jacobian(out, piece.shape)))
+        self._value, self._slope = ca.Function("place", arguments, [out]), ca.Function("slope", arguments, [slope])
+        self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
+        self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
+        self._scatter = selector(self._gather.ravel(), self._fixed.size)
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        """The parameters of `colloc.gaits.path_classes`: shapes where arcs meet follow from the start."""
+        return self._followed(v).copy()
+
+    def _follow(self, v: np.ndarray) -> np.ndarray:
+        p = self._fixed.copy()
+        p[self.own] = v
+        if self._arcs:
+            tangents = p[self._tangents]
+            if tangents.shape[0] > 1:
+                if self._closed:
+                    tangents[:, -1] = tangents[:, 0] * (1 if self.problem.gait.symmetry == NONE else -1)
+                p[self._tangents] = tangents / np.linalg.norm(tangents, axis=0)
+            step = self._chord.value(p[self._geometry.shape], self.mesh.h[None], 0.0).full()
+            start = p[self.shapes[:, :1]]
+            p[self.shapes] = np.concatenate([start, start + np.cumsum(step, axis=1)], axis=1)
+        return p
+
+    def frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Full parameters ``(m,)`` and their derivatives ``(m, n)``."""
+        return self._framed(v)
+
+    def _frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        p, frame = self.full_parameters(v), np.zeros((self._fixed.size, self.n))
+        frame[self.own, np.arange(self.n)] = 1.0
+        if not self._arcs:
+            return p, frame
+        if self._tangents.shape[0] > 1:
+            raw = self._fixed.copy()
+            raw[self.own] = v
+            for edge, rows in enumerate(self._tangents.T):
+                sign, source = 1.0, rows
+                if self._closed and edge == self._tangents.shape[1] - 1:
+                    sign, source = 1.0 if self.problem.gait.symmetry == NONE else -1.0, self._tangents[:, 0]
+                size = np.linalg.norm(raw[source])
+                unit = raw[source] / size
+                own = np.zeros((rows.size, self.n))
+                own[:, np.searchsorted(self.own, source)] = (np.eye(rows.size) - np.outer(unit, unit)) * sign / size
+                frame[rows] = own
+        local = self._geometry.shape
+        f = self._chord
+        nonzeros = f.jacobian(p[local], self.mesh.h[None], 0.0).full()
+        n_joint, n = self.shapes.shape[0], self.mesh.n
+        jacobian = np.zeros((n, n_joint, f.n_local))
+        jacobian[:, f.jac_row, f.jac_col] = nonzeros.T
+        # a chord does not depend on where the arc starts, so the frame of the shapes is not needed for it
+        step = np.einsum("kjs,ksn->kjn", jacobian, frame[local.T])
+        frame[self.shapes[:, 1:].T] = frame[self.shapes[:, 0]] + np.cumsum(step, axis=0)
+        return p, frame
+
+    def member(self, v: np.ndarray) -> ArcPath | Corners:
+        """The gait of parameters v."""
+        return self._fit.member(self.full_parameters(v))
+
+    def parameters(self, gait: AnyGait) -> np.ndarray:
+        """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances where arcs or sides meet.
+
+        Raises
+        ------
+        NotConvergedError
+            If no path of the class is found near the gait.
+        """
+        near, _ = path_through(self.problem, gait, self.mesh.edges)
+        laid = self.problem.gait.parameters(near)
+        v, fitted = laid[self.own], False
+        for _ in range(_ROUNDS):
+            excess = self.move_checks(v)
+            values = self.rows(v)
+            outside = max((self.row_lower - values).max(), (values - self.row_upper).max(), excess)
+            if outside < _EXACT and (fitted or np.abs(self.full_parameters(v) - laid).max() < _EXACT):
+                return v
+            v, fitted = minimised(_Nearest(self, laid), v, np.inf, _FITTED).v, True
+        if outside < _SETTLED:
+            return v
+        bound = f"; allow more curvature than {self.problem.gait.curvature:g}" if self._arcs else ""
+        raise NotConvergedError(f"found no {self.problem.gait.describe()} near the guess; try another guess{bound}.")
+
+    def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
+        """The mesh in phases of a member."""
+        return self._fit.phase_mesh(gait)
+
+    def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
+        """The class near a member on another mesh."""
+        return PathSpace(self.problem, gait, edges, scheme, self.far)
+
+    def with_far(self, far: Pairs) -> PathSpace:
+        """The class with other pairs of links kept apart."""
+        return PathSpace(self.problem, self.near, self.mesh.edges, self.mesh.scheme.name, far)
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
+        out = self._value(self.full_parameters(v)[self._gather], self._given).full()
+        angles, rates = np.split(out[:-1], 2)
+        return angles, rates, out[-1]
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        """See `colloc.reduced.motion.Shapes`."""
+        p, frame = self.frame(v)
+        n_out, n_shape = on_shape.shape[2] + 1, self._gather.shape[0]
+        slope = self._slope(p[self._gather], self._given).full().T.reshape(-1, n_shape, n_out)
+        on_local = np.einsum("kto,tso->kst", np.concatenate([on_shape, on_pace[:, :, None]], axis=2), slope)
+        return (on_local.reshape(on_local.shape[0], -1) @ self._scatter) @ frame
+
+    def move_checks(self, v: np.ndarray) -> float:
+        """Place the checks at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+        p, fit = self.full_parameters(v), self._fit
+        gait, limit = fit.member(p), self.problem.joint_limit
+        mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
+        given = {name: block.parameters.copy() for name, block in zip(self._geometry.blocks, fit.assembly.blocks, strict=True)}
+        for check, (cells, times) in zip(fit.checks, peaks(gait, mesh, fit.checks, limit), strict=True):
+            self.watched[check.name] = cells
+            if not cells.size:
+                continue
+            tau, values = np.full(mesh.n, 0.5), check_values(check, gait, times)
+            tau[cells] = np.clip((times - mesh.edges[cells]) / mesh.h[cells], 0.0, 1.0)
+            given[check.name][:-1] = self._geometry.given(tau)
+            given[check.name][-1, cells] = held_shares(check, gait, times)
+            excess = max(excess, float((np.abs(values) - limit if check.on_joint else values).max()))
+        self._kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
+        self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
+        objective = fit.assembly.objective.parameters
+        self._moved = self._oracles.parameter_vector(1.0, [objective, *given.values()])
+        return excess
+
+    def rows(self, v: np.ndarray) -> np.ndarray:
+        """Values of the rows."""
+        return self._row_values(self.full_parameters(v), self._moved).full().ravel()[self._kept]
+
+    def row_slopes(self, v: np.ndarray) -> np.ndarray:
+        """Derivatives of the rows, ``(n_row, n)``."""
+        p, frame = self.frame(v)
+        jacobian = self._oracles.options["jac_g"](p, self._moved)[1]
+        return np.asarray(as_sparse(jacobian)[self._kept] @ frame)
+
+
+class _Nearest:
+    """The program of the member nearest to a given vector of full parameters."""
+
+    def __init__(self, space: PathSpace, target: np.ndarray) -> None:
+        self.space, self._target = space, target
+        self.lower, self.upper, self.row_lower, self.row_upper = space.lower, space.upper, space.row_lower, space.row_upper
+        self.rows, self.row_slopes = space.rows, space.row_slopes
+        self._shapes = space.shapes.ravel(order="F")
+
+    def objective(self, v: np.ndarray) -> float:
+        """Half the sum of squared distances of the shapes."""
+        return 0.5 * float(np.sum((self.space.full_parameters(v) - self._target)[self._shapes] ** 2))
+
+    def gradient(self, v: np.ndarray) -> np.ndarray:
+        """Of the objective."""
+        p, frame = self.space.frame(v)
+        return (p - self._target)[self._shapes] @ frame[self._shapes]

@@ -1,0 +1,78 @@
+"""What a certificate is: checks (what was measured, how much is allowed, what it means) and the numbers of the replay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of a certificate: what was measured, the largest value allowed, and what it means."""
+
+    name: str
+    value: float
+    threshold: float
+    meaning: str
+
+    @property
+    def passed(self) -> bool:
+        return bool(np.isfinite(self.value) and abs(self.value) <= self.threshold)
+
+    def line(self) -> str:
+        """For a terminal."""
+        return (
+            f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= {self.threshold:.0e})  {self.meaning}"
+        )
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The verdict of an independent replay.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    efficiency, distance, work : float
+        Of the replay, over one period, at the solution's delta.
+    efficiency_error : float
+        Error of that efficiency: what refining the replay changes, and what following another point of the body would
+        (net rotation times the body's reach over the distance).
+    efficiency_at_zero_delta : float
+        Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed.
+    instants : int
+        Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
+    error_at_zero_delta : float
+        Error of the extrapolation (`colloc.results.delta_limit.extrapolated_limit`); NaN if an older file does not state it.
+    """
+
+    checks: tuple[Check, ...]
+    efficiency: float
+    distance: float
+    work: float
+    efficiency_error: float
+    efficiency_at_zero_delta: float
+    instants: int
+    error_at_zero_delta: float = float("nan")
+
+    @property
+    def replayed(self) -> bool:
+        """Whether there was a replay at all; if not, all numbers are NaN."""
+        return self.instants > 0
+
+    @property
+    def passed(self) -> bool:
+        return all(check.passed for check in self.checks)
+
+    @property
+    def failures(self) -> list[Check]:
+        return [check for check in self.checks if not check.passed]
+
+
+UNCERTIFIED = Certificate(
+    (Check("replay", np.inf, 0.0, "not made, since the solve did not converge: nothing was checked"),),
+    instants=0,
+    **{each.name: np.nan for each in fields(Certificate) if each.name not in ("checks", "instants")},
+)
+"""Of a solve that did not converge: it fails, and says that nothing was checked."""

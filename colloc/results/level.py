@@ -1,0 +1,61 @@
+"""One step of a continuation, as the optimiser left it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+REDUCED = "reduced"
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """One converged or failed step of the continuation.
+
+    Attributes
+    ----------
+    delta : float
+        Regularisation speed, in the units of the problem's class of gaits: per period, or at unit shape speed.
+    edges : (n_interval + 1,)
+        The mesh, in phases of the gait found.
+    x, lam_x : (n,)
+        Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces are in units of
+        `colloc.search.friction_unit`.
+    lam_g : (m,)
+        Multipliers of the constraints.
+    efficiency, distance, work : float
+        Over one whole period, as collocation sees them.
+    kkt_error, violation, complementarity : float
+        Measured first-order conditions, in units of the friction, otherwise unscaled.
+    status : str
+        The optimiser's own word.
+    optimal : bool
+        Whether the first-order conditions hold.
+    iterations : int
+    seconds, evaluation_seconds : float
+    scheme : str
+        Collocation scheme, which refinement may have raised in order; "" for the problem's.
+    program : str
+        What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
+        formulation.
+    """
+
+    delta: float
+    edges: np.ndarray
+    x: np.ndarray
+    lam_x: np.ndarray
+    lam_g: np.ndarray
+    efficiency: float
+    distance: float
+    work: float
+    kkt_error: float
+    violation: float
+    complementarity: float
+    status: str
+    optimal: bool
+    iterations: int
+    seconds: float
+    evaluation_seconds: float
+    scheme: str = ""
+    program: str = REDUCED

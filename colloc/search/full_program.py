@@ -1,0 +1,123 @@
+"""The answer of a search: its gait as a solution of the problem's full nonlinear program, by IPOPT.
+
+The full program has joint angles, rates, tail velocities and link forces as variables and the balance of forces as
+constraints. It is solved on the final mesh, from the gait that the search found, with the multipliers of the reduced program
+and, for the equations, those that come closest to stationarity. Both have the same solutions, so a few steps confirm it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from colloc.collocation.layout import problem_layout
+from colloc.collocation.program import GaitProgram
+from colloc.collocation.warm_start import balanced_variables, feasible_point
+from colloc.reduced.spaces import heading, transcribed
+from colloc.results.level import REDUCED, Level
+from colloc.search.diagnosis import explanation
+from colloc.search.nlp import NlpResult, Solver
+from colloc.search.reduced_search import Found
+
+STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
+RADIUS = 0.01
+"""How far the gait may move [rad]: a solution farther away would be another gait."""
+_OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60}
+_SECONDS = 20.0
+
+
+def level_found(found: Found) -> Level:
+    """What is kept of a level of the search: its gait with every other variable in balance."""
+    space, problem = found.space, found.space.problem
+    mesh, layout = space.phase_mesh(found.gait), problem_layout(problem, space.mesh)
+    x = balanced_variables(problem, layout, mesh, found.gait, space.full_parameters(found.v), found.delta)
+    conditions, periods = found.conditions, 1.0 / problem.gait.fraction
+    return Level(
+        found.delta,
+        mesh.edges,
+        x,
+        np.zeros_like(x),
+        conditions.on_rows,
+        -found.objective,
+        periods * float(x[layout.distance[0, -1]]),
+        periods * float(x[layout.work[0, -1]]),
+        conditions.kkt_error,
+        conditions.violation,
+        conditions.complementarity,
+        STATIONARY if found.optimal else NOT_STATIONARY,
+        found.optimal,
+        found.iterations,
+        found.seconds,
+        found.seconds,
+        space.mesh.scheme.name,
+    )
+
+
+def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -> Level:
+    """What is kept of a solved program."""
+    layout, periods = program.layout, 1.0 / program.problem.gait.fraction
+    gait = program.member(result.x[layout.parameters[:, 0]])
+    return Level(
+        delta,
+        program.phase_mesh(gait).edges,
+        result.x,
+        result.lam_x,
+        result.lam_g,
+        -result.objective,
+        periods * float(result.x[layout.distance[0, -1]]),
+        periods * float(result.x[layout.work[0, -1]]),
+        result.kkt_error,
+        result.violation,
+        result.complementarity,
+        result.status,
+        result.optimal,
+        result.iterations,
+        result.seconds,
+        result.evaluation_seconds,
+        program.mesh.scheme.name,
+        name,
+    )
+
+
+def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
+    """The gait of a search as a solution of the full program, and what does not hold, or "".
+
+    Where IPOPT strays from a gait at which the first-order conditions of the full program hold, the gait is kept: at a kink
+    of the collocated efficiency its second derivatives mislead.
+
+    Parameters
+    ----------
+    found : Found
+    seconds : float
+        IPOPT's limit of processor time.
+    """
+    space, delta = found.space, found.delta
+    problem = space.problem.with_(scheme=space.mesh.scheme.name)
+    program = transcribed(problem, found.gait, space.mesh.edges, space.far)
+    x = feasible_point(program, space.full_parameters(found.v), delta)
+    program = heading(program, x)
+    solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
+    before = solver.measured(x, delta, *_multipliers(found, program))
+    result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
+    if result.optimal:
+        return level_of(program, result, delta, problem.formulation), ""
+    own = f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
+    if before.optimal:
+        kept = replace(before, status=STATIONARY)
+        text = f"First-order conditions hold (KKT error {before.kkt_error:.1e} on the {problem.formulation} program); {own}."
+        return level_of(program, kept, delta, REDUCED), text
+    kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
+    return level_of(program, kept, delta, REDUCED), f"{explanation(program, kept, delta)} {own}."
+
+
+def _multipliers(found: Found, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:
+    """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
+    lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
+    conditions, space = found.conditions, found.space
+    on_rows, at = conditions.on_rows[-space.row_lower.size :], 0
+    for name, rows in space.watched.items():
+        lam_g[program.groups[name].start + rows] = on_rows[at : at + rows.size]
+        at += rows.size
+    lam_x[program.layout.parameters[space.own, 0]] = conditions.on_bounds
+    return lam_x, lam_g

@@ -1,0 +1,190 @@
+"""The search for an optimum in the reduced space: delta falls, checks move, the mesh is refined, by quasi-Newton SQP.
+
+At every delta the gait is optimised within a box round the last one, with the shape checks at their worst instants; they are
+moved, and the gait optimised again, until it rests. At the final delta a mesh is planned for the gait
+(`colloc.verification.refinement`) and the gait optimised on that, until it needs no other.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.numerics.sqp import Stationarity, minimised, stationarity
+from colloc.reduced.closure import closed_gait
+from colloc.reduced.program import ReducedProgram, SearchSpace
+from colloc.reduced.spaces import space_near
+from colloc.search.far_contact import crossing_pairs, last_free
+from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
+
+FACTOR = 0.2
+FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
+"""Boxes round the last gait [rad], at the first level, later ones, and on a refined mesh: far enough for an optimum to move,
+not so far that a step ends in another world. A gait that ends on the edge of its box goes on from there."""
+VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
+"""Accuracy of -d/W at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
+STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
+"""What the first-order conditions have to keep to then; the efficiency is off by the square of that."""
+_GROWTH, _FEW_POINTS = 3, 300
+"""A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
+_DRIER, _LOST = 0.1, 0.5
+_ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
+_ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
+"""Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
+_ADMISSIBLE = 1e-8
+_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
+"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
+half, then a quarter of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A gait that SQP came to rest at.
+
+    Attributes
+    ----------
+    space : SearchSpace
+        Its class on a mesh, with the checks placed.
+    v : (n,)
+    delta : float
+    objective : float
+        -d/W.
+    conditions : Stationarity
+        Of the reduced program.
+    accuracy : float
+        Of -d/W that was asked for.
+    iterations, evaluations : int
+    seconds : float
+    """
+
+    space: SearchSpace
+    v: np.ndarray
+    delta: float
+    objective: float
+    conditions: Stationarity
+    accuracy: float
+    iterations: int
+    evaluations: int
+    seconds: float
+
+    @classmethod
+    def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
+        """A gait as it is, to go on from."""
+        space.move_checks(v)
+        program = ReducedProgram(space, delta)
+        return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0)
+
+    @property
+    def optimal(self) -> bool:
+        """First-order conditions hold in the reduced space, as far as the accuracy asked for needs."""
+        c = self.conditions
+        return max(c.kkt_error, c.complementarity) < STATIONARY[self.accuracy] and c.violation < STATIONARY[FINE]
+
+    @property
+    def gait(self) -> AnyGait:
+        return self.space.member(self.v)
+
+
+Report = Callable[[Found], None]
+
+
+def settled(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float) -> Found:
+    """Optimise from v at one delta on one mesh until checks, box and gait rest."""
+    begin, program = time.perf_counter(), ReducedProgram(space, delta)
+    iterations = evaluations = 0
+    space.move_checks(v)
+    for _ in range(_ROUNDS[accuracy]):
+        before = v
+        result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy])
+        v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
+        admissible = space.move_checks(v) <= _ADMISSIBLE
+        conditions = stationarity(program, v)
+        stationary = conditions.kkt_error < STATIONARY[accuracy]
+        if admissible and not result.on_edge and (stationary or np.abs(v - before).max() < _AT_REST):
+            break
+    return Found(space, v, delta, result.objective, conditions, accuracy, iterations, evaluations, time.perf_counter() - begin)
+
+
+def settled_apart(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float) -> Found:
+    """The same, keeping pairs of links more than two apart from crossing as they turn out to cross."""
+    found = settled(space, v, delta, radius, accuracy)
+    while new := tuple(p for p in crossing_pairs(found.space, found.v) if p not in found.space.far):
+        begin = last_free(found.space, v, found.v)
+        space = found.space.with_far(found.space.far + new)
+        found = settled(space, begin, delta, radius, accuracy)
+    return found
+
+
+def deltas(problem: Problem, first: float) -> list[float]:
+    """Levels from a first delta down to the problem's."""
+    levels = [first]
+    while levels[-1] > problem.delta:
+        below = FACTOR * levels[-1]
+        levels.append(below if below > 1.2 * problem.delta else problem.delta)
+    return levels
+
+
+def descended(found: Found, problem: Problem, report: Report) -> Found:
+    """From a gait at some delta down to the problem's, on the same mesh."""
+    for delta in deltas(problem, found.delta)[1:]:
+        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, ROUGH)
+        report(found)
+    return found
+
+
+def refined(found: Found, report: Report) -> tuple[Found, str]:
+    """The gait on planned meshes until it needs no other, and what is missing if that does not happen.
+
+    On the way it need not be optimised to the last digit: the next mesh moves it by more.
+    """
+    problem, kept = found.space.problem, np.empty(0)
+    count = 0
+    while True:
+        plan = _plan(found, kept, count) if problem.mesh_tolerance > 0 else None
+        if plan is None and found.accuracy == FINE:
+            return found, ""
+        if count == _MESHES:
+            return found, f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
+        space, v, radius, accuracy = found.space, found.v, NEXT_RADIUS, FINE
+        if plan is not None:
+            count, kept, radius = count + 1, np.concatenate([kept, plan.kept]), REMESH_RADIUS
+            space = space.remeshed(found.gait, plan.edges, plan.scheme)
+            v, accuracy = space.parameters(found.gait), FINE if count > _SAME_AIM else ROUGH
+        found = settled_apart(space, v, found.delta, radius, accuracy)
+        report(found)
+
+
+def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
+    """A mesh on which the gait is accurate enough; None if its own will do."""
+    problem, gait, aim = found.space.problem, found.gait, AIM * 0.5 ** min(max(0, count - _SAME_AIM), _HALVINGS)
+    mesh, delta = found.space.phase_mesh(gait), found.delta * gait.delta_unit
+    points = min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS)
+    return planned_mesh(problem, mesh, gait, delta, problem.mesh_tolerance, kept=kept, aim=aim, most_points=points)
+
+
+def is_viscous(found: Found) -> bool:
+    """Whether the gait owes its efficiency to delta: at a tenth of it half is lost. Slow parts of a retraced gait do that."""
+    dry = ReducedProgram(found.space, _DRIER * found.delta).objective(found.v)
+    return not dry <= _LOST * found.objective
+
+
+def begun(space: SearchSpace, v: np.ndarray, levels: list[float], accuracy: float) -> Found:
+    """The gait of the first level; where that is a viscous one, the start is tried at the next delta."""
+    for delta in levels:
+        found = settled_apart(space, v, delta, FIRST_RADIUS, accuracy)
+        if not is_viscous(found):
+            break
+    return found
+
+
+def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:
+    """An optimum of a problem from a start, on a mesh that meets its tolerance; the second is what is missing, or ""."""
+    space, v = space_near(problem, closed_gait(problem, start, problem.delta_start))
+    found = begun(space, v, deltas(problem, problem.delta_start), ROUGH)
+    report(found)
+    return refined(descended(found, problem, report), report)

@@ -1,0 +1,275 @@
+"""Commands end in a sentence and an exit code: early Ctrl-C, full disks, encodings, odd names, broken caches."""
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import h5py
+import pytest
+
+from colloc.bounds.optimality_gap import upper_bound
+from colloc.bounds.sampled import QUICK as BUDGET
+from colloc.bounds.sampled import Domain, bound_key
+from colloc.commands.ending import exit_code
+from colloc.commands.main import main as colloc
+from colloc.commands.solve import summary_lines
+from colloc.gaits.problem_file import read_problem_file
+from colloc.results.store import load, save
+from colloc.system.row_file import CACHE, put_rows
+
+QUICK = """
+from colloc import *
+PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
+"""
+needs_full = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+
+
+@pytest.fixture
+def result(three_link, tmp_path):
+    return save(three_link, tmp_path / "three_link.h5")
+
+
+@pytest.fixture
+def quick(tmp_path):
+    (tmp_path / "quick.py").write_text(QUICK, encoding="utf-8")
+    return str(tmp_path / "quick.py")
+
+
+def command(*words, **options):
+    """A run of the installed command in a process of its own, its output as bytes."""
+    return subprocess.run([sys.executable, "-m", "colloc", *map(str, words)], capture_output=True, check=False, **options)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("module", ["numpy", "scipy", "casadi"])
+def test_ctrl_c_while_libraries_are_imported_ends_without_a_traceback(module, quick, tmp_path):
+    """The signal comes from inside the import, as early as that library is asked for."""
+    (tmp_path / "library").mkdir()
+    (tmp_path / "library" / f"{module}.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "library")}
+    done = command("solve", quick, "--output", f"{tmp_path}/", env=environment)
+    assert done.returncode == 130
+    assert done.stderr.decode() == "colloc: interrupted; nothing was written.\n"
+
+
+@needs_full
+@pytest.mark.parametrize("words", [["verify"], ["compare"]])
+@pytest.mark.parametrize("buffered", [True, False])
+def test_a_full_disk_behind_standard_output_is_said_once(words, buffered, result):
+    files = [result] * (2 if words == ["compare"] else 1)
+    environment = {**os.environ, "PYTHONUNBUFFERED": "" if buffered else "1"}
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "colloc", *words, *map(str, files)], stdout=full, stderr=subprocess.PIPE, env=environment
+        )
+    assert done.returncode == 2
+    assert done.stderr.decode() == "colloc: cannot read or write the output: No space left on device.\n"
+
+
+@pytest.mark.parametrize(("encoding", "shown"), [("ascii", "cos 2 pi t"), ("cp1252", "cos 2 pi t"), ("utf-8", "cos 2πt")])
+def test_letters_that_an_encoding_lacks_are_printed_as_words(encoding, shown, three_link, monkeypatch):
+    printed = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(printed, encoding=encoding))
+    assert exit_code(lambda: print("\n".join(summary_lines(three_link, None))) or 0) == 0
+    assert shown in printed.getvalue().decode(encoding)
+
+
+def test_a_solve_ends_well_on_a_terminal_without_greek(quick, tmp_path):
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = command("solve", quick, "--no-figure", "--output", f"{tmp_path}/", env=environment)
+    assert done.returncode in (0, 4)
+    assert b"cos 2 pi t" in done.stdout
+    assert done.stderr == b""
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["animate", "RESULT", "--output", "x.avi"], "x.avi should end in .gif or .mp4"),
+        (["animate", "RESULT", "--format", "mp4", "--output", "x.gif"], "x.gif should end in .mp4"),
+        (["export", "RESULT", "--period", "4", "--output", "x.xlsx"], "x.xlsx should end in .csv or .json"),
+        (["report", "RESULT", "--output", "x.htm"], "x.htm should end in .html"),
+        (["solve", "QUICK", "--output", "out.txt"], "out.txt should end in .h5"),
+        (["solve", "QUICK", "--output", "x" * 300 + ".h5"], "too long"),
+        (["solve", "QUICK", "--output", "x" * 300], "File name too long"),
+        (["solve", "x" * 300], "there is no problem file"),
+        (["solve", "QUICK", "--delta", "1e-30"], "delta must be at least 1e-14"),
+        (["solve", "RESULT"], "is a results file (HDF5), not a problem file"),
+        (["verify", "y" * 300], "File name too long"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_and_nothing_is_made(words, message, quick, result, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    assert colloc([{"RESULT": str(result), "QUICK": quick}.get(word, word) for word in words]) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_folder_whose_name_has_an_ending_is_named_with_a_slash(result, tmp_path, capsys):
+    for output in (f"{tmp_path}/v1.2/", f"{tmp_path}/v1.2"):  # made, then there
+        assert colloc(["export", str(result), "--period", "4", "--output", output]) == 0
+    assert [p.name for p in (tmp_path / "v1.2").iterdir()] == ["three_link.csv"]
+    assert capsys.readouterr().err == ""
+
+
+def test_a_long_name_of_a_problem_is_refused(tmp_path, capsys):
+    (tmp_path / "p.py").write_text(QUICK.replace('"quick"', f'"{"x" * 300}"'))
+    assert colloc(["solve", str(tmp_path / "p.py"), "--output", f"{tmp_path}/"]) == 2
+    assert "name has 300 characters; files are named after it, and 200 are allowed" in capsys.readouterr().err
+    (tmp_path / "p.py").write_text(QUICK.replace('"quick"', f'"{"x" * 200}"'))
+    assert colloc(["solve", str(tmp_path / "p.py"), "--output", f"{tmp_path}/", "--quiet", "--no-figure"]) in (0, 4)
+
+
+def test_a_start_of_another_body_is_named(three_link, tmp_path, capsys):
+    start = save(three_link, tmp_path / "three.h5")
+    assert colloc(["solve", "problems/four_link.py", "--start", str(start), "--output", f"{tmp_path}/"]) == 2
+    assert f"the gait of {start} cannot be the guess: guess has 2 joints" in capsys.readouterr().err
+
+
+def test_errors_are_one_json_object_where_json_is_asked_for(result, tmp_path, capsys):
+    for words in (["solve", "nope.py", "--json"], ["verify", str(result), "--tolerance", "3", "--json"], ["solve", "--json"]):
+        assert colloc(words) == 2
+        printed = capsys.readouterr()
+        error = json.loads(printed.out)
+        assert (error["status"], error["exit_code"]) == ("error", 2)
+        assert printed.err == f"colloc: {error['message']}\n"
+
+
+@pytest.mark.parametrize("ending", ["sys.exit(0)", "raise SystemExit", "exit()"])
+def test_a_problem_file_that_ends_the_program_is_refused(ending, tmp_path, capsys):
+    (tmp_path / "p.py").write_text(f"import sys\n{ending}\n")
+    assert colloc(["solve", str(tmp_path / "p.py")]) == 2
+    assert "p.py, line 2: the file ends the program" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("cache", ["{", "ENTRY", "FOLDER", "KIND"])
+def test_a_broken_cache_of_bounds_is_left_alone(cache, quick, tmp_path):
+    path, problem = tmp_path / "bounds.sqlite", read_problem_file(quick).problem
+    if cache == "FOLDER":
+        path.mkdir()
+    elif cache == "ENTRY":
+        put_rows(path, CACHE, {bound_key(Domain(problem.body, problem.friction, problem.joint_limit), BUDGET): {"a": 1}})
+    elif cache == "KIND":
+        put_rows(path, "another kind", {"a": 1})
+    else:
+        path.write_text(cache)
+    with pytest.warns(UserWarning, match="No bound is taken from it"):
+        assert upper_bound(problem, tmp_path, compute=False) is None
+
+
+def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bound(quick, tmp_path, monkeypatch):
+    problem = read_problem_file(quick).problem
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: problem.friction)  # anything with fields
+    (tmp_path / "file").write_text("in the way of the folder")
+    with pytest.warns(UserWarning, match="cannot write .*The bound is not kept"):
+        assert upper_bound(problem, tmp_path / "file" / "below", compute=True) is problem.friction
+
+
+def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(quick, tmp_path, capsys):
+    (tmp_path / "bounds.sqlite").write_text("{")
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/", "--no-figure"]) in (0, 4)
+    printed = capsys.readouterr()
+    assert "efficiency d/W" in printed.out
+    assert "upper bound 1 = 1/min(mu)" in printed.out
+    assert printed.err.count("No bound is taken from it") == 1
+
+
+def test_a_bound_that_cannot_be_computed_costs_no_summary(quick, tmp_path, capsys):
+    text = QUICK.replace(
+        "ellipse(0.0, 1.4, 0.8)", "Fourier([0] * 4, [[0.6], [0.3], [-0.3], [-0.6]], [[0.6], [0.3], [0.3], [0.6]])"
+    )
+    (tmp_path / "p.py").write_text(text.replace('"quick",', '"quick", body=Chain((0.2,) * 5), guess='))
+    assert colloc(["solve", str(tmp_path / "p.py"), "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
+    printed = capsys.readouterr()
+    assert "quick:" in printed.out
+    assert "no bound: bounds are computed for at most four links" in printed.err
+
+
+def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys):
+    for name in ("quick.png", "quick.failed.png"):
+        (tmp_path / name / "full").mkdir(parents=True)
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/"]) == 2
+    printed = capsys.readouterr()
+    assert "efficiency d/W" in printed.out
+    assert "no figure: cannot write" in printed.err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
+@pytest.mark.parametrize("mask", [0o022, 0o027, 0o077, 0o002])
+def test_files_have_the_permissions_that_the_user_asked_for(mask, three_link, tmp_path):
+    before = os.umask(mask)
+    try:
+        path = save(three_link, tmp_path / "x.h5")
+    finally:
+        os.umask(before)
+    assert path.stat().st_mode & 0o777 == 0o666 & ~mask
+
+
+def test_a_result_that_another_program_opened_is_read_and_verify_decides(result, capsys):
+    before = load(result)
+    with h5py.File(result, "r+"):
+        pass
+    with pytest.warns(UserWarning, match="was changed after colloc wrote it"):
+        again = load(result)
+    assert again.changed
+    assert not before.changed
+    assert again.last.x.tobytes() == before.last.x.tobytes()
+    assert colloc(["verify", str(result)]) == 0
+    printed = capsys.readouterr()
+    assert "the file was changed after colloc wrote it" in printed.out
+    assert printed.err.count("was changed") == 1
+    with h5py.File(result, "r+") as file:
+        file["certificate"].attrs["efficiency"] = 0.5
+    assert colloc(["verify", str(result), "--json"]) == 4
+    verdict = json.loads(capsys.readouterr().out)
+    assert verdict["changed"]
+    assert "the file certifies an efficiency of 0.5" in verdict["complaint"]
+
+
+@pytest.mark.parametrize("cut", [1, 1000, 100_000])
+def test_a_result_without_its_end_is_still_refused(cut, result, capsys):
+    with h5py.File(result, "r+"):
+        pass
+    content = result.read_bytes()
+    result.write_bytes(content[:-cut])
+    assert colloc(["verify", str(result)]) == 2
+    assert "it carries no checksum" in capsys.readouterr().err
+
+
+def test_a_command_that_was_interrupted_says_so_whatever_became_of_the_interruption():
+    """CasADi's wrappers turn a KeyboardInterrupt into errors of other kinds."""
+
+    def swallowing():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise NotImplementedError("Wrong number or type of arguments") from None
+
+    assert exit_code(swallowing) == 130
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
+    class _Begun(Exception):
+        pass
+
+    def begun(*_):
+        raise _Begun
+
+    monkeypatch.setattr("colloc.commands.solve._solved", begun)
+    for intervals, said in ((5000, "5000 intervals will take about 1 min 40 s"), (60, "")):
+        with pytest.raises(_Begun):
+            colloc(["solve", quick, "--mesh", str(intervals), "--output", f"{tmp_path}/"])
+        assert said in capsys.readouterr().err
+
+
+def test_a_command_imports_nothing_heavy_before_it_can_end_well():
+    code = "import sys, colloc.commands.main; print(any(name in sys.modules for name in ('numpy', 'scipy', 'casadi', 'h5py')))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

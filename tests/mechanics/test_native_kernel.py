@@ -1,0 +1,124 @@
+"""The compiled kernel: the same bits on any number of threads and in any batch; whatever is wrong with it costs speed only."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Friction, solve_balance
+from colloc.mechanics.native_kernel import library, native_kernel
+from colloc.numerics.c_compiler import FOLDER, OFF, c_compiler
+from colloc.system.processors import available_threads
+
+needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
+N_TIME = 9001
+
+
+@pytest.fixture
+def fresh(monkeypatch):
+    """The kernel is looked for again, before and after."""
+    library.cache_clear()
+    yield monkeypatch
+    monkeypatch.undo()
+    library.cache_clear()
+
+
+def instants(count, seed=1):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-np.pi, np.pi, (2, count)), rng.normal(size=(2, count))
+
+
+def fields(solution):
+    return np.vstack([solution.z, solution.residual, solution.iterations, solution.anchor, solution.anchor_velocity])
+
+
+@needs_kernel
+@pytest.mark.parametrize("law", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
+def test_an_instant_has_the_same_bits_on_repetition_on_threads_and_in_any_batch(monkeypatch, law):
+    angles, rates = instants(N_TIME)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    once = fields(solve_balance(Chain(), law, angles, rates, 1e-5))
+    np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles, rates, 1e-5)), once)
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles, rates, 1e-5)), once)
+    few = slice(4321, 4371)
+    np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles[:, few], rates[:, few], 1e-5)), once[:, few])
+
+
+@needs_kernel
+def test_views_with_any_strides_are_read_right():
+    angles, rates = instants(40)
+    whole = solve_balance(Chain(), Friction(), angles, rates, 1e-3)
+    backwards = solve_balance(
+        Chain(), Friction(), angles[:, ::-1], np.asfortranarray(rates[:, ::-1]), 1e-3, start=whole.z[:, ::-1]
+    )
+    np.testing.assert_allclose(backwards.z[:, ::-1], whole.z, rtol=0, atol=1e-9)
+
+
+def test_threads_are_those_asked_for(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "5")
+    assert available_threads() == 5
+    monkeypatch.setenv("OMP_NUM_THREADS", "all")
+    assert available_threads() >= 1
+
+
+@pytest.mark.skipif(c_compiler() is None, reason="no C compiler")
+def test_it_is_compiled_once_and_a_damaged_one_again(fresh, tmp_path):
+    fresh.setenv(FOLDER, str(tmp_path / "code"))
+    assert native_kernel() is not None
+    (compiled,) = (tmp_path / "code").glob("kernel-*.so")
+    made = compiled.stat().st_mtime_ns
+    library.cache_clear()
+    assert native_kernel() is not None
+    assert compiled.stat().st_mtime_ns == made
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / compiled.name).write_bytes(compiled.read_bytes()[:1000])
+    fresh.setenv(FOLDER, str(other))
+    library.cache_clear()
+    assert native_kernel() is not None
+    assert (other / compiled.name).stat().st_size == compiled.stat().st_size
+
+
+@pytest.mark.skipif(c_compiler() is None or not hasattr(os, "geteuid"), reason="no C compiler, or no POSIX permissions")
+def test_a_library_that_others_could_have_written_is_not_run(fresh, tmp_path):
+    fresh.setenv(FOLDER, str(tmp_path / "code"))
+    assert native_kernel() is not None
+    (compiled,) = (tmp_path / "code").glob("kernel-*.so")
+    assert compiled.stat().st_mode & 0o777 == 0o600
+    (tmp_path / "code").chmod(0o777)
+    library.cache_clear()
+    assert native_kernel() is None
+
+
+@pytest.mark.parametrize("missing", ["compiler", "folder", "working compiler", "permission"])
+def test_without_it_numpy_gives_the_answer(fresh, tmp_path, missing):
+    known = solve_balance(Chain(), Friction(), *instants(5), 1e-3).z
+    a_file = tmp_path / "file"
+    a_file.write_text("")
+    fresh.setenv(FOLDER, str(tmp_path / "code"))
+    match missing:
+        case "compiler":
+            fresh.setenv("PATH", "")
+            fresh.delenv("CC", raising=False)
+        case "folder":
+            fresh.setenv(FOLDER, str(a_file / "below"))
+        case "working compiler":
+            fresh.setenv("CC", shutil.which("false"))
+        case "permission":
+            fresh.setenv(FOLDER, OFF)
+    library.cache_clear()
+    assert native_kernel() is None
+    np.testing.assert_allclose(solve_balance(Chain(), Friction(), *instants(5), 1e-3).z, known, rtol=0, atol=1e-9)
+
+
+def test_solving_a_balance_loads_neither_casadi_nor_matplotlib():
+    code = (
+        "import sys, numpy as np; from colloc import Chain, Friction, solve_balance;"
+        "solve_balance(Chain(), Friction(), np.ones((2, 3)), np.ones((2, 3)), 1e-3).require();"
+        "assert not {'casadi', 'matplotlib', 'numba'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,120 @@
+"""The figure of a solution can be read: no words over words, nothing cut off, snapshots apart, and PDF only on demand."""
+
+import subprocess
+import sys
+from itertools import combinations, pairwise
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.problem import Problem
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure
+from colloc.pictures.publication import panels
+from colloc.pictures.style import save
+
+
+def crawler(n_link, size=0.6):
+    j = np.arange(n_link - 1)
+    guess = Fourier(np.zeros(n_link - 1), size * np.cos(0.9 * j)[:, None], size * np.sin(0.9 * j)[:, None] + 0.1)
+    lengths = (1 / n_link,) * n_link
+    return Problem("crawler", guess, Chain(lengths), Friction(1.5, 1.0, 1.2), gait=Harmonic(1), delta=1e-2, intervals=8)
+
+
+def words(figure):
+    """What is written and where [pixels]; labels of ticks beyond an axis' limits are not drawn."""
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(renderer)
+    unseen = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                room = 1e-9 * (high - low)
+                if not axes.axison or not low - room <= tick.get_loc() <= high + room:
+                    unseen |= {tick.label1, tick.label2}
+            if not axes.axison:
+                unseen |= {axis.label, axis.offsetText}
+    shown = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip() and text not in unseen]
+    return [(text.get_text(), text.get_window_extent(renderer)) for text in shown]
+
+
+def assert_readable(figure):
+    found = words(figure)
+    for text, box in found:
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, f"{text!r} leaves the canvas"
+        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1, f"{text!r} leaves the canvas"
+    for (one, a), (other, b) in combinations(found, 2):
+        across, along = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert min(across, along) < 1.0, f"{one!r} lies on {other!r}"
+    return [text for text, _ in found]
+
+
+@pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (8, 0.3)])
+def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
+    solution = unsolved(crawler(n_link, size))
+    texts = assert_readable(solution_figure(solution))
+    assert "joint angle 2  [rad]" in texts if n_link == 3 else {"joint 1", *(f"{j}" for j in range(2, n_link))} <= set(texts)
+
+
+def test_the_solved_problem_can_be_read(three_link):
+    texts = assert_readable(solution_figure(three_link))
+    assert any("efficiency d/W = 0.26003" in text for text in texts)
+
+
+@pytest.mark.parametrize("name", ["lab", "angles", "speeds", "power", "convergence", "mesh", "shape-1-2", "filmstrip"])
+def test_panels_alone_can_be_read(name, three_link):
+    assert_readable(panels(three_link)[name].figure())
+
+
+def test_a_reader_of_words_sees_an_overlap():
+    figure = Figure(figsize=(4, 2))
+    figure.text(0.1, 0.5, "one")
+    figure.text(0.11, 0.5, "two")
+    with pytest.raises(AssertionError, match="lies on"):
+        assert_readable(figure)
+
+
+@pytest.mark.parametrize("n_link", [2, 3, 5])
+def test_snapshots_never_touch(n_link, unsolved):
+    axes = Figure().add_subplot()
+    draw_filmstrip(axes, unsolved(crawler(n_link, 1.5)))
+    bodies = [line.get_xdata() for line in axes.lines if line.get_linestyle() == "-"]
+    assert len(bodies) == 11
+    for left, right in pairwise(bodies):
+        assert right.min() - left.max() > 0.1
+
+
+def test_forbidden_shapes_are_the_exact_set_of_the_three_link_body():
+    """Design: crossing iff both angles positive and min(2 a + b, a + 2 b) > 2 pi, or the mirror image."""
+
+    def area(limit):
+        return float((forbidden(Chain(), limit)[1][:-1, :-1] > 0).mean()) * (2 * np.pi) ** 2
+
+    # per sign: the triangle-like region min(2a+b, a+2b) > 2 pi in [0, pi]^2 has area pi^2 / 6
+    assert area(np.pi) == pytest.approx(2 * np.pi**2 / 6, rel=0.03)
+    assert area(np.pi / 2) == pytest.approx(3 * np.pi**2, rel=0.03)
+
+
+def test_only_the_kinds_asked_for_are_written_and_nobodys_settings_change(tmp_path):
+    before = dict(matplotlib.rcParams)
+    figure = Figure(figsize=(1, 1))
+    assert save(figure, tmp_path / "x.y", ("png",)) == [tmp_path / "x.y.png"]
+    assert {path.name for path in tmp_path.iterdir()} == {"x.y.png"}
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_drawing_loads_neither_pyplot_nor_what_writes_pdf():
+    program = (
+        "import sys, colloc.commands.solve; assert 'matplotlib' not in sys.modules; import colloc.pictures.figure;"
+        "print(*sys.modules)"
+    )
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert "matplotlib.figure" in loaded
+    assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "scipy.stats", "jinja2"} & set(loaded)

@@ -1,0 +1,83 @@
+"""The reduced space: exact gradients, the same numbers as the full program, and answers that solve the full program."""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc.collocation.warm_start import feasible_point
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near, transcribed
+from colloc.search.optimise import optimum
+
+FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
+WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}
+CASES = {
+    "harmonics": {"gait": Harmonic(2, "none"), "friction": Friction(0.5, 1, 5)},
+    "bilateral harmonics": {"gait": Harmonic(2, "bilateral")},
+    "antipodal harmonics": {"gait": Harmonic(1, "antipodal"), "friction": Friction(1.7, 1, 1.3), "guess": ellipse(0, 1.3, 0.8)},
+    "shared nodes": {"gait": Harmonic(1, "none"), "scheme": "hermite-simpson"},
+    "free path": {"gait": FreePath(4.0, "none")},
+    "bilateral path": {"gait": FreePath(4.0, "bilateral"), "friction": Friction(1.7, 1, 1.3)},
+    "antipodal path": {"gait": FreePath(4.0, "antipodal")},
+    "bilateral path of three joints": {"gait": FreePath(6.0, "bilateral"), **FOUR},
+    "path of three joints": {"gait": FreePath(6.0, "none"), **WAVE},
+    "antipodal path of three joints": {"gait": FreePath(6.0, "antipodal"), **WAVE},
+    "polygon": {"gait": Polygon(4, "none"), "friction": Friction(3, 1, 2)},
+    "bilateral polygon": {"gait": Polygon(5, "bilateral")},
+}
+DELTA = 0.05
+
+
+def near_start(case, shake=1e-2):
+    problem = Problem("p", **({"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10} | CASES[case]))
+    space, v = space_near(problem, problem.guess)
+    v = v + shake * np.random.default_rng(0).normal(size=v.size)
+    space.move_checks(v)
+    return space, v, ReducedProgram(space, DELTA)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_gradients_are_those_of_differences(case):
+    space, v, program = near_start(case)
+    h = 1e-6
+    steps = h * np.eye(space.n)
+    slopes = [(program.objective(v + e) - program.objective(v - e)) / (2 * h) for e in steps]
+    np.testing.assert_allclose(program.gradient(v), slopes, atol=2e-7)
+    rows = np.transpose([(program.rows(v + e) - program.rows(v - e)) / (2 * h) for e in steps])
+    np.testing.assert_allclose(program.row_slopes(v), rows, atol=2e-6)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_equation_among_the_rows_is_redundant(case):
+    """An SQP step solves the linearised equations: dependent ones would have no solution."""
+    _, v, program = near_start(case)
+    equations = program.row_slopes(v)[program.row_lower == program.row_upper]
+    assert np.linalg.matrix_rank(equations, tol=1e-6) == len(equations)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_full_program_measures_the_same_efficiency_and_rotation(case):
+    space, v, program = near_start(case, shake=0.0)
+    full = transcribed(space.problem, space.member(v), space.mesh.edges)
+    x, layout = feasible_point(full, space.full_parameters(v), DELTA), full.layout
+    sign = np.sign(x[layout.distance[0, -1]])  # an antipodal gait may travel either way along its axis
+    assert -sign * x[layout.distance[0, -1]] / x[layout.work[0, -1]] == pytest.approx(program.objective(v), rel=1e-9)
+    if "rotation" in full.groups and space.problem.gait.symmetry == "none":
+        turned = x[layout.theta[0, -1]] - x[layout.theta[0, 0]]
+        assert turned == pytest.approx(program.rows(v)[0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "gait", [Harmonic(1, "none"), Harmonic(2, "bilateral"), Polygon(4, "bilateral"), FreePath(2.0, "bilateral")]
+)
+def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
+    """Tail velocities and link forces among the variables, the balance among the constraints; two programs, one solution."""
+    problem = Problem("p", ellipse(1.0, 0.7, 1.1), friction=Friction(1.7, 1, 1.3), gait=gait, intervals=24, delta=3e-3)
+    solution = optimum(problem.with_(mesh_tolerance=0.0))
+    found, answer = solution.levels[-2:]
+    assert (found.program, answer.program) == ("reduced", "full")
+    assert max(answer.kkt_error, answer.violation, answer.complementarity) < 1e-8
+    assert answer.iterations <= 15
+    assert answer.efficiency == pytest.approx(found.efficiency, rel=1e-7)
+    assert solution.layout.forces.size == 9 * solution.mesh.n_point
+    assert solution.message == ""

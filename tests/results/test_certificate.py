@@ -1,0 +1,223 @@
+"""Every check of the certificate refuses what lies just above its limit, and nothing else does; the limits are these."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from colloc.commands.verify import main as recheck
+from colloc.gaits.paths import ArcPath
+from colloc.results import certificate as verify
+from colloc.results.certificate import certify
+from colloc.results.solution import Solution
+from colloc.results.store import load, save
+from colloc.verification.replay import replay
+
+JUST_BELOW, JUST_ABOVE = 0.95, 1.05
+
+
+@pytest.fixture(scope="module")
+def replays(three_link):
+    """What certifying the solution replays, by delta: every test changes a copy."""
+    found = {}
+
+    def kept(*arguments, **settings):
+        found.setdefault(arguments[3], replay(*arguments, **settings))
+        return found[arguments[3]]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verify, "replay", kept)
+        assert certify(three_link).passed
+    return found
+
+
+@pytest.fixture
+def failures(three_link, replays, monkeypatch):
+    """A function from a changed solution and changes of its replays to the names of the checks that fail."""
+
+    def names(solution=three_link, change=lambda part, replayed: replayed):
+        largest = max(replays)
+        monkeypatch.setattr(verify, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
+        return {check.name for check in certify(solution).failures}
+
+    return names
+
+
+def with_last(solution, **changes):
+    return Solution(solution.problem, [*solution.levels[:-1], replace(solution.last, **changes)])
+
+
+def judged(name, run):
+    """`run` of a factor makes a violation of so many times the limit: only `name` fails, and only above it."""
+    assert run(JUST_BELOW) == set()
+    assert run(JUST_ABOVE) == {name}
+
+
+def test_an_honest_solution_passes(failures):
+    assert failures() == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "limit"),
+    [
+        ("KKT error", "kkt_error", 1e-6),
+        ("KKT error", "complementarity", 1e-6),
+        ("constraint violation", "violation", 1e-8),
+    ],
+)
+def test_first_order_conditions(failures, three_link, name, field, limit):
+    judged(name, lambda f: failures(with_last(three_link, **{field: f * limit})))
+
+
+def test_balance_at_the_nodes(failures, three_link):
+    """A tail velocity that is off: the force left over is linear in it."""
+    index = three_link.layout.z[0, 10]
+
+    def off(step):
+        x = three_link.last.x.copy()
+        x[index] += step
+        return with_last(three_link, x=x)
+
+    check = next(c for c in verify._optimality(off(1e-7)) if c.name == "balance at nodes")
+    judged("balance at nodes", lambda f: failures(off(f * 1e-6 * 1e-7 / check.value)))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("balance in replay", lambda r, f: {"residual": f * 1e-6}),
+        ("net rotation", lambda r, f: {"rotation": -f * 1e-4 * r.distance / r.lever}),
+        ("replay error", lambda r, f: {"error": f * 1e-6}),
+        ("work = dissipation", lambda r, f: {"actuator_work": r.work * (1 + f * 1e-7)}),
+        ("work = dissipation", lambda r, f: {"actuator_work": r.work * (1 - f * 1e-7)}),
+    ],
+)
+def test_what_the_replay_measures(failures, name, changes):
+    judged(name, lambda f: failures(change=lambda part, r: replace(r, **changes(r, f))))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_collocated_against_replayed_efficiency(failures, three_link, replays, sign):
+    true, before = replays[max(replays)].efficiency, three_link.levels[-2]
+
+    def run(f):
+        claimed = true * (1 + sign * f * 1e-4)
+        levels = [*three_link.levels[:-2], replace(before, efficiency=claimed), replace(three_link.last, efficiency=claimed)]
+        return failures(Solution(three_link.problem, levels))
+
+    judged("replay gap", run)
+
+
+def test_closure(failures, three_link, monkeypatch):
+    path = verify.gait_path(three_link)
+
+    def run(f):
+        monkeypatch.setattr(verify, "gait_path", lambda solution: lambda t: (path(t)[0] + f * 1e-9 * t, path(t)[1]))
+        return failures()
+
+    judged("closure", run)
+
+
+def test_joint_limits_are_those_of_the_problem(failures, three_link):
+    largest = np.abs(three_link.gait.angles(np.linspace(0, 1, 20001))).max()
+
+    def run(f):
+        return failures(Solution(three_link.problem.with_(joint_limit=largest - f * 1e-6), three_link.levels))
+
+    judged("joint limits", run)
+
+
+@pytest.mark.parametrize("depth", ["crossing_depth", "passing_depth"])
+def test_self_contact(failures, monkeypatch, depth):
+    def run(f):
+        monkeypatch.setattr(verify, depth, lambda body, angles: np.float64(f * 1e-6))
+        return failures()
+
+    judged("self-contact", run)
+
+
+def test_mesh_error(failures, three_link, monkeypatch):
+    def run(f):
+        monkeypatch.setattr(verify, "mesh_error", lambda *a: SimpleNamespace(estimate=f * three_link.problem.mesh_tolerance))
+        return failures()
+
+    judged("mesh error", run)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_influence_of_delta(failures, replays, sign):
+    largest = replays[max(replays)].efficiency
+
+    def run(f):
+        return failures(change=lambda part, r: r if part == 1 else replace(r, efficiency=largest * (1 + sign * f * 1e-2)))
+
+    judged("delta influence", run)
+
+
+def circle(radius):
+    """A path of eight arcs."""
+    turn = 2 * np.pi * np.arange(9) / 8
+    shapes = radius * np.stack([np.cos(turn), np.sin(turn)])
+    return ArcPath(np.arange(9) / 8, shapes, turn[None] + 0.5 * np.pi, 2 * np.pi * radius)
+
+
+def of_path(gait, curvature):
+    stated = SimpleNamespace(gait=gait, problem=SimpleNamespace(gait=SimpleNamespace(curvature=curvature)))
+    return {check.name for check in verify._class(stated) if not check.passed}
+
+
+def test_curvature_between_the_nodes_of_a_free_path():
+    judged("curvature", lambda f: of_path(circle(0.5), 2.0 / (1 + f * 1e-6)))
+
+
+def test_joins_of_a_free_path(monkeypatch):
+    def run(f):
+        monkeypatch.setattr(verify, "_largest_jump", lambda gait: f * 1e-8)
+        return of_path(circle(0.5), 2.1)
+
+    assert verify._largest_jump(circle(0.5)) < 1e-9
+    judged("joins", run)
+
+
+def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys):
+    """1e-9 is reached; 1e-15 is beyond the balance, and what is not reached is not certified."""
+    file = save(three_link, tmp_path / "a.h5")
+    assert recheck([str(file), "--tolerance", "1e-9"]) == 0
+    assert recheck([str(file), "--tolerance", "1e-15"]) == 4
+    assert "NOT CERTIFIED" in capsys.readouterr().out
+
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "name", ["two_link", "three_link", "small_gaits", *(pytest.param(n, marks=SLOW) for n in ("four_link", "five_link"))]
+)
+def test_errors_of_a_certificate_hold(solved, name):
+    """Efficiency at delta, and for delta -> 0, against replays to 1e-9 at delta and at a ten-thousandth of it."""
+    solution = solved(name)[0]
+    problem, path, known = solution.problem, verify.gait_path(solution), solution.certificate
+    here, limit = (
+        replay(problem.body, problem.friction, path, part * solution.delta_per_period, tolerance=1e-9).efficiency
+        for part in (1.0, 1e-4)
+    )
+    assert abs(known.efficiency - here) <= known.efficiency_error < 2e-6 * here
+    assert abs(known.efficiency_at_zero_delta - limit) <= known.error_at_zero_delta < 1e-4 * limit
+
+
+def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
+    monkeypatch.setattr(verify, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
+    known, fine = certify(three_link), replays[max(replays)]
+    assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
+    assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
+
+
+def test_files_without_an_error_of_the_limit_are_read(three_link, tmp_path, monkeypatch):
+    import colloc.results.store as store
+
+    put = store.put_attribute
+    monkeypatch.setattr(store, "put_attribute", lambda o, n, v: None if n == "error_at_zero_delta" else put(o, n, v))
+    known = load(save(three_link, tmp_path / "old.h5")).certificate
+    assert np.isnan(known.error_at_zero_delta)
+    assert replace(known, error_at_zero_delta=0.0) == replace(three_link.certificate, error_at_zero_delta=0.0)

@@ -1,0 +1,45 @@
+"""Only the ratios of friction coefficients matter: their size is a unit, for solves and certificates alike."""
+
+import numpy as np
+import pytest
+
+from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.problem import Problem
+from colloc.mechanics.friction import Friction
+from colloc.search.friction_unit import friction_unit, in_friction_units
+from colloc.search.optimise import maximise_efficiency
+
+
+def stated(*mu, **changes):
+    settings = {"gait": Harmonic(1, "bilateral"), "intervals": 24, "delta": 1e-2, "mesh_tolerance": 1e-4} | changes
+    return Problem("unit", ellipse(0.3, 1.0, 0.5), friction=Friction(*mu), **settings)
+
+
+def test_friction_of_usual_size_is_left_alone():
+    for mu in ((1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (0.5, 1.0, 5.0), (10.0, 1.0, 1.0)):
+        problem = stated(*mu)
+        assert in_friction_units(problem) == (problem, 1.0)
+    assert friction_unit(Friction(2e-6, 1e-6, 3e-6)) == pytest.approx(1e-6)
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return maximise_efficiency(stated(1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_coefficients_of_any_size_are_solved_and_certified(usual, size):
+    """Work is proportional to the coefficients, efficiency inversely; the gait is the same."""
+    seen = []
+    solution = maximise_efficiency(stated(size, size, size), seen.append)
+    assert solution.status == "solved"
+    assert solution.efficiency * size == pytest.approx(usual.efficiency, rel=1e-9)
+    assert solution.certificate.efficiency * size == pytest.approx(usual.certificate.efficiency, rel=1e-6)
+    assert solution.work / size == pytest.approx(usual.work, rel=1e-9)
+    np.testing.assert_allclose(solution.gait.cos, usual.gait.cos, rtol=1e-6)
+    assert [level.efficiency for level in seen] == [level.efficiency for level in solution.levels]
+    assert solution.last.kkt_error < 1e-6
+
+    resumed = maximise_efficiency(stated(size, size, size), before=solution.levels)
+    assert resumed.status == "solved"
+    assert resumed.efficiency == pytest.approx(solution.efficiency, rel=1e-6)
