@@ -34,7 +34,6 @@ PLAIN = {
     "work = dissipation": "All work of the joints goes into friction: energy is conserved.",
     "mesh error": "More time steps would hardly change the efficiency.",
     "delta influence": "Friction is smoothed a little at rest; that hardly changes the efficiency.",
-    "delta step": "Nor did the last reduction of that smoothing change it.",
     "joins": "The pieces of the path meet without a jump.",
     "curvature": "The path bends no more sharply than it may.",
 }

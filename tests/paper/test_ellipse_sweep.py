@@ -40,7 +40,7 @@ def test_half_a_period_gives_what_a_replay_of_the_whole_period_gives(direct):
     for i, gait in enumerate(gaits.T):
         path = ellipse(*gait)
         exact = replay(BODY, ISOTROPIC, lambda t, p=path: (p.angles(t), p.rates(t)), DELTA, tolerance=1e-5)
-        assert abs(exact.rotation) < 1e-9
+        assert abs(exact.rotation) < 1e-7  # the balance's residual, 1e-11, over its stiffness, of order delta
         assert found.distance[i] == pytest.approx(exact.distance, abs=5e-6)
         assert found.work[i] == pytest.approx(exact.work, rel=1e-5)
 

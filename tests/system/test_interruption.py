@@ -10,6 +10,8 @@ import time
 import numpy as np
 import pytest
 
+from colloc.collocation import implicit_velocity
+from colloc.collocation.implicit_velocity import balanced_near
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.harmonic import Harmonic, ellipse
@@ -126,19 +128,19 @@ def test_no_solve_begins_after_an_interruption_that_was_swallowed():
     assert begun == []
 
 
-def test_ipopt_stops_between_iterations_and_says_nothing(capfd):
-    problem = Problem("p", ellipse(0.3, 1.0, 0.5), gait=Harmonic(1, "bilateral"), intervals=20)
+def test_ipopt_stops_between_iterations_and_says_nothing(capfd, monkeypatch):
+    gait = Harmonic(1, "bilateral")
+    problem = Problem("p", ellipse(0.3, 1.0, 0.5), gait=gait, intervals=20, formulation="implicit velocity")
     solver, calls = Solver(transcribe(problem)), []
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
-    balanced = solver._reduced.condensed._balanced
 
     def pressed(*arguments):
         calls.append(arguments)
         if len(calls) == 10:
             signal.raise_signal(signal.SIGINT)
-        return balanced(*arguments)
+        return balanced_near(*arguments)
 
-    solver._reduced.condensed._balanced = pressed
+    monkeypatch.setattr(implicit_velocity, "balanced_near", pressed)
     with pytest.raises(KeyboardInterrupt):
         solver.solve(x, 0.1)
     assert 10 <= len(calls) < 20

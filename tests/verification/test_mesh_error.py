@@ -148,7 +148,7 @@ def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     assert not plan.reached
     assert plan.estimate > 1e-7
     small = planned_mesh
-    monkeypatch.setattr(reduced_search, "planned_mesh", lambda *a, **k: small(*a, **k, most_points=60))
+    monkeypatch.setattr(reduced_search, "planned_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60}))
     solution = maximise_efficiency(stated)
     assert solution.status == "certificate failed"
     assert "mesh error" in solution.message
