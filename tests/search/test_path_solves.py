@@ -7,12 +7,12 @@ import pytest
 from colloc import Chain, Corners, Fourier, FreePath, Friction, Polygon, Problem, ellipse, load, save
 from colloc.bounds.infinitesimal import small_gait
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
-from colloc.search.class_transfer import continue_classes
 from colloc.search.optimise import maximise_efficiency
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
@@ -98,7 +98,8 @@ def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
 
 def test_more_curvature_allows_more_and_each_bound_is_kept(tmp_path):
     first = Problem("p", ellipse(0, 2.8, 1.3), gait=FreePath(1.0, "bilateral"), intervals=30, mesh_tolerance=1e-4, delta=1e-3)
-    solutions = continue_classes(first, [FreePath(2.0, "bilateral")])
+    one = maximise_efficiency(first)
+    solutions = [one, maximise_efficiency(prolonged(first, one.gait, FreePath(2.0, "bilateral")))]
     assert [s.status for s in solutions] == ["solved"] * 2
     one, two = (s.certificate.efficiency_at_zero_delta for s in solutions)
     assert one == pytest.approx(0.287, abs=2e-3)
