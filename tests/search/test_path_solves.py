@@ -13,7 +13,7 @@ from colloc.gaits.problem import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.optimise import best_gait, maximise_efficiency
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {
@@ -135,18 +135,15 @@ def test_a_free_path_far_beyond_the_paper(solved):
 
 @pytest.mark.slow
 def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
-    """The far pair binds at the first level; refined to 1e-4, the solve wanders (docs/gait_classes.md), so the mesh is given.
-
-    Of 15 such solves, from three ellipses on five meshes, 14 converge.
-    """
+    """The far pair binds at the first level. From this guess alone the search ends at 0.463; of eight starts the best has 0.551."""
     guess = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
     problem = Problem(
         "four", guess, FOUR["body"], gait=FreePath(2.0, "bilateral"), intervals=50, delta=1e-3, mesh_tolerance=0.0
     )
-    solution = maximise_efficiency(problem)
+    solution = best_gait(problem, 8)
     assert solution.last.optimal
     certificate = solution.certificate
-    assert certificate.efficiency > 0.52
+    assert certificate.efficiency > 0.54
     # at this delta the certificate asks for less; what concerns the motion itself holds
     checks = {check.name: check for check in certificate.checks}
     assert checks["self-contact"].passed
