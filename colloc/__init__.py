@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from colloc.results.certificate import certify
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
-    from colloc.search.optimise import maximise_efficiency
     from colloc.studies.calls import Starts, multistart, solve, sweep
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
@@ -53,7 +52,6 @@ _HOME = {
     "gaits.paths": ("ArcPath", "Corners"),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
-    "search.optimise": ("maximise_efficiency",),
     "results.solution": ("Solution",),
     "results.store": ("load", "save"),
     "results.certificate": ("certify",),
@@ -86,7 +84,6 @@ __all__ = [
     "ellipse",
     "load",
     "load_problem",
-    "maximise_efficiency",
     "multistart",
     "replay",
     "save",
