@@ -1,7 +1,8 @@
 """Solve every problem file for the gallery of the documentation: python -m scripts.gallery [NAME ...]
 
-Writes results/curated/gallery.json (numbers), results/curated/gallery/NAME.png (a picture each) and results/curated/gallery.png (all
-of them). The test tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own REFERENCE.
+Writes results/curated/gallery.json (numbers), results/curated/gallery/NAME.png (a picture each) and results/curated/gallery.png
+(all of them). The test tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own
+REFERENCE.
 """
 
 from __future__ import annotations
