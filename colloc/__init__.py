@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
+    from colloc.smooth.modal_body import ModalBody
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
     from colloc.verification.replay import replay
 
@@ -47,6 +48,7 @@ __all__ = [
     "FreePath",
     "Friction",
     "Harmonic",
+    "ModalBody",
     "NotConvergedError",
     "Polygon",
     "Problem",
@@ -71,6 +73,7 @@ _HOME = {
     "gaits.harmonic": ("Fourier", "Harmonic", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
     "gaits.paths": ("ArcPath", "Corners"),
+    "smooth.modal_body": ("ModalBody",),
     "search.optimise": ("maximise_efficiency",),
     "gaits.problem": ("Problem", "Reference"),
     "verification.replay": ("replay",),

@@ -125,7 +125,7 @@ def _search_lines(solution: Solution) -> list[str]:
 
 
 def _gait_lines(solution: Solution) -> list[str]:
-    gait = solution.gait
+    gait, coordinate = solution.gait, solution.problem.body.coordinate
     lines = [f"class: {solution.problem.gait.describe()}"]
     if isinstance(gait, Fourier):
         for j in range(gait.n_joint):
@@ -133,7 +133,7 @@ def _gait_lines(solution: Solution) -> list[str]:
             for k in range(gait.n_harmonic):
                 wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
                 terms.append(f"{gait.cos[j, k]:+.4f} cos {wave} {gait.sin[j, k]:+.4f} sin {wave}")
-            lines.append(f"joint {j + 1}: " + " ".join(terms))
+            lines.append(f"{coordinate} {j + 1}: " + " ".join(terms))
         return lines
     what = f"path of length {gait.length:.4f} rad"
     if isinstance(gait, ArcPath):

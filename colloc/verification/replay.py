@@ -15,9 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
-from colloc.mechanics.chain_motion import chain_motion
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 
@@ -103,15 +101,14 @@ class _Panels(NamedTuple):
 
 
 def _evaluated(
-    body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None
+    body: Body, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None
 ) -> tuple[np.ndarray, ...]:
     """The last six of `_Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``."""
     angles, rates = path(t.ravel())
-    solved = solve_balance(body, friction, angles, rates, delta, start=near).require()
-    motion = chain_motion(body, friction, angles, rates, delta, solved)
-    (x, y), (gx, gy) = body.joints(angles), body.centre(body.posture(angles))
+    motion, residual = body.replayed(friction, angles, rates, delta, near)
+    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, solved.residual, lever)
+    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, residual, lever)
     return motion.z.T.reshape(*t.shape, 3), *(value.reshape(t.shape) for value in values)
 
 
@@ -136,7 +133,7 @@ def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarr
 
 
 def replay(
-    body: Chain,
+    body: Body,
     friction: Friction,
     path: Path,
     delta: float,
