@@ -28,7 +28,7 @@ from colloc.system.errors import CollocError, StoreError
 from colloc.system.sealed_file import MAGIC, SEAL_SIZE, check_seal, write_sealed
 from colloc.system.store_file import LARGEST_FILE, array, attribute, mark, new_file, sealed_file
 
-QUICK, SLOW, RESEALED = 600, 6000, 1000
+QUICK, SLOW, RESEALED = 600, 6000, 999
 
 
 @pytest.fixture(scope="module")

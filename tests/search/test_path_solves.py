@@ -7,13 +7,13 @@ import pytest
 from colloc import Chain, Corners, Fourier, FreePath, Friction, Polygon, Problem, ellipse, load, save
 from colloc.bounds.infinitesimal import small_gait
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import path_length
 from colloc.mechanics.bodies import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
-from colloc.search.class_transfer import continue_classes
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.optimise import best_gait, maximise_efficiency
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {
@@ -98,7 +98,8 @@ def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
 
 def test_more_curvature_allows_more_and_each_bound_is_kept(tmp_path):
     first = Problem("p", ellipse(0, 2.8, 1.3), gait=FreePath(1.0, "bilateral"), intervals=30, mesh_tolerance=1e-4, delta=1e-3)
-    solutions = continue_classes(first, [FreePath(2.0, "bilateral")])
+    one = maximise_efficiency(first)
+    solutions = [one, maximise_efficiency(prolonged(first, one.gait, FreePath(2.0, "bilateral")))]
     assert [s.status for s in solutions] == ["solved"] * 2
     one, two = (s.certificate.efficiency_at_zero_delta for s in solutions)
     assert one == pytest.approx(0.287, abs=2e-3)
@@ -134,18 +135,15 @@ def test_a_free_path_far_beyond_the_paper(solved):
 
 @pytest.mark.slow
 def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
-    """The far pair binds at the first level; refined to 1e-4, the solve wanders (docs/gait_classes.md), so the mesh is given.
-
-    Of 15 such solves, from three ellipses on five meshes, 14 converge.
-    """
+    """The far pair binds at the first level. From this guess alone the search ends at 0.463; of eight starts the best has 0.551."""
     guess = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
     problem = Problem(
         "four", guess, FOUR["body"], gait=FreePath(2.0, "bilateral"), intervals=50, delta=1e-3, mesh_tolerance=0.0
     )
-    solution = maximise_efficiency(problem)
+    solution = best_gait(problem, 8)
     assert solution.last.optimal
     certificate = solution.certificate
-    assert certificate.efficiency > 0.52
+    assert certificate.efficiency > 0.54
     # at this delta the certificate asks for less; what concerns the motion itself holds
     checks = {check.name: check for check in certificate.checks}
     assert checks["self-contact"].passed
