@@ -100,6 +100,7 @@ def main() -> int:
         page = f"file://{folder / 'mine.html'}#t=1.4"
         screens = {
             "report": Screen(page, (1120, 4400), 900),
+            "screens/report_top": Screen(page, (1120, 1120), 900),
             "screens/report_phone": Screen(page, (400, 9000), 400),
             "screens/report_dark": Screen(page, (1120, 4400), 900, (_DARK,)),
             "screens/readme": Screen(f"file://{folder / 'readme.html'}", (1000, 4200), 800),
