@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from colloc.results.certificate import certify
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
+    from colloc.search.optimise import maximise_efficiency
     from colloc.studies.calls import Starts, multistart, solve, sweep
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
@@ -50,6 +51,7 @@ _HOME = {
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
     "gaits.paths": ("ArcPath", "Corners"),
+    "search.optimise": ("maximise_efficiency",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
     "results.solution": ("Solution",),
@@ -84,6 +86,7 @@ __all__ = [
     "ellipse",
     "load",
     "load_problem",
+    "maximise_efficiency",
     "multistart",
     "replay",
     "save",
