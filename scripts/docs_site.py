@@ -3,7 +3,7 @@
 - Pages that `ORDER` does not name are appended under "Measurements and notes", so a new file in docs/ needs no other change.
 - Generated: the gallery (problems/ with results/curated/gallery.json), the commands (their own --help), the API.
 - Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
-- Links to files of the repository outside docs/ become their names; pictures of results/curated are copied.
+- Links to files of the repository outside docs/ become their names; pictures and tables of results/curated are copied.
 
 `python -m scripts.docs_site PAGE` prints a generated page, to read without building the site.
 """
@@ -40,6 +40,7 @@ ORDER = (
     ("Reference", ("commands.md", "api.md", "modules.md", "architecture.md", "changelog.md", "cite.md")),
 )
 PICTURES = (".png", ".gif")
+KEPT = (*PICTURES, ".md")
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _MATH_INLINE = re.compile(r"\$`([^`\n]+)`\$")
 _OUTSIDE = re.compile(r"(!?)\[([^\]]*)\]\(((?:\.\./)+)([^)#\s]+)(#[^)]*)?\)")
@@ -58,13 +59,13 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the generated pages and the curated pictures."""
+    """Add the generated pages, and the curated pictures and tables."""
     for name, make in GENERATED.items():
         files.append(File.generated(config, name, content=make()))
     curated = ROOT / "results/curated"
-    for picture in sorted(path for path in curated.rglob("*") if path.suffix in PICTURES):
-        name = f"curated/{picture.relative_to(curated).as_posix()}"
-        files.append(File.generated(config, name, content=picture.read_bytes()))
+    for path in sorted(path for path in curated.rglob("*") if path.suffix in KEPT):
+        name = f"curated/{path.relative_to(curated).as_posix()}"
+        files.append(File.generated(config, name, content=path.read_bytes() if path.suffix in PICTURES else path.read_text()))
     return files
 
 
@@ -86,11 +87,11 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
 
 def outside(match: re.Match[str], depth: int) -> str:
-    """A link to a file outside docs/: pictures of results/curated stay, others become the file's name."""
+    """A link to a file outside docs/: pictures and tables of results/curated stay, others become the file's name."""
     picture, text, up, target = match[1], match[2], match[3], match[4]
     if up.count("../") <= depth:
         return match[0]
-    if target.startswith("results/curated/") and target.endswith(PICTURES):
+    if target.startswith("results/curated/") and target.endswith(KEPT):
         return f"{picture}[{text}]({'../' * depth}curated/{target.removeprefix('results/curated/')})"
     return f"`{target}`" if text.strip("`") in (target, Path(target).name) else f"{text} (`{target}`)"
 

@@ -72,8 +72,11 @@ def photograph(browser: str, screen: Screen, target: Path, folder: Path) -> None
     subprocess.run([*command, screen.page], check=True, capture_output=True)
     image = Image.open(shot).convert("RGB")
     pixels = np.asarray(image)
+    pixels = pixels[
+        : np.flatnonzero(pixels.any(axis=(1, 2)))[-1] + 1
+    ]  # a window may be shorter than it says, the rest is black
     used = np.flatnonzero((pixels != pixels[-1, 0]).any(axis=(1, 2)))[-1] + 20
-    image = image.crop((0, 0, image.width, int(used)))
+    image = image.crop((0, 0, image.width, min(int(used), len(pixels))))
     image = image.resize((screen.width, round(image.height * screen.width / image.width)), Image.Resampling.LANCZOS)
     target.parent.mkdir(exist_ok=True)
     image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)

@@ -136,7 +136,7 @@ def _search(solution: Solution) -> str:
         return "local optimum, from one start"
     best, *others = solution.others
     met = ", ".join(f"{other.efficiency:.4f} ({other.starts})" for other in others[:_MOST_OTHERS])
-    also = f"; also met, with the number of starts: {met}" if met else ""
+    also = f"; also met on a first mesh (starts): {met}" if met else ""
     return f"local optimum, best of {solution.starts} starts, of which {best.starts} led here{also}"
 
 
