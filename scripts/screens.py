@@ -98,21 +98,20 @@ def main() -> int:
         report([str(folder / "mine.h5"), "--quiet"])
         body = markdown.markdown((ROOT / "README.md").read_text(encoding="utf-8"), extensions=["tables", "fenced_code"])
         (folder / "readme.html").write_text(_HOST.format(base=f"file://{ROOT}/", body=body), encoding="utf-8")
-        site = folder / "site"
-        subprocess.run([sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", site], check=True, cwd=ROOT)
-        page = f"file://{folder / 'mine.html'}#t=1.4"
-        screens = {
+        page, site = f"file://{folder / 'mine.html'}#t=1.4", folder / "site"
+        for target, screen in {
             "report": Screen(page, (1120, 4400), 900),
             "screens/report_top": Screen(page, (1120, 1120), 900),
             "screens/report_phone": Screen(page, (400, 9000), 400),
             "screens/report_dark": Screen(page, (1120, 4400), 900, (_DARK,)),
             "screens/readme": Screen(f"file://{folder / 'readme.html'}", (1000, 4200), 800),
-            "screens/home": Screen(f"file://{site / 'index.html'}", (1280, 2400), 900),
-            "screens/gallery": Screen(f"file://{site / 'gallery.html'}", (1280, 2400), 900),
-            "screens/known": Screen(f"file://{site / 'known.html'}", (1280, 3200), 900),
-        }
-        for target, screen in screens.items():
+        }.items():
             photograph(browser, screen, TARGET / f"{target}.png", folder)
+        # with the pictures just made
+        subprocess.run([sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", site], check=True, cwd=ROOT)
+        for name, height in (("index", 2400), ("gallery", 2400), ("known", 3200)):
+            screen = Screen(f"file://{site / name}.html", (1280, height), 900)
+            photograph(browser, screen, TARGET / f"screens/{name.replace('index', 'home')}.png", folder)
     return 0
 
 

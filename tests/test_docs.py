@@ -5,6 +5,7 @@ import contextlib
 import importlib
 import io
 import json
+import pkgutil
 import re
 from pathlib import Path
 
@@ -54,6 +55,16 @@ def test_python_in_the_pages_parses_and_imports_what_exists(page):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("colloc"):
                 module = importlib.import_module(node.module)
                 assert all(hasattr(module, alias.name) for alias in node.names), (page.name, node.module)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_files_and_names_in_the_pages_exist(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    for path in re.findall(r"`((?:colloc|tests|scripts|benchmarks|problems|studies|results/curated)/[\w/.]+\w)`", text):
+        assert (ROOT / path).exists() or path == "studies/X.py", (page.name, path)
+    for dotted in re.findall(r"`(colloc(?:\.\w+){2,})(?:\([^`]*\))?`", text):
+        found = pkgutil.resolve_name(dotted)
+        assert found is not None, (page.name, dotted)
 
 
 def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys):
