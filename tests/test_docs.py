@@ -84,6 +84,21 @@ def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys)
     assert said == quoted
 
 
+def test_the_summary_quoted_in_the_tutorial_is_what_a_solve_says(three_link):
+    """Words to the letter and numbers to three digits, but for times, roundings and counts of the search."""
+    from colloc.commands.solve import summary_lines
+
+    quoted = next(block for block in blocks(ROOT / "docs/tutorial.md", "text") if "by independent replay" in block)
+    said = summary_lines(three_link, None)
+    lines = [line.rstrip() for line in quoted.splitlines() if line.split()[0] in ("efficiency", "distance", "gait")]
+    assert len(lines) == 5
+    wordless = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e-?\d+)?")
+    for line in lines:
+        same = next(other for other in said if wordless.sub("", other) == wordless.sub("", line))
+        for mine, theirs in zip(numbers(line), numbers(same), strict=True):
+            assert mine == pytest.approx(theirs, rel=1e-3, abs=1e-3)
+
+
 def test_messages_quoted_in_troubleshooting_are_the_programs_own():
     text = (ROOT / "docs/troubleshooting.md").read_text(encoding="utf-8")
     quoted = [part for part in re.findall(r"`([^`\n]+)`", text) if len(part) > 17 and " " in part and part[0] != "-"]
