@@ -4,9 +4,9 @@ At a shape q a small gait spends times w_i in directions r_i of the joint rates,
 sum w_i omega_i = 0 (so does the rotation). Dry friction is homogeneous of degree 1 but not linear, so such a gait moves in
 first order of its size: d/W = sum w_i e.v_i / sum w_i P_i, a linear program (`bounds.infinitesimal`, docs/bound.md section 4).
 
-`PROBLEM` starts collocation from the best of them: the triangle about (c, -c), whose efficiency tends to 2/5 as it shrinks,
-here of finite size and with three harmonics (0.348 at delta = 1e-3; smaller delta lets the loop shrink further, and takes
-longer). `python -m scripts.infinitesimal_map` draws the map.
+`PROBLEM` gives a search with three harmonics the best of them as its guess: the triangle about (c, -c), whose efficiency tends
+to 2/5 as it shrinks. The best of its starts is another gait, a large loop of efficiency 0.394: with three harmonics a small
+triangle is too blunt to win. `python -m scripts.infinitesimal_map` draws the map.
 """
 
 import numpy as np

@@ -20,9 +20,12 @@ COMMANDS = {
     "benchmarks/*.png": "python -m benchmarks",
 }
 KEPT = {
-    "report.png": "python -m scripts.report_screenshot",
+    "report.png": "python -m scripts.screens",
     "gallery.json": "python -m scripts.gallery",
     "gallery": "python -m scripts.gallery",
+    "gallery.png": "python -m scripts.gallery",
+    "side_by_side.gif": "python -m scripts.side_by_side",
+    "screens": "python -m scripts.screens",
     "mesh_tolerance.md": "python -m benchmarks.work_precision",
     "gait_classes.md": "python -m scripts.class_table",
     "gait_classes_4.md": "python -m scripts.class_table --links 4",

@@ -1,9 +1,9 @@
 """Hooks of the documentation (mkdocs.yml): the order of pages, generated pages, formulas, links out of docs/.
 
-- Pages that `ORDER` does not name are appended under "Further reading", so a new file in docs/ needs no other change.
+- Pages that `ORDER` does not name are appended under "Measurements and notes", so a new file in docs/ needs no other change.
 - Generated: the gallery (problems/ with results/curated/gallery.json), the commands (their own --help), the API.
 - Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
-- Links to files of the repository outside docs/ become their names; pictures of results/curated are copied.
+- Links to files of the repository outside docs/ become their names; pictures and tables of results/curated are copied.
 
 `python -m scripts.docs_site PAGE` prints a generated page, to read without building the site.
 """
@@ -27,11 +27,20 @@ from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (
-    ("Start", ("index.md", "tutorial.md", "gallery.md", "troubleshooting.md")),
-    ("How to", ("howto/report.md", "howto/robot.md", "howto/scripts.md", "howto/starts.md", "howto/check.md")),
-    ("Theory", ("theory.md", "bound.md", "gait_classes.md", "bodies.md")),
-    ("Reference", ("commands.md", "api.md", "modules.md", "cite.md")),
+    ("Start", ("index.md", "tutorial.md", "gallery.md", "known.md", "limits.md", "troubleshooting.md")),
+    (
+        "How to",
+        (
+            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "check", "starts")),
+            "studies.md",
+            "howto/paper.md",
+        ),
+    ),
+    ("Theory", ("theory.md", "convergence.md", "gait_classes.md", "bound.md", "bodies.md", "smooth_bodies.md")),
+    ("Reference", ("commands.md", "api.md", "modules.md", "architecture.md", "changelog.md", "cite.md")),
 )
+PICTURES = (".png", ".gif")
+KEPT = (*PICTURES, ".md")
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _MATH_INLINE = re.compile(r"\$`([^`\n]+)`\$")
 _OUTSIDE = re.compile(r"(!?)\[([^\]]*)\]\(((?:\.\./)+)([^)#\s]+)(#[^)]*)?\)")
@@ -44,18 +53,19 @@ def on_config(config: Any) -> Any:
     nav: list[Any] = [{title: [page for page in pages if page in present]} for title, pages in ORDER]
     rest = sorted(present - named)
     if rest:
-        nav.insert(3, {"Further reading": rest})
+        nav.append({"Measurements and notes": rest})
     config["nav"] = nav
     return config
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the generated pages and the curated pictures."""
+    """Add the generated pages, and the curated pictures and tables."""
     for name, make in GENERATED.items():
         files.append(File.generated(config, name, content=make()))
-    for picture in sorted((ROOT / "results/curated").rglob("*.png")):
-        name = f"curated/{picture.relative_to(ROOT / 'results/curated').as_posix()}"
-        files.append(File.generated(config, name, content=picture.read_bytes()))
+    curated = ROOT / "results/curated"
+    for path in sorted(path for path in curated.rglob("*") if path.suffix in KEPT):
+        name = f"curated/{path.relative_to(curated).as_posix()}"
+        files.append(File.generated(config, name, content=path.read_bytes() if path.suffix in PICTURES else path.read_text()))
     return files
 
 
@@ -77,11 +87,11 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
 
 def outside(match: re.Match[str], depth: int) -> str:
-    """A link to a file outside docs/: pictures of results/curated stay, others become the file's name."""
+    """A link to a file outside docs/: pictures and tables of results/curated stay, others become the file's name."""
     picture, text, up, target = match[1], match[2], match[3], match[4]
     if up.count("../") <= depth:
         return match[0]
-    if target.startswith("results/curated/") and target.endswith(".png"):
+    if target.startswith("results/curated/") and target.endswith(KEPT):
         return f"{picture}[{text}]({'../' * depth}curated/{target.removeprefix('results/curated/')})"
     return f"`{target}`" if text.strip("`") in (target, Path(target).name) else f"{text} (`{target}`)"
 
@@ -92,36 +102,41 @@ def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
 
 
 def gallery_page() -> str:
-    """One section a problem file: picture, numbers, docstring, source."""
+    """All pictures at a glance, then a section a problem file: its story, picture, numbers and source."""
     table = json.loads((ROOT / "results/curated/gallery.json").read_text())
+    files = sorted((ROOT / "problems").glob("[!_]*.py"))
+    shown = [path.stem for path in files if (ROOT / f"results/curated/gallery/{path.stem}.png").exists()]
+    cards = "\n".join(f"[![{name}](curated/gallery/{name}.png){{ width=49% }}](#{name})" for name in shown)
     parts = [
         "# Gallery",
         "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest tests/commands/test_gallery.py` solves them "
-        "again and holds them against these numbers.",
+        "again and holds them against these numbers. Choose a picture for its story.",
+        cards,
     ]
-    for path in sorted((ROOT / "problems").glob("[!_]*.py")):
+    for path in files:
         source = path.read_text(encoding="utf-8")
         title, _, rest = (ast.get_docstring(ast.parse(source)) or path.stem).partition("\n")
-        parts.append(f"## {path.stem}\n\n{title}")
-        if (ROOT / f"results/curated/gallery/{path.stem}.png").exists():
+        parts.append(f"## {path.stem} {{ #{path.stem} }}\n\n**{title}**")
+        if path.stem in shown:
             parts.append(f"![{path.stem}](curated/gallery/{path.stem}.png)")
         row = table.get(path.stem)
         if row and "efficiency" in row:
-            numbers = f"Efficiency **{row['efficiency']:.6f}** ± {row['error']:.0e}, d = {row['distance']:.5f}"
             parts.append(
-                f"{numbers}, W = {row['work']:.5f} at δ = {row['delta']:.0e}; {row['status']}, "
-                f"{row['cpu_seconds']:g} s of processor time."
+                f"Efficiency **{row['efficiency']:.6f}** ± {row['error']:.0e}: d = {row['distance']:.5f} for "
+                f"W = {row['work']:.5f} at δ = {row['delta']:.0e}; {row['status']}, {row['cpu_seconds']:g} s of processor time."
             )
+        if rest.strip():
+            parts.append(rest.strip("\n"))
         if "from colloc import" in source and "Problem(" in source:
             parts.append(f"```sh\ncolloc solve problems/{path.name}\n```")
         quoted = "\n".join(f"    {line}" for line in source.splitlines())
-        body = f"    ```text\n{_indented(rest.strip())}\n    ```\n\n" if rest.strip() else ""
-        parts.append(f'??? note "source and notes"\n\n{body}    ```python\n{quoted}\n    ```')
+        parts.append(f'??? note "source"\n\n    ```python\n{quoted}\n    ```')
     return "\n\n".join(parts) + "\n"
 
 
-def _indented(text: str) -> str:
-    return "\n".join(f"    {line}" for line in text.splitlines())
+def changelog_page() -> str:
+    """CHANGELOG.md, its links as from docs/."""
+    return (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace("](docs/", "](")
 
 
 def commands_page() -> str:
@@ -163,7 +178,13 @@ def modules_page() -> str:
     return "# Modules\n\n" + text + "\n\n" + "\n".join(rows) + "\n"
 
 
-GENERATED = {"gallery.md": gallery_page, "commands.md": commands_page, "api.md": api_page, "modules.md": modules_page}
+GENERATED = {
+    "gallery.md": gallery_page,
+    "commands.md": commands_page,
+    "api.md": api_page,
+    "modules.md": modules_page,
+    "changelog.md": changelog_page,
+}
 
 
 def main() -> None:

@@ -1,8 +1,7 @@
 """Solve every problem file for the gallery of the documentation: python -m scripts.gallery [NAME ...]
 
-Writes results/curated/gallery.json (numbers), results/curated/gallery/NAME.png (a picture each) and results/curated/gallery.png
-(all of them). The test tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own
-REFERENCE.
+Writes results/curated/gallery.json (numbers), gallery/NAME.png beside it (a picture each) and gallery.png (all of them).
+The test tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own REFERENCE.
 """
 
 from __future__ import annotations
@@ -34,9 +33,9 @@ from scripts.models.smooth_record import snapshots
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
 SHEET = ROOT / "results/curated/gallery.png"
-_SIZE, _RESOLUTION, _COLOURS = (9.0, 3.7), 110, 64
+_SIZE, _LOW, _RESOLUTION, _COLOURS = (9.0, 3.7), 2.0, 110, 256
 _COLUMNS, _THUMBNAIL = 2, 620
-_FLAT, _TALLEST = 0.15, 20.0
+_FLAT, _TALLEST = 0.25, 20.0
 """A body that is flatter than this part of its width is drawn higher, at most so many times."""
 
 
@@ -107,7 +106,7 @@ def solved_row(solution: Solution) -> dict[str, Any]:
 def _picture(example: Example, solution: Solution | None) -> None:
     PICTURES.mkdir(parents=True, exist_ok=True)
     with styled():
-        figure = Figure(figsize=_SIZE)
+        figure = Figure(figsize=_SIZE if solution is not None else (_SIZE[0], _LOW))
         if solution is not None:
             grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
             draw_filmstrip(figure.add_subplot(grid[0, 0]), solution, count=9)
@@ -125,7 +124,7 @@ def _picture(example: Example, solution: Solution | None) -> None:
 
 
 def _quantised(image: Image.Image) -> Image.Image:
-    return image.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    return image.convert("RGB").quantize(_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
 
 
 def _sheet() -> None:

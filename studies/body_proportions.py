@@ -5,8 +5,7 @@
 
 import numpy as np
 
-from colloc import Chain, Friction, Harmonic, Problem, ellipse
-from colloc.studies.study import Axis, Study
+from colloc import Axis, Chain, Friction, Harmonic, Problem, Study, ellipse
 
 LAWS = {"isotropic": Friction(1, 1, 1), "backward 3": Friction(1, 1, 3), "transverse 10": Friction(10, 1, 1)}
 

@@ -7,8 +7,7 @@ are given relative to mu_f = 1; exchanging head and tail exchanges mu_f and mu_b
 
 import numpy as np
 
-from colloc import Friction, Harmonic, Problem, ellipse
-from colloc.studies.study import Axis, Study
+from colloc import Axis, Friction, Harmonic, Problem, Study, ellipse
 
 
 def problem(mu_t, mu_b, symmetry):

@@ -5,8 +5,7 @@ Starts travel from wide limits to narrow ones: a gait that fits is kept, one tha
 
 import numpy as np
 
-from colloc import Harmonic, Problem, ellipse
-from colloc.studies.study import Axis, Study
+from colloc import Axis, Harmonic, Problem, Study, ellipse
 
 
 def problem(symmetry, joint_limit):

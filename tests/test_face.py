@@ -55,9 +55,11 @@ def test_the_module_behind_python_m_is_also_the_function():
         (lambda: colloc.Harmonic(harmonic=2), "did you mean harmonics"),
         (lambda: colloc.Problem("x").with_(intervalls=3), "did you mean intervals"),
         (lambda: colloc.FreePath(colour=1), "it takes curvature, symmetry, winding"),
+        (lambda: colloc.solve(5), "problem must be a Problem or the path of a problem file, not int"),
+        (lambda: colloc.solve(colloc.Problem("x"), starts=0), "starts must be at least 1"),
     ],
 )
-def test_a_misspelt_argument_is_named_with_the_right_one(made, said):
+def test_a_wrong_argument_is_named_with_what_is_right(made, said):
     with pytest.raises(colloc.ProblemError, match=said):
         made()
 

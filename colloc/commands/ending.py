@@ -40,9 +40,12 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
     try:
         with interruptible(polled=False), _notes():
             try:
-                return command()
+                code = command()
             finally:
                 sys.stdout.flush()
+        if code == INTERRUPTED:
+            _end_workers()
+        return code
     except CollocError as error:
         return _ended(BAD_PROBLEM, "error", str(error), as_json)
     except BrokenPipeError:
@@ -54,7 +57,15 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
             _leave_output()
         return _ended(BAD_PROBLEM, "error", f"cannot read or write {where}: {error.strerror or error}.", as_json)
     except KeyboardInterrupt as stop:
+        _end_workers()
         return _ended(INTERRUPTED, "interrupted", f"interrupted; {str(stop) or 'nothing was written.'}", as_json)
+
+
+def _end_workers() -> None:
+    """End processes of this one that are still at work; what they were at is not kept, and Python would wait for them."""
+    if "multiprocessing" in sys.modules:
+        for child in sys.modules["multiprocessing"].active_children():
+            child.terminate()
 
 
 def _ended(code: int, status: str, message: str, as_json: bool) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import sys
 from collections.abc import Sequence
@@ -61,6 +60,8 @@ def _command(words: list[str]) -> int:
         print(", ".join(f"{name} {version}" for name, version in versions().items()))
         return OK
     if words[0] not in SUBCOMMANDS:
+        import difflib
+
         near = difflib.get_close_matches(words[0], SUBCOMMANDS, n=1)
         if words[0].endswith(".py"):
             near = [f"solve {words[0]}"]

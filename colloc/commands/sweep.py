@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import sys
 import time
@@ -137,8 +136,6 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
                 save()
                 due = time.perf_counter() + max(_SAVE_EVERY, 20 * (time.perf_counter() - saving))
     except KeyboardInterrupt:
-        for child in multiprocessing.active_children():
-            child.terminate()
         return True
     except BrokenExecutor as error:
         raise StoreError(f"no worker could be started ({error}); what is done is kept.") from None

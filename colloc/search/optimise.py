@@ -97,6 +97,13 @@ def maximise_efficiency(
     -------
     Solution
         With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> colloc.maximise_efficiency(problem).status
+    'solved'
     """
     begin = time.perf_counter()
     solution = literal_optimum(problem, on_level) if literal else optimum(problem, on_level, before)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc.gaits.problem import Problem
-from colloc.gaits.problem_file import read_problem_file
+from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.sampling import LATIN_HYPERCUBE
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, Outcome, basins, counts
@@ -24,7 +24,7 @@ from colloc.studies.campaign import run_starts
 from colloc.studies.run import Progress, StudyRun
 from colloc.studies.study import Study, read_study_file
 from colloc.studies.table import StudyTable, cell_text, study_table
-from colloc.system.errors import NotConvergedError
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.task_pool import pool_for
 
 Stated = Problem | str | os.PathLike[str]
@@ -72,13 +72,20 @@ def solve(
     >>> solution.success, round(solution.efficiency, 2)
     (True, 0.26)
     """
-    source = ""
-    if not isinstance(problem, Problem):
-        stated = read_problem_file(problem)
-        problem, starts, source = stated.problem, starts or stated.starts, stated.source
-    solution = best_gait(problem, starts or STARTS, _told(verbose, progress), seconds)
-    solution.source = source
+    stated = _stated(problem)
+    if starts is not None and starts < 1:
+        raise ProblemError(f"starts must be at least 1, not {starts}.")
+    solution = best_gait(stated.problem, starts or stated.starts or STARTS, _told(verbose, progress), seconds)
+    solution.source = stated.source
     return solution
+
+
+def _stated(problem: Stated) -> ProblemFile:
+    if isinstance(problem, Problem):
+        return ProblemFile(problem, None, "")
+    if not isinstance(problem, (str, os.PathLike)):
+        raise ProblemError(f"problem must be a Problem or the path of a problem file, not {type(problem).__name__}.")
+    return read_problem_file(problem)
 
 
 def _told(verbose: bool, progress: Callable[..., object] | None) -> Callable[..., None]:
@@ -183,7 +190,7 @@ def multistart(
     >>> found.optima[0].best.efficiency > 0.2
     True
     """
-    problem = problem if isinstance(problem, Problem) else read_problem_file(problem).problem
+    problem = _stated(problem).problem
     told = _told(verbose, progress)
     kept = None if archive is None else open_archive(problem, archive)
     done = {} if kept is None else kept.of_search(sampler, seed)

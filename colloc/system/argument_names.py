@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 from typing import Any, TypeVar
 
@@ -29,6 +28,8 @@ def named_arguments(cls: type[T]) -> type[T]:
     def checked(self: T, *given: Any, **named: Any) -> None:
         for name in named:
             if name not in known:
+                import difflib
+
                 near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
                 hint = f"did you mean {_either(near)}?" if near else f"it takes {', '.join(known)}."
                 raise ProblemError(f"{cls.__name__} has no argument {name!r}; {hint}")

@@ -2,10 +2,12 @@
 
 import io
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import time
 
 import h5py
 import pytest
@@ -273,3 +275,32 @@ def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
 def test_a_command_imports_nothing_heavy_before_it_can_end_well():
     code = "import sys, colloc.commands.main; print(any(name in sys.modules for name in ('numpy', 'scipy', 'casadi', 'h5py')))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["report", "RESULT"],
+        ["animate", "RESULT", "--periods", "1", "--seconds", "0.3", "--fps", "10", "--width", "200"],
+        ["export", "RESULT", "--period", "4"],
+        ["compare", "RESULT", "RESULT"],
+        ["verify", "RESULT"],
+    ],
+)
+def test_json_is_one_object_on_standard_output(words, result, capsys):
+    assert colloc([str(result) if word == "RESULT" else word for word in words] + ["--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert words[0] not in ("report", "animate") or os.path.getsize(said["file"]) == said["bytes"]
+
+
+def test_an_interrupted_command_leaves_no_workers_behind():
+    """Python would wait for them at its end, as long as what they are at takes."""
+    working = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(600,))
+
+    def interrupted():
+        working.start()
+        raise KeyboardInterrupt("one start is kept.")
+
+    assert exit_code(interrupted) == 130
+    working.join(timeout=30)
+    assert working.exitcode is not None

@@ -229,7 +229,7 @@ def test_xarray_opens_an_archive_with_named_dimensions(tmp_path):
 
 
 def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
-    def solve(stated, watch):
+    def solve(stated, watch, **how):
         solve.calls += 1
         if solve.calls == 2:
             raise ZeroDivisionError("one bad start")
