@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -12,6 +12,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     SMOOTHING,
+    Pairs,
     crossing_sums,
     intrusions,
     share_of_first,
@@ -20,7 +21,8 @@ from colloc.mechanics.contact import (
 )
 
 
-class ShapeCheck(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class ShapeCheck:
     """A scalar function of the joint angles that admissibility bounds from above (joint angles also from below).
 
     value: of the angles. share: of the angles, the weight of the first of two sums of which the function is the minimum,
@@ -41,7 +43,8 @@ class ShapeCheck(NamedTuple):
         return self.joint >= 0
 
 
-def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[ShapeCheck]:
+@lru_cache(maxsize=64)
+def shape_checks(body: Chain, far: Pairs = ()) -> list[ShapeCheck]:
     """Functions of the joint angles that admissibility bounds.
 
     Each joint angle, to be kept within its limits; then functions that must not be positive: for all links two apart, and
