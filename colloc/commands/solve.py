@@ -89,8 +89,8 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
             f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} +- "
             f"{certificate.error_at_zero_delta:.0e} for delta -> 0",
-            f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}      "
-            f"at delta {solution.last.delta:.0e}",
+            f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
+            f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  search          {text}" for text in _search_lines(solution)]
         gait = [f"class: {solution.problem.gait.describe()}", *solution.gait.lines()]
@@ -159,6 +159,8 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
             "efficiency_error": certificate.efficiency_error,
             "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
             "error_at_zero_delta": certificate.error_at_zero_delta,
+            "distance_error": certificate.distance_error,
+            "work_error": certificate.work_error,
             "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
         }
     if reference is not None:

@@ -8,6 +8,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.mechanics.balance import net_force
 from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.mechanics.friction import Friction
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import extrapolated_limit
 from colloc.results.solution import Solution
@@ -19,6 +20,8 @@ CURVATURE = 1e-6
 """Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
 order; so the rotation is limited by what it changes there, to as much as collocation may be wrong by (GAP). DELTA is the
 paper's own claim (less than 1 % below delta = 1e-4)."""
+MOTIONS = DELTA
+"""Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
 _FINE_PHASES = 20000
 
@@ -76,17 +79,28 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     fine = replayed_at(1.0, None)
     at_tenth = replayed_at(0.1, fine)
     replays = fine, at_tenth, replayed_at(0.01, at_tenth)
-    errors = [replayed.efficiency * (replayed.error + replayed.turning) for replayed in replays]
+    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
     limit = extrapolated_limit([replayed.efficiency for replayed in replays], errors)
     checks = (
         *_optimality(solution),
         *_motion(solution, fine, path, tolerance),
+        _one_motion(problem.friction, fine),
         *_class(solution),
         *_mesh(solution),
         *_delta(fine, limit.value),
     )
-    measured = (fine.efficiency, fine.distance, fine.work, errors[0])
-    return Certificate(checks, *measured, limit.value, fine.instants, limit.error)
+    return Certificate(
+        checks,
+        fine.efficiency,
+        fine.distance,
+        fine.work,
+        errors[0],
+        limit.value,
+        fine.instants,
+        limit.error,
+        distance_error=fine.distance_error + fine.turning * fine.distance + fine.other_distance,
+        work_error=fine.work_error + fine.other_work,
+    )
 
 
 def _optimality(solution: Solution) -> list[Check]:
@@ -105,6 +119,7 @@ def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> l
     ends, _ = path(np.array([0.0, 1.0]))
     angles, _ = path(np.linspace(0.0, 1.0, _FINE_PHASES + 1))
     beyond = max(float(np.abs(angles).max()) - problem.joint_limit, 0.0)
+    gap = level.efficiency / fine.efficiency - 1
     depth = max(float(crossing_depth(problem.body, angles).max()), passing_depth(problem.body, angles))
     return [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
@@ -112,10 +127,26 @@ def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> l
         Check("net rotation", fine.turning, ROTATION, "over a period, times the body's reach over the distance"),
         Check("joint limits", beyond, ADMISSIBLE, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
-        Check("replay gap", level.efficiency / fine.efficiency - 1, GAP, "collocated over replayed efficiency, less 1"),
+        Check("replay gap", _beyond(gap, fine.ambiguity), GAP, "collocated over replayed efficiency, less 1"),
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
     ]
+
+
+def _beyond(value: float, unknown: float) -> float:
+    """The part of a difference that something of unknown sign does not explain."""
+    return float(np.copysign(max(abs(value) - unknown, 0.0), value))
+
+
+def _one_motion(friction: Friction, fine: Replay) -> Check:
+    """How far the efficiency depends on which of several balanced motions the body takes."""
+    if friction.isotropic:
+        meaning = "relative; equal coefficients leave one balanced motion"
+    elif fine.several == 0:
+        meaning = f"relative; no other balanced motion was found at {fine.instants} instants"
+    else:
+        meaning = f"relative; several motions are balanced at {fine.several:.2g} of the period"
+    return Check("one motion", fine.ambiguity, MOTIONS, meaning)
 
 
 _BESIDE = 1e-10
