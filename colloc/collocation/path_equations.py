@@ -8,8 +8,8 @@ body, from the NumPy solver, with derivatives by the implicit function theorem (
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -25,7 +25,8 @@ OMEGA, ADVANCE, POWER = range(3)
 """Outputs of `path_point`, per unit of phase."""
 
 
-class Piece(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Piece:
     """A point of a piece of the path as an expression: `shape` and `given` are its variables and instance parameters."""
 
     shape: ca.SX
@@ -35,6 +36,7 @@ class Piece(NamedTuple):
     speed: ca.SX
 
 
+@lru_cache(maxsize=32)
 def arc(n_joint: int) -> Piece:
     """A point of an arc.
 
@@ -54,6 +56,7 @@ def arc(n_joint: int) -> Piece:
     )
 
 
+@lru_cache(maxsize=32)
 def side(n_joint: int) -> Piece:
     """A point of a straight piece.
 
@@ -95,6 +98,7 @@ def full_path_point(body: Body, friction: Friction, kind: Callable[[int], Piece]
     return local_function("point", local, piece.given, delta, out)
 
 
+@lru_cache(maxsize=256)
 def chord(piece: Piece) -> LocalFunction:
     """Displacement along a whole arc."""
     n_joint = piece.angles.shape[0]
@@ -102,6 +106,7 @@ def chord(piece: Piece) -> LocalFunction:
     return local_function("chord", piece.shape, piece.given[1], ca.SX.sym("delta"), whole)
 
 
+@lru_cache(maxsize=256)
 def placed_check(check: ShapeCheck, piece: Piece) -> LocalFunction:
     """A shape check at a point of a piece; given are those of the piece and the share of the cut."""
     share = ca.SX.sym("share")

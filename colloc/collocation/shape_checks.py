@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
-from colloc.mechanics.bodies import Body, Contact
+from colloc.mechanics.bodies import Body, Contact, Pairs
 from colloc.mechanics.contact import share_of_first, smooth_minimum, tangent_of_minimum
 
 
-class ShapeCheck(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class ShapeCheck:
     """A scalar function of the shape that admissibility bounds from above (angles also from below).
 
     value: of the shape. share: of the shape, the weight of the first of two functions of which this is the minimum,
@@ -41,7 +42,8 @@ class ShapeCheck(NamedTuple):
         return np.maximum(values - upper, lower - values)
 
 
-def shape_checks(body: Body, far: Sequence[tuple[int, int]] = ()) -> list[ShapeCheck]:
+@lru_cache(maxsize=64)
+def shape_checks(body: Body, far: Pairs = ()) -> list[ShapeCheck]:
     """Functions of the shape that admissibility bounds.
 
     Angles to be kept within the limit of the problem; then functions that must not be positive: for parts that might cross,

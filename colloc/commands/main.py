@@ -10,6 +10,7 @@ from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
 from colloc.system.errors import ProblemError
 
 SUBCOMMANDS = {
+    "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
     "solve": ("solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
     "multistart": (
         "multistart",

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
 """Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
-_MOST_OTHERS = 4
 SEARCHES = ("reduced", "full")
 EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED}
 _EPILOG = """\
@@ -111,14 +110,7 @@ def _search_lines(solution: Solution) -> list[str]:
     rows = f"{level.x.size} variables, {level.lam_g.size} constraints"
     how = f"{level.iterations} iterations of IPOPT" if level.program != REDUCED else level.status
     lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {level.kkt_error:.0e}"]
-    if solution.starts == 1:
-        return [*lines, "local optimum, from one start"]
-    best, *others = solution.others
-    lines.append(f"local optimum, best of {solution.starts} starts; {best.starts} led here")
-    for other in others[:_MOST_OTHERS]:
-        size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
-        lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
-    return lines
+    return [*lines, *solution.standing]
 
 
 def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
@@ -142,6 +134,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "constraints": int(solution.last.lam_g.size),
         "kkt_error": solution.last.kkt_error,
         "starts": solution.starts,
+        "finite": None if solution.finite is None else solution.finite.efficiency,
         "others": [
             {"efficiency": a.efficiency, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
             for a in solution.others
@@ -195,6 +188,9 @@ def _solve(options: argparse.Namespace) -> int:
     save(solution, path)
     _partial(path).unlink(missing_ok=True)
     bound, saved, complaints = None, str(path), []
+    if solution.finite is not None:
+        solution.finite.source = solution.source
+        saved += f", {save(solution.finite, path.with_suffix('.finite.h5'))} (the gait of finite size)"
     with StatusLine(enabled=not quiet) as line:
         if options.bound:
             line.say("computing an upper bound on every gait")

@@ -14,6 +14,8 @@ The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.n
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
@@ -114,7 +116,7 @@ def solve_balance(
     tolerance : float
         Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
-        Steps allowed to an instant in each of at most four attempts.
+        Steps allowed to an instant in each of at most four attempts; with each link at rest as many again.
     method : {"auto", "newton", "fixed_point"}
         "auto" damps Newton and falls back on the paper's fixed point; the others are for comparison.
 
@@ -155,10 +157,23 @@ def solve_balance(
         start = _real("start", start)
         if start.shape != (3, n_time) or not np.isfinite(start).all():
             raise ProblemError(f"start must be finite with shape (3, {n_time}).")
-    arguments = (body, friction, angles, rates, float(delta), start, float(tolerance), int(max_iterations), method)
+    settings = float(tolerance), int(max_iterations), method
     library = native_kernel(body)
-    solved = _numpy_balance(*arguments) if library is None else balance(library, *arguments)
-    z, residual, iterations, anchor, velocity = solved
+
+    solved = _numpy_balance if library is None else partial(balance, library)
+    found = solved(body, friction, angles, rates, float(delta), start, *settings)
+    for link in range(body.n_link if method == "auto" else 0):
+        failed = np.flatnonzero(~(found[1] <= tolerance))
+        if not failed.size:
+            break
+        # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
+        some, rates_there = angles[:, failed], rates[:, failed]
+        at_rest = body.tail_velocity(body.posture(some, link), rates_there, np.zeros((3, failed.size)), link)
+        again = solved(body, friction, some, rates_there, float(delta), at_rest, *settings)
+        better = again[1] <= tolerance
+        for old, new in zip(found, again, strict=True):
+            old[..., failed[better]] = new[..., better]
+    z, residual, iterations, anchor, velocity = found
     return BalanceSolution(z, residual, iterations, residual <= tolerance, anchor, velocity)
 
 

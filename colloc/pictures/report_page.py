@@ -20,8 +20,7 @@ from colloc.pictures.style import INK, styled
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.replaced_file import replaced_file
 
-_MOST_PLANES, _MOST_OTHERS = 6, 4
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_MOST_PLANES, _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """The page may run its own script and nothing else: it can fetch nothing, whatever the file held."""
 PLAIN = {
     "KKT error": "To first order, no small change of the gait within its class is better.",
@@ -103,7 +102,6 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             certificate=solution.certificate,
             solved=solution.status == SOLVED,
             headline=_headline(solution),
-            search=_search(solution),
             gap=gap.strip(),
             reference=_comparison(solution, reference),
             plain=PLAIN,
@@ -131,16 +129,6 @@ def _headline(solution: Solution) -> str:
         return "no gait was found"
     measured = solution.measured
     return f"moves {measured.distance:.2g} body lengths a cycle; {measured.efficiency:.2g} body lengths per unit of work"
-
-
-def _search(solution: Solution) -> str:
-    """What the gait is the best of."""
-    if not solution.others:
-        return "local optimum, from one start"
-    best, *others = solution.others
-    met = ", ".join(f"{other.efficiency:.4f} ({other.starts})" for other in others[:_MOST_OTHERS])
-    also = f"; also met on a first mesh (starts): {met}" if met else ""
-    return f"local optimum, best of {solution.starts} starts, of which {best.starts} led here{also}"
 
 
 def _comparison(solution: Solution, reference: Reference | None) -> str:

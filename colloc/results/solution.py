@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     import xarray
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
+_MOST_OTHERS = 4
+"""Of the gaits that a search met besides, so many are told."""
 
 
 @dataclass(eq=False, repr=False)
@@ -57,6 +59,8 @@ class Solution:
         How many the gait is the best of.
     others : tuple of Alternative
         Distinct gaits they led to, the one of this solution first; empty for a single start.
+    finite : Solution, optional
+        The best gait of finite size, where this one is as small as the bound on the shape speed allows; saved by itself.
 
     Examples
     --------
@@ -80,6 +84,7 @@ class Solution:
     changed: bool = False
     starts: int = 1
     others: tuple[Alternative, ...] = ()
+    finite: Solution | None = None
 
     def __repr__(self) -> str:
         facts = [self.problem.name, self.status]
@@ -132,6 +137,18 @@ class Solution:
     @property
     def work(self) -> float:
         return self.last.work
+
+    @property
+    def standing(self) -> list[str]:
+        """What the gait is the best of, and what else the search met."""
+        if self.starts == 1 or not self.others:
+            return ["local optimum, from one start"]
+        best, *others = self.others
+        lines = [f"local optimum, best of {self.starts} starts; {best.starts} led here"]
+        for other in others[:_MOST_OTHERS]:
+            size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
+            lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
+        return lines
 
     @property
     def mesh(self) -> Mesh:

@@ -141,12 +141,15 @@ class Chosen:
         Tried in all.
     others : tuple of Alternative
         All distinct gaits, the chosen one first.
+    finite : list of Found
+        Levels of the best gait of finite size, where the chosen one is as small as the bound on the shape speed allows.
     """
 
     found: Found
     levels: list[Found]
     starts: int
     others: tuple[Alternative, ...]
+    finite: list[Found]
 
 
 def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
@@ -173,8 +176,16 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     if not known:
         raise NotConvergedError("no start led to any gait of the class; give a guess.")
     ends: list[tuple[Candidate, list[Found]]] = []
-    for candidate in _promising(problem, known):
-        if ends and not goes_on():
+
+    def is_finite(found: Found) -> bool:
+        return not on_speed_floor(problem, found.gait)
+
+    least = _PROMISING * -known[0].found.objective
+    # gaits of finite size may shrink on the way, so they are followed until one has not
+    queue = [c for c in known if -c.found.objective >= least][:_FOLLOWED]
+    spare = [c for c in known if is_finite(c.found) and c not in queue][:_FOLLOWED]
+    for candidate in (*queue, *spare):
+        if (ends and not goes_on()) or (candidate in spare and any(is_finite(levels[-1]) for _, levels in ends)):
             break
         levels: list[Found] = []
         with suppress(CollocError):
@@ -185,17 +196,18 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     if not ends:
         raise NotConvergedError("no gait could be followed to the final delta; start at a larger delta or give another guess.")
     ends.sort(key=lambda end: end[1][-1].objective)
-    followed = [_alternative(problem, levels[-1], c.starts) for c, levels in ends]
+    distinct: list[tuple[Found, list[int]]] = []
+    for candidate, levels in ends:
+        twin = next((starts for found, starts in distinct if same_gait(problem, found, levels[-1])), None)
+        if twin is None:
+            distinct.append((levels[-1], list(candidate.starts)))
+        else:
+            twin.extend(candidate.starts)
+    followed = [_alternative(problem, found, starts) for found, starts in distinct]
     dropped = [_alternative(problem, c.found, c.starts) for c in known if not any(c is done for done, _ in ends)]
-    return Chosen(ends[0][1][-1], ends[0][1], tried, (*followed, *dropped))
-
-
-def _promising(problem: Problem, known: list[Candidate]) -> list[Candidate]:
-    """The best few, and the best that is larger than the bound on the shape speed makes it."""
-    least = _PROMISING * -known[0].found.objective
-    chosen = [c for c in known if -c.found.objective >= least][:_FOLLOWED]
-    finite = next((c for c in known if not on_speed_floor(problem, c.found.gait)), None)
-    return chosen if finite is None or any(c is finite for c in chosen) else [*chosen, finite]
+    best = ends[0][1]
+    finite = [] if is_finite(best[-1]) else next((levels for _, levels in ends if is_finite(levels[-1])), [])
+    return Chosen(best[-1], best, tried, (*followed, *dropped), finite)
 
 
 def _alternative(problem: Problem, found: Found, starts: list[int]) -> Alternative:

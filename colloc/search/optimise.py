@@ -13,7 +13,7 @@ from colloc.gaits.sampling import on_speed_floor
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
 from colloc.results.level import Level
-from colloc.results.solution import Solution
+from colloc.results.solution import SOLVED, Solution
 from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
@@ -143,7 +143,8 @@ def best_gait(
     Returns
     -------
     Solution
-        ``solution.starts`` and ``solution.others`` say what it is the best of.
+        ``solution.starts`` and ``solution.others`` say what it is the best of; where it shrank to the bound on the shape speed,
+        ``solution.finite`` is the best gait that did not, if there is one.
     """
     if starts == 1 or before:
         return maximise_efficiency(problem, on_level, before)
@@ -160,8 +161,23 @@ def best_gait(
     solution = maximise_efficiency(problem, on_level, levels)
     solution.starts = chosen.starts
     solution.others = tuple(replace(other, efficiency=other.efficiency / unit) for other in chosen.others)
+    if chosen.finite and on_speed_floor(problem, solution.gait):
+        _add_finite(solution, [restated(level_found(found), unit) for found in chosen.finite])
     solution.seconds = time.perf_counter() - begin
     return solution
+
+
+def _add_finite(solution: Solution, levels: list[Level]) -> None:
+    """Solve for the gait of finite size that these levels lead to, and put it beside the solution."""
+    finite = maximise_efficiency(solution.problem, None, levels)
+    if finite.status == SOLVED and not on_speed_floor(finite.problem, finite.gait):
+        found = finite.certificate
+        finite.starts, finite.others = solution.starts, tuple(o for o in solution.others if not o.on_speed_floor)
+        solution.finite = finite
+        text = f"The best gait of finite size: {found.efficiency:.6f} +- {found.efficiency_error:.0e}, certified."
+    else:
+        text = f"The best gait of finite size, not certified: {levels[-1].efficiency:.4f}."
+    solution.message = f"{solution.message} {text}"
 
 
 def _certified(solution: Solution) -> None:
@@ -180,6 +196,6 @@ def _certified(solution: Solution) -> None:
         solution.message = " ".join(p for p in parts if p)
     elif on_speed_floor(problem, solution.gait):
         solution.message = (
-            f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: smaller gaits are "
-            "more efficient still. Lower the bound (and delta with it) to see how far that goes."
+            f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: the gait shrinks as far "
+            "as it may, smaller ones are more efficient still. Lower the bound (and delta with it) to see how far that goes."
         )

@@ -197,3 +197,34 @@ def test_a_link_at_stick_keeps_its_relative_accuracy_at_tiny_delta():
     solved = solve_balance(Chain(), ISOTROPIC, angles, rates, 1e-13)
     assert solved.converged.all()
     assert np.abs(solved.anchor_velocity).max() < 1e-9
+
+
+BESIDE_A_FOLD = [
+    (
+        Chain((0.2, 0.2, 0.2, 0.2, 0.2)), Friction(0.3732971441138048, 1.0, 1.0), 1e-4,
+        [0.2902139692001954, 0.41142221419266584, -0.24741914938788861, 0.5570036473833548],
+        [1.5208964099572015, -0.442939356313379, -3.631156061252283, 2.5549055153555553],
+    ),
+    (
+        Chain((0.12294025905001435, 0.3350092716615993, 0.2503457939937866, 0.29170467529459976)),
+        Friction(3.041129126875383, 1.0, 1.0), 1e-6,
+        [-0.3771453161256885, 1.8087369384145267, 0.4682390817703179],
+        [-0.030994899599743775, 0.0007943275201016675, -3.2631510952794907],
+    ),
+    (
+        Chain((0.18256804397346088, 0.19015637257632248, 0.2545511669004333, 0.19015637257632248, 0.18256804397346094)),
+        Friction(0.4809270258518652, 1.0, 3.636603686191716), 1e-4,
+        [2.597688063049994, -2.786161703726339, 3.0860764570646855, -2.866002211321948],
+        [0.0026765635702248325, 2.586684889251715, -0.9621272363129159, -2.9613888780556366],
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=["five links", "four links", "backward friction"])
+def test_beside_a_fold_of_the_balance_the_other_solution_is_found(case):
+    """Two solutions have just met and vanished: the residual has a minimum there, at which every step from rest used to end."""
+    body, friction, delta, angles, rates = case
+    solution = solve_balance(body, friction, np.array(angles)[:, None], np.array(rates)[:, None], delta)
+    assert solution.converged.all()
+    now = instant(body, friction, np.array(angles)[:, None], np.array(rates)[:, None], solution.z, delta)
+    assert np.abs(net_force(now.posture, now.force)).max() < 1e-9

@@ -122,7 +122,7 @@ def tips_passing(side):
 
 def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
     body = Chain((0.25,) * 4)
-    check = next(c for c in shape_checks(body, [(0, 3)]) if c.name == "links 1 and 4")
+    check = next(c for c in shape_checks(body, ((0, 3),)) if c.name == "links 1 and 4")
     mesh = problem_mesh(Problem("tips", tips_passing(np.full(3, -0.3)), body, intervals=40))
     first = tips_passing(np.array([-0.002, 0.0, 0.001]))
 

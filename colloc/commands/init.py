@@ -1,0 +1,84 @@
+"""Command line: write a commented problem file that runs as it is, for a user to change."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from colloc.commands.ending import OK, run
+from colloc.commands.options import new_parser
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import read_problem_file
+from colloc.system.errors import ProblemError
+
+_FEWEST, _MOST = 3, 12
+_EPILOG = """\
+  colloc init mine.py --links 4
+  colloc solve mine.py"""
+_TEMPLATE = '''\
+"""{links} equal links: change what is yours, then `colloc solve {file}`."""
+
+from colloc import Chain, Friction, Harmonic, Problem
+
+PROBLEM = Problem(
+    name="{name}",
+    # link lengths from tail to head; they add up to 1, the unit of length
+    body=Chain(({lengths})),
+    # what sliding sideways, forwards and backwards costs, in units of the weight; friction does not depend on speed
+    friction=Friction(mu_t=1.0, mu_f=1.0, mu_b=1.0),
+    # the class of gaits to search, which decides the answer: more harmonics allow finer motions.
+    # "bilateral": the body run backwards in time looks the same from its head; it never turns, and half a period is enough.
+    # It needs lengths that read the same from both ends. Others: "antipodal" (the second half mirrors the first), "none"
+    gait=Harmonic(harmonics=2, symmetry="bilateral"),
+    # the largest angle of a joint [rad], at most pi
+    joint_limit=3.14,
+    # No guess is needed: travelling waves, known gaits and random ones are tried. guess=Fourier(mean, cos, sin) adds yours.
+)
+'''
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("init", "Write a commented problem file for a chain of equal links; it runs as it is.", _EPILOG)
+    parser.add_argument("problem", type=Path, metavar="FILE.py", help="the file to write; an existing one is left alone")
+    parser.add_argument("--links", type=int, default=_FEWEST, metavar="N", help=f"links of the chain (default: {_FEWEST})")
+    return parser
+
+
+def problem_text(path: Path, links: int) -> str:
+    """A problem file for a chain of so many equal links.
+
+    Raises
+    ------
+    ProblemError
+        If the number of links is out of range, or the file's name cannot be a problem's.
+    """
+    if not _FEWEST <= links <= _MOST:
+        raise ProblemError(f"--links must be {_FEWEST} to {_MOST}, not {links}.")
+    if path.suffix != ".py":
+        raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
+    Problem(path.stem)  # refuses names that files cannot have
+    return _TEMPLATE.format(links=links, file=path.name, name=path.stem, lengths=", ".join([f"1 / {links}"] * links))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _init, arguments)
+
+
+def _init(options: argparse.Namespace) -> int:
+    path: Path = options.problem
+    text = problem_text(path, options.links)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise ProblemError(f"{path} is there already; choose another name.") from None
+    read_problem_file(path)
+    print(f"wrote {path}: a problem of {options.links} links. Change it, then: colloc solve {path}")
+    return OK
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,45 @@
+"""A problem file for somebody who has none yet: it runs as it is, says what its lines mean, and replaces nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from colloc import maximise_efficiency
+from colloc.commands.ending import BAD_PROBLEM, OK
+from colloc.commands.init import main
+from colloc.gaits.problem_file import read_problem_file
+
+
+@pytest.mark.parametrize("links", [3, 4, 7])
+def test_the_file_states_a_problem_of_so_many_links(links, tmp_path, capsys):
+    path = tmp_path / "mine.py"
+    assert main([str(path), "--links", str(links)]) == OK
+    problem = read_problem_file(path).problem
+    assert problem.name == "mine"
+    assert problem.body.lengths == pytest.approx([1 / links] * links)
+    assert f"colloc solve {path}" in capsys.readouterr().out
+
+
+def test_the_file_runs_as_it_is(tmp_path):
+    path = tmp_path / "mine.py"
+    main([str(path), "--links", "4"])
+    solution = maximise_efficiency(read_problem_file(path).problem)
+    assert solution.status == "solved", solution.message
+
+
+@pytest.mark.parametrize(
+    ("name", "links", "says"),
+    [("mine.py", "2", "3 to 12"), ("mine.txt", "4", "end in .py"), ("my body.py", "4", "letters, digits")],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(name, links, says, tmp_path, capsys):
+    assert main([str(tmp_path / name), "--links", links]) == BAD_PROBLEM
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / name).exists()
+
+
+def test_an_existing_file_is_left_alone(tmp_path, capsys):
+    path = tmp_path / "mine.py"
+    path.write_text("mine", encoding="utf-8")
+    assert main([str(path)]) == BAD_PROBLEM
+    assert path.read_text(encoding="utf-8") == "mine"
+    assert "is there already" in capsys.readouterr().err
