@@ -214,7 +214,7 @@ def main() -> None:
             source = ROOT / name
             (shutil.copytree if source.is_dir() else shutil.copy)(source, copy / name)
         cache.mkdir()
-        for package in dict.fromkeys(mutant.package for mutant in chosen):
+        for package in () if options.first else dict.fromkeys(mutant.package for mutant in chosen):
             if outcome(None, copy, cache, TESTS[package]) != "survived":
                 said = (copy.parent / "said.txt").read_text(encoding="utf-8")
                 raise SystemExit(f"the tests of {package} fail without any fault:\n{said[-3000:]}")
