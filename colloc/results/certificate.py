@@ -65,6 +65,13 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     ------
     NotConvergedError
         If the balance cannot be solved at some instant of the replay.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> colloc.certify(colloc.solve(problem, starts=1), tolerance=1e-7).passed
+    True
     """
     problem = solution.problem
     path = gait_path(solution)

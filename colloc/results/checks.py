@@ -27,7 +27,7 @@ class Check:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certificate:
     """The verdict of an independent replay.
 
@@ -59,6 +59,16 @@ class Certificate:
     error_at_zero_delta: float = float("nan")
     distance_error: float = float("nan")
     work_error: float = float("nan")
+
+    def __repr__(self) -> str:
+        if not self.replayed:
+            return "<Certificate: nothing was replayed>"
+        failed = ", ".join(check.name for check in self.failures)
+        verdict = f"fails on {failed}" if failed else f"all {len(self.checks)} checks hold"
+        return f"<Certificate: {verdict}; d/W = {self.efficiency:.6g} +- {self.efficiency_error:.0e}>"
+
+    def __str__(self) -> str:
+        return "\n".join(check.line() for check in self.checks)
 
     @property
     def replayed(self) -> bool:

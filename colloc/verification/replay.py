@@ -215,6 +215,14 @@ def replay(
         If the path does not move, or the grid is too small.
     NotConvergedError
         If the balance cannot be solved at some instant.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    >>> measured = colloc.replay(colloc.Chain(), colloc.Friction(), gait, delta=1e-4)
+    >>> round(measured.efficiency, 4)
+    0.26
     """
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
