@@ -27,8 +27,8 @@ MOTIONS = DELTA
 """Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
 SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
-"""Curvatures of the efficiency over the efficiency [1/rad^2]: a saddle falls off by so much, as a tenth of a radian along it then
-gains 5e-5, what the mesh may be wrong by; less than FLAT is called flat. NEAR: largest gradient at which they mean anything."""
+"""Curvatures of the efficiency over the efficiency [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
+5e-5, what the mesh may be wrong by; less than FLAT is called flat. NEAR: largest gradient at which they mean anything."""
 _SECOND, _MOST_PARAMETERS = "second order", 150
 
 _FINE_PHASES = 20000
