@@ -20,10 +20,12 @@ from colloc.pictures.style import INK, styled
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.replaced_file import replaced_file
 
-_MOST_PLANES, _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_MOST_PLANES = 6
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """The page may run its own script and nothing else: it can fetch nothing, whatever the file held."""
 PLAIN = {
     "KKT error": "To first order, no small change of the gait within its class is better.",
+    "second order": "To second order none is either: the gait is a best one, and no saddle between better ones.",
     "constraint violation": "Every condition of the problem is met at the solver's own points.",
     "balance at nodes": "At these points no net force or torque acts on the body.",
     "balance in replay": "Nor does any act at all the instants in between.",

@@ -7,6 +7,9 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.second_order import curvature
+from colloc.reduced.spaces import space_near
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import extrapolated_limit
 from colloc.results.solution import Solution
@@ -20,6 +23,11 @@ order; so the rotation is limited by what it changes there, to as much as colloc
 change is the body's own (`colloc.mechanics.bodies.Usual`)."""
 MOTIONS = 1e-2
 """Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
+
+SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
+"""Curvatures of the efficiency over the efficiency [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
+5e-5, what the mesh may be wrong by; less than FLAT is called flat. NEAR: largest gradient at which they mean anything."""
+_SECOND, _MOST_PARAMETERS = "second order", 150
 
 _FINE_PHASES = 20000
 
@@ -81,6 +89,7 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     limit = extrapolated_limit([replayed.efficiency for replayed in replays], errors)
     checks = (
         *_optimality(solution),
+        _second_order(solution),
         *_motion(solution, fine, path, tolerance),
         _one_motion(problem, fine),
         *_class(solution),
@@ -110,6 +119,31 @@ def _optimality(solution: Solution) -> list[Check]:
         Check("constraint violation", level.violation, VIOLATION, "largest violated equation or bound"),
         Check("balance at nodes", float(residual), RESIDUAL, "net force and torque by the closed-form law"),
     ]
+
+
+def _second_order(solution: Solution) -> Check:
+    """Whether the gait is a local optimum and no other critical point, in the space of its class."""
+    problem, level = solution.problem, solution.last
+    space, v = space_near(problem, solution.gait, level.edges, level.scheme)
+    space = space.with_far(problem.body.far_pairs)
+    space.move_checks(v)
+    if v.size > _MOST_PARAMETERS:
+        return Check(_SECOND, 0.0, SADDLE, f"not measured, for {v.size} parameters")
+    found = curvature(ReducedProgram(space, level.delta), v)
+    size = abs(level.efficiency)
+    least, error = found.smallest / size, found.error / size
+    value = max(-least - error, 0.0)
+    if not found.kkt_error < NEAR * size:
+        return Check(_SECOND, 0.0, SADDLE, "not measured, where the gradient of the reduced program does not vanish")
+    if found.n_free == 0:
+        verdict = "a vertex: what binds leaves no direction free"
+    elif least > max(error, FLAT):
+        verdict = f"an optimum: smallest curvature {least:.1e} in {found.n_free} free directions"
+    elif value > SADDLE:
+        verdict = f"a saddle: smallest curvature {least:.1e} in {found.n_free} free directions"
+    else:
+        verdict = f"flat: smallest curvature {least:.1e} +- {error:.0e} in {found.n_free} free directions"
+    return Check(_SECOND, value, SADDLE, f"{verdict} [1/rad^2]")
 
 
 def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> list[Check]:

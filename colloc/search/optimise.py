@@ -19,6 +19,7 @@ from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
 from colloc.search.reduced_search import Found, descended, refined, searched
+from colloc.search.saddles import off_saddles
 from colloc.system.errors import NotConvergedError
 
 TRIVIAL_EFFICIENCY = 1e-4
@@ -28,6 +29,7 @@ ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
     "self-contact": "another guess or a smaller joint_limit",
     "delta influence": "a smaller delta",
+    "second order": "another guess or more starts",
 }
 """What helps against a check that failed; anything else is a matter of the mesh."""
 
@@ -72,6 +74,7 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
         found, lacks = refined(descended(Found.at(space, v, done.last.delta), scaled, ended), ended)
     else:
         found, lacks = searched(scaled, scaled.guess, ended)
+    found, lacks = off_saddles(found, lacks, ended)
     level, fails = answer(found)
     report(level)
     message = " ".join(part for part in (fails, lacks) if part)

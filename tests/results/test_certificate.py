@@ -9,6 +9,7 @@ import pytest
 from colloc.commands.verify import main as recheck
 from colloc.gaits.paths import ArcPath
 from colloc.mechanics.body import Chain
+from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
 from colloc.results.certificate import certify
 from colloc.results.solution import Solution
@@ -241,3 +242,27 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     known = certify(three_link)
     assert min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency) >= 5e-3
     assert known.work_error >= 5e-3 * known.work
+
+
+def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link, monkeypatch):
+    """Curvature in units of the efficiency, less its error, as the mesh may be wrong by what a tenth of a radian gains."""
+    size = three_link.efficiency
+
+    def run(f, error=0.0):
+        found = Curvature(-(f * 1e-2 + error) * size, error * size, 2, np.array([1.0, 0.0, 0.0]), 0.0)
+        monkeypatch.setattr(verify, "curvature", lambda *a: found)
+        return failures()
+
+    judged("second order", run)
+    assert run(0.5, error=1.0) == set()
+    assert run(1.1, error=1.0) == {"second order"}
+    monkeypatch.setattr(verify, "curvature", lambda *a: Curvature(-1.0, 0.0, 3, np.eye(3)[0], 0.0))
+    assert "a saddle" in next(c.meaning for c in certify(three_link).checks if c.name == "second order")
+    monkeypatch.setattr(verify, "curvature", lambda *a: Curvature(1e-6, 0.0, 3, np.eye(3)[0], 0.0))
+    assert "flat" in next(c.meaning for c in certify(three_link).checks if c.name == "second order")
+
+
+def test_an_optimum_is_said_to_be_one(three_link):
+    (check,) = (c for c in certify(three_link).checks if c.name == "second order")
+    assert check.passed
+    assert "an optimum" in check.meaning

@@ -1,0 +1,88 @@
+"""Second-order conditions: optima have positive curvature on what is free, and a known saddle has not."""
+
+import numpy as np
+import pytest
+
+from colloc import Friction, Harmonic, Problem, ellipse
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.second_order import curvature
+from colloc.reduced.spaces import space_near
+from colloc.search.optimise import optimum
+
+PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)
+SADDLE = ellipse(0.0, 0.30734, 0.76781)
+
+
+def program_at(problem, gait):
+    """The reduced program, with its checks placed, and the parameters of a gait."""
+    space, v = space_near(problem, gait)
+    space.move_checks(v)
+    return ReducedProgram(space, problem.delta), v
+
+
+class Quadratic:
+    """x'Hx/2 on a plane or not, with its exact answer known."""
+
+    def __init__(self, hessian, normal=None, upper=np.inf):
+        n = len(hessian)
+        self.hessian, self.lower, self.upper = np.array(hessian, dtype=float), np.full(n, -9.0), np.full(n, 9.0)
+        self.normal = np.zeros((0, n)) if normal is None else np.atleast_2d(np.array(normal, dtype=float))
+        self.row_lower = self.row_upper = np.zeros(len(self.normal))
+
+    def objective(self, v):
+        return 0.5 * v @ self.hessian @ v
+
+    def gradient(self, v):
+        return self.hessian @ v
+
+    def rows(self, v):
+        return self.normal @ v
+
+    def row_slopes(self, v):
+        return self.normal
+
+
+def test_curvature_is_that_on_the_free_directions_alone():
+    hessian = np.diag([3.0, -2.0, 0.5])
+    free, fixed = (curvature(Quadratic(hessian, normal), np.zeros(3)) for normal in (None, [0, 1, 0]))
+    assert free.smallest == pytest.approx(-2.0)
+    assert np.abs(free.direction) == pytest.approx([0, 1, 0])
+    assert fixed.smallest == pytest.approx(0.5)
+    assert (free.n_free, fixed.n_free) == (3, 2)
+
+
+def test_rows_on_both_sides_of_one_instant_hold_one_direction():
+    twice = curvature(Quadratic(np.diag([1.0, 1.0, -1.0]), [[1, 0, 0], [1, 1e-3, 0]]), np.zeros(3))
+    assert twice.n_free == 2
+
+
+def test_a_vertex_leaves_nothing_free():
+    assert curvature(Quadratic(np.diag([-1.0, -1.0]), np.eye(2)), np.zeros(2)).smallest == np.inf
+
+
+def test_the_gait_between_two_ways_of_bending_is_a_saddle():
+    """Its curvature is the second difference of the efficiency along its direction."""
+    program, v = program_at(PROBLEM, SADDLE)
+    found = curvature(program, v)
+    assert found.kkt_error < 1e-3
+    assert found.n_free == 3
+    assert found.smallest == pytest.approx(-0.81, abs=0.02)
+    assert found.error < 1e-4
+    step = 1e-3 * found.direction
+    objective = [program.objective(v + k * step) for k in (-1, 0, 1)]
+    assert objective[0] < objective[1] > objective[2]
+    assert (objective[0] - 2 * objective[1] + objective[2]) / 1e-6 == pytest.approx(found.smallest, rel=1e-2)
+
+
+def test_an_optimum_is_better_than_its_neighbours():
+    solution = optimum(PROBLEM.with_(friction=Friction(10, 1, 1), intervals=20))
+    space, v = space_near(solution.problem, solution.gait, solution.last.edges, solution.last.scheme)
+    space.move_checks(v)
+    program = ReducedProgram(space, solution.last.delta)
+    found = curvature(program, v)
+    assert found.n_free == v.size
+    assert found.smallest > 100 * found.error
+    here, rng = program.objective(v), np.random.default_rng(1)
+    for direction in rng.normal(size=(10, v.size)):
+        rise = program.objective(v + 0.01 * direction / np.linalg.norm(direction)) - here
+        assert rise > 0.9 * 0.5e-4 * found.smallest
