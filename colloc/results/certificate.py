@@ -27,7 +27,7 @@ MOTIONS = 1e-2
 SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
 """Curvatures of the efficiency over the efficiency [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
 5e-5, what the mesh may be wrong by; less than FLAT is called flat. NEAR: largest gradient at which they mean anything."""
-_SECOND, _MOST_PARAMETERS = "second order", 150
+_MOST_PARAMETERS = 150
 
 _FINE_PHASES = 20000
 
@@ -128,13 +128,13 @@ def _second_order(solution: Solution) -> Check:
     space = space.with_far(problem.body.far_pairs)
     space.move_checks(v)
     if v.size > _MOST_PARAMETERS:
-        return Check(_SECOND, 0.0, SADDLE, f"not measured, for {v.size} parameters")
+        return Check("second order", 0.0, SADDLE, f"not measured, for {v.size} parameters")
     found = curvature(ReducedProgram(space, level.delta), v)
     size = abs(level.efficiency)
     least, error = found.smallest / size, found.error / size
     value = max(-least - error, 0.0)
     if not found.kkt_error < NEAR * size:
-        return Check(_SECOND, 0.0, SADDLE, "not measured, where the gradient of the reduced program does not vanish")
+        return Check("second order", 0.0, SADDLE, "not measured, where the gradient of the reduced program does not vanish")
     if found.n_free == 0:
         verdict = "a vertex: what binds leaves no direction free"
     elif least > max(error, FLAT):
@@ -143,7 +143,7 @@ def _second_order(solution: Solution) -> Check:
         verdict = f"a saddle: smallest curvature {least:.1e} in {found.n_free} free directions"
     else:
         verdict = f"flat: smallest curvature {least:.1e} +- {error:.0e} in {found.n_free} free directions"
-    return Check(_SECOND, value, SADDLE, f"{verdict} [1/rad^2]")
+    return Check("second order", value, SADDLE, f"{verdict} [1/rad^2]")
 
 
 def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> list[Check]:
