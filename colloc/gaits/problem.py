@@ -112,7 +112,7 @@ class Problem:
     ...     gait=Harmonic(harmonics=2, symmetry="bilateral"),
     ... )
     >>> problem
-    <Problem mine: 4 links, friction (1.7, 1, 1.3), 2 harmonics, symmetry bilateral, delta 1e-04>
+    <Problem mine: 3 joints, friction (1.7, 1, 1.3), 2 harmonics, symmetry bilateral, delta 1e-04>
     >>> problem.with_(delta=1e-6).delta
     1e-06
     """
