@@ -22,7 +22,7 @@ class GaitPanel(NamedTuple):
     gait: Gait
 
 
-_SNAPSHOTS = 8
+_SNAPSHOTS = 6
 
 
 def _draw_path(axes: Any, gait: Gait, limits: tuple[np.ndarray, float]) -> None:
@@ -34,18 +34,19 @@ def _draw_path(axes: Any, gait: Gait, limits: tuple[np.ndarray, float]) -> None:
     axes.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] - half, centre[1] + half), aspect="equal")
 
 
-def _draw_bodies(axes: Any, body: Chain, gait: Gait, apart: float | None = 0.8) -> None:
-    """Bodies side by side, `apart` body lengths, by default as far as they are wide; then a bar of 0.1 body lengths too."""
+def _draw_bodies(axes: Any, body: Chain, gait: Gait, bar: bool = False) -> None:
+    """Bodies side by side, each over the first one in grey, so that small motions show; with a bar of 0.1 body lengths."""
     t = np.arange(_SNAPSHOTS) / _SNAPSHOTS
     x, y = body.joints(gait.angles(t))
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-    if apart is None:
-        apart = 1.3 * float(np.ptp(x, axis=0).max())
+    apart = 1.15 * float(np.ptp(x, axis=0).max()) + 0.05
+    if bar:
         low = y.min() - 0.12 * apart
         axes.plot(x.min() + np.array([0.0, 0.1]), [low, low], color="black", lw=1.0, clip_on=False)
-    for k, colour in enumerate(matplotlib.colormaps["viridis"](t)):
-        axes.plot(x[:, k] + apart * k, y[:, k], color=colour, lw=1.6, solid_capstyle="round", clip_on=False)
-        axes.plot(x[-1:, k] + apart * k, y[-1:, k], "o", color=colour, ms=2.5, clip_on=False)
+    for k, colour in enumerate(matplotlib.colormaps["viridis"](0.9 * t)):
+        axes.plot(x[:, 0] + apart * k, y[:, 0], color="#d5dade", lw=1.6, solid_capstyle="round", clip_on=False)
+        axes.plot(x[:, k] + apart * k, y[:, k], color=colour, lw=2.0, solid_capstyle="round", clip_on=False)
+        axes.plot(x[-1:, k] + apart * k, y[-1:, k], "o", color=colour, ms=3.5, clip_on=False)
     axes.set_aspect("equal")
     axes.set_axis_off()
 
@@ -56,8 +57,8 @@ def gait_panels(panels: list[GaitPanel], body: Chain | None = None) -> Figure:
     columns = min(4, len(panels))
     rows = -(-len(panels) // columns)
     with styled():
-        figure = Figure(figsize=(3.1 * columns, 4.0 * rows))
-        grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3.2, 0.6] * rows)
+        figure = Figure(figsize=(3.1 * columns, 4.2 * rows))
+        grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3.0, 0.9] * rows)
         for k, panel in enumerate(panels):
             row, column = divmod(k, columns)
             axes = figure.add_subplot(grid[2 * row, column])
@@ -91,10 +92,10 @@ def body_strips(panels: list[GaitPanel], body: Chain) -> Figure:
     columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
     with styled():
-        figure = Figure(figsize=(5.2 * columns, 1.15 * rows))
+        figure = Figure(figsize=(5.6 * columns, 1.5 * rows))
         for k, panel in enumerate(panels):
             axes = figure.add_subplot(rows, columns, k + 1)
-            _draw_bodies(axes, body, panel.gait, None)
+            _draw_bodies(axes, body, panel.gait, bar=True)
             axes.set_title(panel.title, fontsize=8)
     return figure
 

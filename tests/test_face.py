@@ -94,6 +94,12 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     assert dataset.attrs["efficiency"] == three_link.certificate.efficiency
 
 
+def test_a_missing_library_is_named(three_link, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(colloc.CollocError, match=r"this needs pandas, which is not installed: pip install pandas"):
+        three_link.to_dataframe()
+
+
 def test_progress_is_told_and_printed_only_if_asked(capsys):
     problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     levels, outcomes = [], []

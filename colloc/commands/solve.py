@@ -92,7 +92,7 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  search          {text}" for text in _search_lines(solution)]
-        gait = [f"class: {solution.problem.gait.describe()}", *solution.gait.lines()]
+        gait = [f"class: {solution.problem.gait.describe()}", *solution.gait.lines(solution.problem.body.coordinate)]
         lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]
         if reference is not None:

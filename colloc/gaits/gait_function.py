@@ -33,8 +33,8 @@ class GaitFunction:
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         raise NotImplementedError
 
-    def lines(self) -> list[str]:
-        """The gait in words or as a formula."""
+    def lines(self, coordinate: str = "joint") -> list[str]:
+        """The gait in words or as a formula; `coordinate` is what the body calls its shape coordinates."""
         raise NotImplementedError
 
     def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -89,15 +89,15 @@ class Fourier(GaitFunction):
         k, cos, sin = self._waves(np.asarray(t, dtype=float))
         return -self.cos @ (k * sin) + self.sin @ (k * cos)
 
-    def lines(self) -> list[str]:
-        """The formula, joint by joint."""
+    def lines(self, coordinate: str = "joint") -> list[str]:
+        """The formula, joint by joint, or whatever the body's shape coordinates are."""
         found = []
         for j in range(self.n_joint):
             terms = [_rounded(self.mean[j])]
             for k in range(self.n_harmonic):
                 wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
                 terms.append(f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}")
-            found.append(f"joint {j + 1}: " + " ".join(terms))
+            found.append(f"{coordinate} {j + 1}: " + " ".join(terms))
         return found
 
     def resized(self, n_harmonic: int) -> Fourier:

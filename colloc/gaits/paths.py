@@ -132,7 +132,7 @@ class ArcPath(GaitFunction):
             return None
         return round(float(self.tangents[0, -1] - self.tangents[0, 0]) / (2 * np.pi * fraction(self.symmetry)))
 
-    def lines(self) -> list[str]:
+    def lines(self, coordinate: str = "joint") -> list[str]:
         """Length, winding and sharpest bend."""
         turned = "" if self.winding is None else f", winding {self.winding}"
         sharpest = np.abs(self.curvatures()).max()
@@ -226,7 +226,7 @@ class Corners(GaitFunction):
         """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
         return self._both(t)[1]
 
-    def lines(self) -> list[str]:
+    def lines(self, coordinate: str = "joint") -> list[str]:
         """Length and corners."""
         corners = [f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T]
         return [f"path of length {self.length:.4f} rad", *corners]

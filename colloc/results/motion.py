@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from colloc.system.late_binding import optional
+
 if TYPE_CHECKING:
     import pandas
     import xarray
-
 
 SAMPLES = 401
 """Instants of one period in a result file, both ends included."""
@@ -69,16 +70,14 @@ def motion_columns(motion: Motion, power: np.ndarray) -> dict[str, Column]:
 
 def motion_dataset(columns: dict[str, Column], about: dict[str, Any]) -> xarray.Dataset:
     """The columns as an xarray Dataset with the attributes `about`."""
-    import xarray
-
+    arrays = optional("xarray")
     found = {name: (c.dims, c.values, {"units": c.units}) for name, c in columns.items()}
-    return xarray.Dataset(found, _labels(columns), about)
+    return arrays.Dataset(found, _labels(columns), about)
 
 
 def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
     """The columns as a pandas DataFrame, a number each, with the phase as index."""
-    import pandas
-
+    frames = optional("pandas")
     flat: dict[str, np.ndarray] = {}
     for name, column in columns.items():
         if column.dims == ("t",):
@@ -86,7 +85,7 @@ def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
         else:
             named = zip(_labels(columns)[column.dims[0]], column.values, strict=True)
             flat |= {f"{name}_{label}": row for label, row in named}
-    return pandas.DataFrame(flat).set_index("t")
+    return frames.DataFrame(flat).set_index("t")
 
 
 def _labels(columns: dict[str, Column]) -> dict[str, list]:

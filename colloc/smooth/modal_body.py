@@ -45,6 +45,12 @@ class ModalBody(Modes):
         sin(2 pi s), cos(2 pi s), sin(4 pi s), ...: an even number of them.
     panels, order : int
         Gauss panels on the body and nodes on each, for the optimisation; certificates use panels that adapt.
+
+    Examples
+    --------
+    >>> from colloc import ModalBody
+    >>> ModalBody(modes=6).describe()
+    'smooth, 6 legendre modes of its tangent angle, 8 panels'
     """
 
     formulations = (IMPLICIT,)

@@ -15,6 +15,7 @@ from colloc.results.distinct_optima import Outcome, fourier_series, series_class
 from colloc.results.solution import SOLVED
 from colloc.studies.run import StudyRun
 from colloc.studies.study import Index, Study
+from colloc.system.late_binding import optional
 
 if TYPE_CHECKING:
     import xarray
@@ -57,10 +58,9 @@ class StudyTable:
 
     def to_xarray(self) -> xarray.Dataset:
         """The arrays as an xarray Dataset."""
-        import xarray
-
+        arrays = optional("xarray")
         found = {k: (self.dimensions[k], v, {"units": UNITS.get(k, "1")}) for k, v in self.variables.items()}
-        return xarray.Dataset(found, dict(self.coordinates), {"name": self.name})
+        return arrays.Dataset(found, dict(self.coordinates), {"name": self.name})
 
 
 def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:

@@ -1,6 +1,6 @@
-"""Functions of higher packages by name, so that a lower one can offer what it must not import.
+"""What is imported only when it is asked for: functions of higher packages by name, and libraries that may be missing.
 
-The face of the library says where they are; they are imported when they are first called.
+So a lower package can offer what it must not import; the face of the library says where that is.
 """
 
 from __future__ import annotations
@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping
 from typing import Any
+
+from colloc.system.errors import CollocError
 
 _WHERE: dict[str, str] = {}
 
@@ -27,3 +29,17 @@ def bound(name: str) -> Callable[..., Any]:
     """
     module, _, function = _WHERE[name].partition(":")
     return getattr(importlib.import_module(module), function)
+
+
+def optional(library: str) -> Any:
+    """A library that colloc can do without.
+
+    Raises
+    ------
+    CollocError
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module(library)
+    except ImportError:
+        raise CollocError(f"this needs {library}, which is not installed: pip install {library}.") from None
