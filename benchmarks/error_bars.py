@@ -76,8 +76,9 @@ def solved_gait(number: int) -> dict[str, list[float]] | None:
     solution = optimum(problem)
     if not solution.levels or not solution.last.optimal:
         return None
-    breaks = corner_phases(solution.gait)
-    return compared(problem.body, problem.friction, gait_path(solution), solution.delta_per_period, breaks)
+    breaks, body = corner_phases(solution.gait), problem.body
+    assert isinstance(body, Chain)  # the zoo has no others
+    return compared(body, problem.friction, gait_path(solution), solution.delta_per_period, breaks)
 
 
 def summary(rows: list[dict[str, list[float]]]) -> str:
