@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import space_near
 from colloc.results.checks import Certificate, Check
-from colloc.results.delta_limit import extrapolated_limit
+from colloc.results.delta_limit import Limit, extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import Path, Replay, replay
@@ -75,18 +79,16 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     path = gait_path(solution)
     if instants is None:
         instants = max(1600, 2 * int(np.ceil(5 * solution.mesh.n_point / problem.gait.fraction)))
-    delta, breaks = solution.delta_per_period, corner_phases(solution.gait)
-
-    def replayed_at(part: float, near: Replay | None) -> Replay:
-        return replay(
-            problem.body, problem.friction, path, part * delta, instants=instants, tolerance=tolerance, breaks=breaks, near=near
-        )
-
-    fine = replayed_at(1.0, None)
-    at_tenth = replayed_at(0.1, fine)
-    replays = fine, at_tenth, replayed_at(0.01, at_tenth)
-    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
-    limit = extrapolated_limit([replayed.efficiency for replayed in replays], errors)
+    known = measured(
+        problem.body,
+        problem.friction,
+        path,
+        solution.delta_per_period,
+        tolerance=tolerance,
+        instants=instants,
+        breaks=corner_phases(solution.gait),
+    )
+    fine = known.fine
     checks = (
         *_optimality(solution),
         _second_order(solution),
@@ -94,20 +96,56 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
         _one_motion(problem, fine),
         *_class(solution),
         *_mesh(solution),
-        *_delta(problem, fine, limit.value),
+        *_delta(problem, fine, known.limit.value),
     )
     return Certificate(
         checks,
         fine.efficiency,
         fine.distance,
         fine.work,
-        errors[0],
-        limit.value,
+        known.efficiency_error,
+        known.limit.value,
         fine.instants,
-        limit.error,
-        distance_error=fine.distance_error + fine.turning * fine.distance + fine.other_distance,
-        work_error=fine.work_error + fine.other_work,
+        known.limit.error,
+        known.distance_error,
+        known.work_error,
     )
+
+
+class Measured(NamedTuple):
+    """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for every balanced motion."""
+
+    fine: Replay
+    efficiency_error: float
+    distance_error: float
+    work_error: float
+    limit: Limit
+
+
+def measured(
+    body: Body,
+    friction: Friction,
+    path: Path,
+    delta: float,
+    *,
+    tolerance: float = 1e-6,
+    instants: int = 1600,
+    breaks: np.ndarray | tuple[float, ...] = (),
+) -> Measured:
+    """Efficiency, distance and work of a path at delta, and the limit of the efficiency for delta -> 0, with their errors.
+
+    Arguments are those of `colloc.verification.replay.replay`.
+    """
+    replays: list[Replay] = []
+    for part in (1.0, 0.1, 0.01):
+        near = replays[-1] if replays else None
+        at = (body, friction, path, part * delta)
+        replays.append(replay(*at, instants=instants, tolerance=tolerance, breaks=breaks, near=near))
+    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
+    limit = extrapolated_limit([each.efficiency for each in replays], errors)
+    fine = replays[0]
+    distance_error = fine.distance_error + fine.turning * fine.distance + fine.other_distance
+    return Measured(fine, errors[0], distance_error, fine.work_error + fine.other_work, limit)
 
 
 def _optimality(solution: Solution) -> list[Check]:

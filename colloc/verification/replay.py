@@ -2,8 +2,9 @@
 
 It shares nothing with collocation but the friction law: no scheme, no mesh, no symmetry, no interpolant. Velocities are
 solved for at five instants of every panel of the period and integrated by Simpson's rule, once over the panel and once over
-its halves; panels are halved where the two differ. The differences add up as magnitudes: kinks of stick and slip lie anywhere
-between the instants, so those of different panels may well cancel by accident, and a difference of two sums be no error.
+its halves; panels are halved where the two differ. What that leaves of the difference follows from how much smaller it is
+than on the panel twice as wide: little where the motion is smooth, all of it at a kink. These errors add up as magnitudes:
+kinks of stick and slip lie anywhere between the instants, so those of different panels may well cancel by accident.
 
 With unequal coefficients several velocities may balance an instant. The replay then follows one branch in time, and says how
 far the others would lead (`colloc.verification.followed_motion`).
@@ -14,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,19 +22,13 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
+from colloc.verification.panels import WHOLE, Panels, begun, differences, halves, increments, left_over
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
 
 _ONE_SIDED = 1e-12
 _NARROWEST = 1e-10
-_HALF = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24
-"""Integrals from the first of three instants to each of them of the parabola through them, over unit distance of the outer."""
-_WHOLE = np.zeros((5, 5))
-_WHOLE[:3, :3] = 0.5 * _HALF
-_WHOLE[3:] = _WHOLE[2]
-_WHOLE[2:, 2:] += 0.5 * _HALF
-"""The same for five instants, parabola by parabola."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +48,7 @@ class Replay:
     residual : float
         Largest force or torque left over, at any instant, in units of the largest friction coefficient.
     error : float
-        Relative error of the efficiency: what halving the panels changes, summed as magnitudes, and the residual.
+        Relative error of the efficiency: what halving the panels would change, summed as magnitudes, and the residual.
     distance_error, work_error : float
         Of distance and work, for the same reasons.
     several : float
@@ -98,30 +92,6 @@ class Replay:
         return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
 
 
-class _Panels(NamedTuple):
-    """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
-    of the centre of mass in the body frame (complex), power, power of the joints, residual and lever ``(n, 5)``; and how far
-    all balanced motions lie apart ``(n, 5, 3)`` (`colloc.verification.followed_motion.FollowedMotion.apart`)."""
-
-    left: np.ndarray
-    width: np.ndarray
-    z: np.ndarray
-    centre: np.ndarray
-    power: np.ndarray
-    actuator: np.ndarray
-    residual: np.ndarray
-    lever: np.ndarray
-    apart: np.ndarray
-
-    def take(self, chosen: np.ndarray) -> _Panels:
-        return _Panels(*(a[chosen] for a in self))
-
-    def joined(self, other: _Panels) -> _Panels:
-        """These and others, in order of time."""
-        both = _Panels(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
-        return both.take(np.argsort(both.left))
-
-
 def _evaluated(
     body: Body,
     friction: Friction,
@@ -133,7 +103,7 @@ def _evaluated(
     *,
     whole: bool,
 ) -> tuple[np.ndarray, ...]:
-    """The last seven of `_Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
+    """The last seven of `Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
 
     Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole` period, the branch in time.
     """
@@ -149,26 +119,6 @@ def _evaluated(
     values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (motion.z, apart))
     return z, *(value.reshape(t.shape) for value in values), apart
-
-
-def _halves(panels: _Panels, new: tuple[np.ndarray, ...]) -> _Panels:
-    """Both halves of panels, from the values at their instants and half way between these ``(n, 4)``."""
-    fields = []
-    for old, between in zip(panels[2:], new, strict=True):
-        merged = np.empty((old.shape[0], 9, *old.shape[2:]), dtype=old.dtype)
-        merged[:, ::2], merged[:, 1::2] = old, between
-        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, *old.shape[1:]))
-    left, width = np.repeat(panels.left, 2), 0.5 * np.repeat(panels.width, 2)
-    left[1::2] += width[1::2]
-    return _Panels(left, width, *fields)
-
-
-def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rotation, displacement in the axes at the panel's begin (complex) and work of panels, on every `every`-th instant."""
-    omega, centre, power = (a[:, ::every] for a in (panels.z[..., 2], panels.centre, panels.power))
-    h, b = panels.width, rule[-1]
-    turn = np.exp(1j * h[:, None] * (omega @ rule.T))
-    return h * (omega @ b), h * ((turn * centre) @ b), h * (power @ b)
 
 
 def replay(
@@ -225,7 +175,7 @@ def replay(
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
-    counts = [max(1, round(instants * (b - a) / 4)) for a, b in pairwise(ends)]
+    counts = [2 * max(1, round(instants * (b - a) / 8)) for a, b in pairwise(ends)]
     edges = np.concatenate([np.linspace(a, b, n + 1)[:-1] for (a, b), n in zip(pairwise(ends), counts, strict=True)] + [[1.0]])
     left, width = edges[:-1], np.diff(edges)
     t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
@@ -233,19 +183,19 @@ def replay(
     t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
     t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
     start = None if near is None else near.tail_velocity(t.ravel())
-    panels = _Panels(left, width, *_evaluated(body, friction, path, delta, t, start, sense, whole=True))
+    panels = begun(left, width, _evaluated(body, friction, path, delta, t, start, sense, whole=True))
     while True:
-        turn, move, spent = _increments(_WHOLE, panels, 1)
+        turn, move, spent = increments(WHOLE, panels, 1)
         heading = np.concatenate([[0.0], np.cumsum(turn)])
         travelled = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
         distance, work = float(abs(travelled[-1])), float(spent.sum())
         if not work > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
-        once = _increments(_HALF, panels, 2)
+        turn_error, move_error, work_error = left_over(differences(panels), panels.wider).T
         # an error of rotation turns all that comes after it
         reach = np.abs(travelled - travelled[-1]).max()
-        astray = np.abs(move - once[1]) + reach * np.abs(turn - once[0])
-        gap = astray / max(distance, 1e-300) + np.abs(spent - once[2]) / work
+        astray = move_error + reach * turn_error
+        gap = astray / max(distance, 1e-300) + work_error / work
         residual = float(panels.residual.max())
         order = np.argsort(gap)
         # finer panels do not make up for what the balance leaves over
@@ -258,7 +208,7 @@ def replay(
         between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
         new = _evaluated(body, friction, path, delta, between, start, sense, whole=False)
-        panels = panels.take(np.setdiff1d(order, chosen)).joined(_halves(old, new))
+        panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new))
     several, other_distance, other_work = _others(panels, reach)
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
     return Replay(
@@ -267,11 +217,11 @@ def replay(
         distance / work,
         float(heading[-1]),
         float(panels.lever.max()),
-        float(((panels.actuator @ _WHOLE[-1]) * panels.width).sum()),
+        float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
         residual,
         float(gap.sum()) + residual,
         float(astray.sum()) + residual * distance,
-        float(np.abs(spent - once[2]).sum()) + residual * work,
+        float(work_error.sum()) + residual * work,
         several,
         other_distance,
         other_work,
@@ -288,7 +238,7 @@ def _starts(z: np.ndarray, friction: Friction, sense: int) -> np.ndarray:
     return z[:, :-1] if sense == FORWARDS else z[:, 1:]
 
 
-def _others(panels: _Panels, reach: float) -> tuple[float, float, float]:
+def _others(panels: Panels, reach: float) -> tuple[float, float, float]:
     """Part of the period with several motions, and how far any others would lead at most: distance and work.
 
     Between two instants they count as at the worse; a rotation moves what is within `reach`.

@@ -1,0 +1,134 @@
+"""Do the stated errors hold? Certified numbers of random gaits against `benchmarks.independent_replay`.
+
+    python -m benchmarks.error_bars --gaits 300 [--solved 20] [--record results/error_bars.jsonl]
+
+Random bodies of 3 to 6 links, laws of friction and gaits of 1 to 4 harmonics with the symmetries of the zoo, which close their
+rotation; and, with --solved, gaits that a search of the zoo's problems ended at. For efficiency, distance, work, and the
+efficiency for delta -> 0: how often the stated error covers the true one, and how many times too large it is in the median.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.independent_replay import Crawler, played
+from benchmarks.zoo import zoo_problem
+from colloc import Chain, Friction, Harmonic
+from colloc.results.certificate import corner_phases, gait_path, measured
+from colloc.search.optimise import optimum
+from colloc.verification.replay import Path as GaitPath
+
+DELTA = 1e-4
+LIMIT = 1e-3
+"""The reference's part of delta for the limit: what is left of it is far below the stated errors."""
+QUANTITIES = ("efficiency", "distance", "work", "limit")
+SEED = 24
+
+
+def random_gait(number: int) -> tuple[Chain, Friction, GaitPath]:
+    """Body, law and gait `number`; it depends on that number alone."""
+    rng = np.random.default_rng([SEED, number])
+    links = int(rng.integers(3, 7))
+    lengths = rng.uniform(0.5, 1.5, links)
+    symmetry = str(rng.choice(["bilateral", "antipodal"]))
+    if symmetry == "bilateral" or rng.random() < 0.3:
+        lengths = lengths + lengths[::-1]
+    lengths = lengths / lengths.sum()
+    body = Chain((*lengths[:-1], 1.0 - lengths[:-1].sum()))
+    isotropic = rng.random() < 0.3
+    mu_t, mu_b = (1.0, 1.0) if isotropic else (float(np.exp(rng.uniform(np.log(0.1), np.log(30)))), float(rng.choice([1, 3])))
+    kind = Harmonic(int(rng.integers(1, 5)), symmetry)
+    size = kind.size(body.n_joint)
+    gait = kind.fourier(rng.normal(0, rng.uniform(0.2, 1.0), size) / np.sqrt(size / 3), body.n_joint)
+    return body, Friction(mu_t, 1.0, mu_b), lambda t: (gait.angles(t), gait.rates(t))
+
+
+def compared(
+    body: Chain,
+    friction: Friction,
+    path: GaitPath,
+    delta: float,
+    breaks: np.ndarray | tuple[float, ...] = (),
+    fine: float = 1e-7,
+) -> dict[str, list[float]]:
+    """For each quantity: stated value, stated error and the reference's value; and the part of the period left open."""
+    known = measured(body, friction, path, delta, breaks=breaks)
+    crawler = Crawler(body.lengths, (friction.mu_t, friction.mu_f, friction.mu_b))
+    here, limit = (played(crawler, path, part * delta, fine, breaks) for part in (1.0, LIMIT))
+    replayed = known.fine
+    return {
+        "efficiency": [replayed.efficiency, known.efficiency_error, here.efficiency],
+        "distance": [replayed.distance, known.distance_error, here.distance],
+        "work": [replayed.work, known.work_error, here.work],
+        "limit": [known.limit.value, known.limit.error, limit.efficiency],
+        "open": [replayed.several],
+    }
+
+
+def solved_gait(number: int) -> dict[str, list[float]] | None:
+    """The same for the gait that the zoo's problem is solved by; None if the search fails."""
+    problem = zoo_problem(number)
+    solution = optimum(problem)
+    if not solution.levels or not solution.last.optimal:
+        return None
+    breaks, body = corner_phases(solution.gait), problem.body
+    assert isinstance(body, Chain)  # the zoo has no others
+    return compared(body, problem.friction, gait_path(solution), solution.delta_per_period, breaks)
+
+
+def summary(rows: list[dict[str, list[float]]]) -> str:
+    """A table of coverage and of stated over true errors."""
+    lines = [
+        "| quantity | gaits | covered | median stated | median true | stated / true, median | worst true / stated |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name in QUANTITIES:
+        value, stated, true = np.array([row[name] for row in rows]).T
+        wrong, size = np.abs(value - true), np.abs(true)
+        covered = wrong <= stated
+        ratio = np.median(stated / np.maximum(wrong, 1e-300))
+        medians = f"{np.median(stated / size):.1e} | {np.median(wrong / size):.1e}"
+        share = f"{covered.sum()} ({100 * covered.mean():.1f} %)"
+        lines.append(f"| {name} | {len(rows)} | {share} | {medians} | {ratio:.1f} | {np.max(wrong / stated):.2f} |")
+    several = sum(row["open"][0] > 0 for row in rows)
+    return "\n".join(lines) + f"\n\n{several} of them run through shapes at which several motions are balanced.\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--gaits", type=int, default=300, metavar="N")
+    parser.add_argument("--solved", type=int, default=0, metavar="N", help="problems of the zoo")
+    parser.add_argument("--record", type=Path, default=Path("results/error_bars.jsonl"), help="what it has is not done again")
+    parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="begin no other after so long")
+    options = parser.parse_args()
+    begin, done = time.monotonic(), {}
+    if options.record.exists():
+        done = {entry["name"]: entry for entry in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())}
+    options.record.parent.mkdir(parents=True, exist_ok=True)
+    todo = [("random", k) for k in range(options.gaits)] + [("zoo", k) for k in range(options.solved)]
+    for kind, number in todo:
+        name = f"{kind}-{number}"
+        if name in done or time.monotonic() - begin > options.seconds:
+            continue
+        try:
+            row = compared(*random_gait(number), DELTA) if kind == "random" else solved_gait(number)
+        except ArithmeticError as error:  # the reference gives up, and says so
+            row = None
+            print(name, error, flush=True)
+        done[name] = {"name": name, "row": row}
+        with options.record.open("a", encoding="utf-8") as record:
+            record.write(json.dumps(done[name]) + "\n")
+    print(f"the reference or the search gave up on {sum(entry['row'] is None for entry in done.values())} of {len(done)}\n")
+    for kind in ("random", "zoo"):
+        rows = [entry["row"] for entry in done.values() if entry["row"] is not None and entry["name"].startswith(kind)]
+        if rows:
+            print(f"{kind}:\n\n{summary(rows)}")
+
+
+if __name__ == "__main__":
+    main()
