@@ -18,9 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
-from colloc.mechanics.chain_motion import chain_motion
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
@@ -125,7 +123,7 @@ class _Panels(NamedTuple):
 
 
 def _evaluated(
-    body: Chain,
+    body: Body,
     friction: Friction,
     path: Path,
     delta: float,
@@ -142,13 +140,13 @@ def _evaluated(
     angles, rates = path(t.ravel())
     apart = np.zeros((3, t.size))
     if not friction.isotropic:
-        near, apart = followed_motion(body, friction, angles, rates, delta, None if whole else near, sense)
-        near = np.nan_to_num(near)
-    solved = solve_balance(body, friction, angles, rates, delta, start=near).require()
-    motion = chain_motion(body, friction, angles, rates, delta, solved)
-    (x, y), (gx, gy) = body.joints(angles), body.centre(body.posture(angles))
+        followed = followed_motion(body, friction, angles, rates, delta, None if whole else near, sense)
+        if followed is not None:
+            near, apart = np.nan_to_num(followed.z), followed.apart
+    motion, residual = body.replayed(friction, angles, rates, delta, near)
+    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, solved.residual, lever)
+    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (motion.z, apart))
     return z, *(value.reshape(t.shape) for value in values), apart
 
@@ -174,7 +172,7 @@ def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarr
 
 
 def replay(
-    body: Chain,
+    body: Body,
     friction: Friction,
     path: Path,
     delta: float,
