@@ -25,6 +25,8 @@ RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
 _OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60}
 _SECONDS = 20.0
+_ROUNDS, _ADMISSIBLE = 4, 1e-8
+"""Times that the shape checks are moved after the answer, and what may be beyond them [rad]."""
 
 
 def level_found(found: Found) -> Level:
@@ -100,15 +102,20 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
     before = solver.measured(x, delta, *_multipliers(found, program))
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
+    own = program.layout.parameters[space.own, 0]
+    for _ in range(_ROUNDS):  # the gait may have moved so far that other instants are the worst
+        if not result.optimal or space.move_checks(result.x[own]) <= _ADMISSIBLE:
+            break
+        result = solver.solve_within(result.x, delta, (result.lam_x, result.lam_g), RADIUS).accumulated(result)
     if result.optimal:
         return level_of(program, result, delta, problem.formulation), ""
-    own = f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
+    ended = f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
     if before.optimal:
         kept = replace(before, status=STATIONARY)
-        text = f"First-order conditions hold (KKT error {before.kkt_error:.1e} on the {problem.formulation} program); {own}."
+        text = f"First-order conditions hold (KKT error {before.kkt_error:.1e} on the {problem.formulation} program); {ended}."
         return level_of(program, kept, delta, REDUCED), text
     kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
-    return level_of(program, kept, delta, REDUCED), f"{explanation(program, kept, delta)} {own}."
+    return level_of(program, kept, delta, REDUCED), f"{explanation(program, kept, delta)} {ended}."
 
 
 def _multipliers(found: Found, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:

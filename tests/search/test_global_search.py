@@ -1,0 +1,38 @@
+"""The best gait of a class: many starts, told apart, and what is said of gaits that shrink."""
+
+from __future__ import annotations
+
+import pytest
+
+from colloc import Chain, Friction, Harmonic, Problem
+from colloc.gaits.sampling import on_speed_floor
+from colloc.results.store import load, save
+from colloc.search.optimise import best_gait
+
+UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(2, 1, 1.4), gait=Harmonic(2, "none"))
+
+
+@pytest.mark.slow
+def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside_it(tmp_path):
+    solution = best_gait(UNEQUAL)
+    assert on_speed_floor(solution.problem, solution.gait)
+    assert solution.finite is not None
+    assert solution.finite.status == "solved"
+    assert not on_speed_floor(solution.problem, solution.finite.gait)
+    assert f"{solution.finite.certificate.efficiency:.6f}" in solution.message
+    again = load(save(solution, tmp_path / "unequal.h5"))
+    assert again.message == solution.message
+    assert again.standing == solution.standing
+    assert "best of 16 starts" in again.standing[0]
+    # no distinct gait is told twice, and none of finite size is better than the one that is given
+    finite = [other.efficiency for other in again.others if not other.on_speed_floor and other.delta == solution.problem.delta]
+    assert max(finite) == pytest.approx(solution.finite.efficiency, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changed", [{}, {"intervals": 30}, {"scheme": "gauss-5"}, {"delta_start": 0.03}], ids=str)
+def test_the_answer_does_not_depend_on_what_the_search_is_given(changed):
+    """Before, options decided: 0.234, 0.493 and 0.647 were each called solved."""
+    solution = best_gait(UNEQUAL.with_(**changed))
+    assert solution.status == "solved"
+    assert solution.efficiency == pytest.approx(0.64685, rel=2e-4)
