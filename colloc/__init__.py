@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
+    from colloc.smooth.concertina import Concertina
     from colloc.smooth.modal_body import ModalBody
+    from colloc.smooth.prescribed_body import Wave
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
     from colloc.verification.replay import replay
 
@@ -43,6 +45,7 @@ __all__ = [
     "ArcPath",
     "Chain",
     "CollocError",
+    "Concertina",
     "Corners",
     "Fourier",
     "FreePath",
@@ -56,6 +59,7 @@ __all__ = [
     "Reference",
     "Solution",
     "StoreError",
+    "Wave",
     "certify",
     "ellipse",
     "load",
@@ -73,7 +77,9 @@ _HOME = {
     "gaits.harmonic": ("Fourier", "Harmonic", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
     "gaits.paths": ("ArcPath", "Corners"),
+    "smooth.concertina": ("Concertina",),
     "smooth.modal_body": ("ModalBody",),
+    "smooth.prescribed_body": ("Wave",),
     "search.optimise": ("maximise_efficiency",),
     "gaits.problem": ("Problem", "Reference"),
     "verification.replay": ("replay",),

@@ -14,16 +14,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.harmonic import Fourier
-from colloc.gaits.paths import ArcPath
 from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.results.level import REDUCED, Level
+from colloc.results.level import PRESCRIBED, REDUCED, Level
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
@@ -111,6 +107,8 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
 def _search_lines(solution: Solution) -> list[str]:
     """What was solved last, and what the gait is the best of."""
     level = solution.last
+    if level.program == PRESCRIBED:
+        return [f"nothing is free: the motion is prescribed, measured on a mesh of {level.edges.size - 1} intervals"]
     rows = f"{level.x.size} variables, {level.lam_g.size} constraints"
     how = f"{level.iterations} iterations of IPOPT" if level.program != REDUCED else level.status
     lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {level.kkt_error:.0e}"]
@@ -125,21 +123,8 @@ def _search_lines(solution: Solution) -> list[str]:
 
 
 def _gait_lines(solution: Solution) -> list[str]:
-    gait, coordinate = solution.gait, solution.problem.body.coordinate
-    lines = [f"class: {solution.problem.gait.describe()}"]
-    if isinstance(gait, Fourier):
-        for j in range(gait.n_joint):
-            terms = [f"{gait.mean[j]:+.4f}"]
-            for k in range(gait.n_harmonic):
-                wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
-                terms.append(f"{gait.cos[j, k]:+.4f} cos {wave} {gait.sin[j, k]:+.4f} sin {wave}")
-            lines.append(f"{coordinate} {j + 1}: " + " ".join(terms))
-        return lines
-    what = f"path of length {gait.length:.4f} rad"
-    if isinstance(gait, ArcPath):
-        turned = "" if gait.winding is None else f", winding {gait.winding}"
-        return [*lines, f"{what}{turned}, largest curvature {np.abs(gait.curvatures()).max():.3f} per rad"]
-    return [*lines, what, *(f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in gait.corners.T)]
+    """Class and gait in words."""
+    return [f"class: {solution.problem.gait.describe()}", *solution.gait.lines(solution.problem.body.coordinate)]
 
 
 def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:

@@ -66,7 +66,7 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
     if problem.gait.symmetry != NONE or not isinstance(gait, Fourier):
         return gait
     delta = problem.delta if delta is None else delta
-    if problem.has_path:
+    if problem.gait.unit_speed:
         delta *= path_length(gait)
     harmonics: Harmonic = seed_class(problem)
     space, v = space_near(problem.with_(gait=harmonics, guess=gait, intervals=_INTERVALS + 4 * harmonics.harmonics), gait)
