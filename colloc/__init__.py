@@ -23,11 +23,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
+from colloc.system.late_binding import bind
+
 if TYPE_CHECKING:
     from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
     from colloc.gaits.path_classes import FreePath, Polygon
     from colloc.gaits.paths import ArcPath, Corners
     from colloc.gaits.problem import Problem, Reference
+    from colloc.gaits.problem_file import load_problem
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
@@ -38,11 +41,35 @@ if TYPE_CHECKING:
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.modal_body import ModalBody
     from colloc.smooth.prescribed_body import Wave
+    from colloc.studies.calls import Starts, multistart, solve, sweep
+    from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
     from colloc.verification.replay import replay
 
+_HOME = {
+    "gaits.problem": ("Problem", "Reference"),
+    "gaits.problem_file": ("load_problem",),
+    "mechanics.body": ("Chain",),
+    "smooth.modal_body": ("ModalBody",),
+    "mechanics.friction": ("Friction",),
+    "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
+    "gaits.path_classes": ("FreePath", "Polygon"),
+    "gaits.paths": ("ArcPath", "Corners"),
+    "search.optimise": ("maximise_efficiency",),
+    "studies.calls": ("solve", "multistart", "Starts", "sweep"),
+    "studies.study": ("Study", "Axis"),
+    "results.solution": ("Solution",),
+    "results.store": ("load", "save"),
+    "results.certificate": ("certify",),
+    "verification.replay": ("replay",),
+    "mechanics.fixed_point": ("solve_balance",),
+    "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
+}
+"""Where the public names live, in the order of use; each is imported when it is first used."""
+
 __all__ = [
     "ArcPath",
+    "Axis",
     "Chain",
     "CollocError",
     "Concertina",
@@ -58,35 +85,31 @@ __all__ = [
     "ProblemError",
     "Reference",
     "Solution",
+    "Starts",
     "StoreError",
+    "Study",
     "Wave",
     "certify",
     "ellipse",
     "load",
+    "load_problem",
     "maximise_efficiency",
+    "multistart",
     "replay",
     "save",
+    "solve",
     "solve_balance",
+    "sweep",
 ]
 
-_HOME = {
-    "mechanics.body": ("Chain",),
-    "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
-    "mechanics.fixed_point": ("solve_balance",),
-    "mechanics.friction": ("Friction",),
-    "gaits.harmonic": ("Fourier", "Harmonic", "ellipse"),
-    "gaits.path_classes": ("FreePath", "Polygon"),
-    "gaits.paths": ("ArcPath", "Corners"),
-    "smooth.concertina": ("Concertina",),
-    "smooth.modal_body": ("ModalBody",),
-    "smooth.prescribed_body": ("Wave",),
-    "search.optimise": ("maximise_efficiency",),
-    "gaits.problem": ("Problem", "Reference"),
-    "verification.replay": ("replay",),
-    "results.solution": ("Solution",),
-    "results.store": ("load", "save"),
-    "results.certificate": ("certify",),
-}
+# what a solution offers and packages above it do
+bind(
+    {
+        "plot": "colloc.pictures.figure:solution_figure",
+        "animate": "colloc.pictures.movie:write_movie",
+        "report": "colloc.pictures.report_page:write_report",
+    }
+)
 
 
 def __dir__() -> list[str]:

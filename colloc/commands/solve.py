@@ -89,11 +89,12 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
             f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} +- "
             f"{certificate.error_at_zero_delta:.0e} for delta -> 0",
-            f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}      "
-            f"at delta {solution.last.delta:.0e}",
+            f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
+            f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  search          {text}" for text in _search_lines(solution)]
-        lines += [f"  gait            {text}" for text in _gait_lines(solution)]
+        gait = [f"class: {solution.problem.gait.describe()}", *solution.gait.lines(solution.problem.body.coordinate)]
+        lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]
         if reference is not None:
             difference = certificate.efficiency - reference.efficiency
@@ -120,11 +121,6 @@ def _search_lines(solution: Solution) -> list[str]:
         size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
         lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
     return lines
-
-
-def _gait_lines(solution: Solution) -> list[str]:
-    """Class and gait in words."""
-    return [f"class: {solution.problem.gait.describe()}", *solution.gait.lines(solution.problem.body.coordinate)]
 
 
 def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
@@ -165,6 +161,8 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
             "efficiency_error": certificate.efficiency_error,
             "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
             "error_at_zero_delta": certificate.error_at_zero_delta,
+            "distance_error": certificate.distance_error,
+            "work_error": certificate.work_error,
             "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
         }
     if reference is not None:

@@ -90,7 +90,9 @@ def _verify(options: argparse.Namespace) -> int:
             "efficiency_at_zero_delta",
             "error_at_zero_delta",
             "distance",
+            "distance_error",
             "work",
+            "work_error",
             "instants",
         )
         facts = {"file": options.result, "name": solution.problem.name, "certified": good, "complaint": complaint}

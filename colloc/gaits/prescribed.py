@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gaits.gait_function import GaitFunction
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves, fraction
 from colloc.system.errors import ProblemError
@@ -16,8 +17,8 @@ from colloc.system.errors import ProblemError
 _INTERVALS_A_STAGE = 4
 
 
-@dataclass(frozen=True, eq=False)
-class Phases:
+@dataclass(frozen=True, eq=False, repr=False)
+class Phases(GaitFunction):
     """A body's run through its phases: the only gait of its class.
 
     Parameters
@@ -30,7 +31,6 @@ class Phases:
     schedule: tuple[float, ...] = (0.0, 1.0)
     symmetry: str = NONE
 
-    n_joint = 2
     delta_unit = 1.0
     speed_unit = 2 * np.pi
     shape_speed = 1.0
@@ -39,11 +39,15 @@ class Phases:
         object.__setattr__(self, "schedule", tuple(float(t) for t in self.schedule))
 
     @property
+    def n_joint(self) -> int:
+        return 2
+
+    @property
     def corner_phases(self) -> np.ndarray:
         """Phases in (0, 1) at which the motion may start to move otherwise."""
         return both_halves(self.symmetry, np.array(self.schedule))
 
-    def lines(self, coordinate: str) -> list[str]:
+    def lines(self, coordinate: str = "joint") -> list[str]:
         """The gait in words: its class says all."""
         return []
 

@@ -115,6 +115,31 @@ class BalancedMotion(NamedTuple):
     actuator_power: np.ndarray
 
 
+class Branches(NamedTuple):
+    """Balanced velocities of instants, from one to `n_root` each.
+
+    Attributes
+    ----------
+    z : (n_root, 3, n_time)
+        Tail velocities (u, v, omega) in the body frame; NaN beyond those that were found.
+    sign : (n_root, n_time)
+        Of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0 beyond those that were found.
+    """
+
+    z: np.ndarray
+    sign: np.ndarray
+
+    @property
+    def number(self) -> np.ndarray:
+        """How many were found, ``(n_time,)``; 0 where the solver failed."""
+        return (self.sign != 0).sum(axis=0)
+
+    @property
+    def complete(self) -> np.ndarray:
+        """Whether the signs add up to 1, as they do over all solutions, ``(n_time,)``."""
+        return self.sign.sum(axis=0) == 1
+
+
 class Contact(NamedTuple):
     """Two parts of a body that must not cross: the smaller of two functions of shape ``(1, n_time)`` must not be positive.
 
@@ -235,6 +260,13 @@ class Body(Protocol):
         self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
     ) -> tuple[BalancedMotion, np.ndarray]:
         """The motion by the most accurate solver there is, and its residual ``(n_time,)``: what certificates are made of."""
+
+    @property
+    def looks_for_all_velocities(self) -> bool:
+        """Whether `all_velocities` finds more than one."""
+
+    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches | None:
+        """Every tail velocity that keeps the balance, as far as they can be found; None where others are not looked for."""
 
     def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
         """What has to vanish for a kink of the velocities in time, ``(n_part, n_time)``; no rows where there are none."""

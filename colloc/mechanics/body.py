@@ -13,6 +13,7 @@ from colloc.mechanics.bodies import (
     IMPLICIT,
     BalancedMotion,
     BalanceSolution,
+    Branches,
     Contact,
     Lifted,
     Pairs,
@@ -33,9 +34,12 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction, force_density
 from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
+from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.numerics.arrays import Array, namespace
+from colloc.system.argument_names import named_arguments
 
 
+@named_arguments
 class Chain(Links):
     """A chain of straight links joined end to end; its shape coordinates are the joint angles.
 
@@ -43,11 +47,18 @@ class Chain(Links):
     ----------
     lengths : tuple of float
         Link lengths from tail to head; they add up to the body length, 1.
+
+    Examples
+    --------
+    >>> from colloc import Chain
+    >>> Chain((0.25, 0.5, 0.25)).n_joint
+    2
     """
 
     formulations = (FULL, IMPLICIT)
     coordinate, quantity = "joint", "joint angle"
     schedule: tuple[float, ...] = ()
+    looks_for_all_velocities = True
     usual = Usual(
         delta=1e-4, delta_start=0.1, limit=float(np.pi), largest_limit=float(np.pi), limit_name="joint limits", excess=1e-6,
         delta_influence=1e-2,
@@ -114,6 +125,9 @@ class Chain(Links):
         """By the solver itself: forces on links are integrals in closed form."""
         solved = solve_balance(self, friction, angles, rates, delta, start=start).require()
         return chain_motion(self, friction, angles, rates, delta, solved), solved.residual
+
+    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
+        return all_balanced_velocities(self, friction, angles, rates, delta)
 
     def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
         """The speed of the slowest point of each link, or where mu_f and mu_b differ the tangential speed."""

@@ -15,6 +15,8 @@ KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK = 1e-6, 1e-8,
 """Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
 order; so the rotation is limited by what it changes there, to as much as collocation may be wrong by (GAP). What delta may
 change is the body's own (`colloc.mechanics.bodies.Usual`)."""
+MOTIONS = 1e-2
+"""Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
 _FINE_PHASES = 20000
 
@@ -40,6 +42,13 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     ------
     NotConvergedError
         If the balance cannot be solved at some instant of the replay.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> colloc.certify(colloc.solve(problem, starts=1), tolerance=1e-7).passed
+    True
     """
     problem = solution.problem
     path = gait_path(solution)
@@ -57,17 +66,28 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     fine = replayed_at(1.0, None)
     at_tenth = replayed_at(0.1, fine)
     replays = fine, at_tenth, replayed_at(0.01, at_tenth)
-    errors = [replayed.efficiency * (replayed.error + replayed.turning) for replayed in replays]
+    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
     limit = extrapolated_limit([replayed.efficiency for replayed in replays], errors)
     checks = (
         *_optimality(solution),
         *_motion(solution, fine, path, tolerance),
+        _one_motion(problem, fine),
         *_class(solution),
         *_mesh(solution),
         *_delta(problem, fine, limit.value),
     )
-    measured = (fine.efficiency, fine.distance, fine.work, errors[0])
-    return Certificate(checks, *measured, limit.value, fine.instants, limit.error)
+    return Certificate(
+        checks,
+        fine.efficiency,
+        fine.distance,
+        fine.work,
+        errors[0],
+        limit.value,
+        fine.instants,
+        limit.error,
+        distance_error=fine.distance_error + fine.turning * fine.distance + fine.other_distance,
+        work_error=fine.work_error + fine.other_work,
+    )
 
 
 def _optimality(solution: Solution) -> list[Check]:
@@ -86,6 +106,7 @@ def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> l
     ends, _ = path(np.array([0.0, 1.0]))
     angles, _ = path(np.linspace(0.0, 1.0, _FINE_PHASES + 1))
     beyond = max(float(body.largest_angles(angles).max()) - problem.joint_limit, 0.0)
+    gap = level.efficiency / fine.efficiency - 1
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     return [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
@@ -93,10 +114,28 @@ def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> l
         Check("net rotation", fine.turning, ROTATION, "over a period, times the body's reach over the distance"),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
-        Check("replay gap", level.efficiency / fine.efficiency - 1, GAP, "collocated over replayed efficiency, less 1"),
+        Check("replay gap", _beyond(gap, fine.ambiguity), GAP, "collocated over replayed efficiency, less 1"),
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
     ]
+
+
+def _beyond(value: float, unknown: float) -> float:
+    """The part of a difference that something of unknown sign does not explain."""
+    return float(np.copysign(max(abs(value) - unknown, 0.0), value))
+
+
+def _one_motion(problem: Problem, fine: Replay) -> Check:
+    """How far the efficiency depends on which of several balanced motions the body takes."""
+    if problem.friction.isotropic:
+        meaning = "relative; equal coefficients leave one balanced motion"
+    elif not problem.body.looks_for_all_velocities:
+        meaning = "relative; other balanced motions of a smooth body are not looked for"
+    elif fine.several == 0:
+        meaning = f"relative; no other balanced motion was found at {fine.instants} instants"
+    else:
+        meaning = f"relative; several motions are balanced at {fine.several:.2g} of the period"
+    return Check("one motion", fine.ambiguity, MOTIONS, meaning)
 
 
 def _class(solution: Solution) -> list[Check]:

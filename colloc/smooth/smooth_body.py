@@ -28,6 +28,7 @@ class SmoothBody:
     formulations: tuple[str, ...] = (IMPLICIT,)
     """Forces on all nodes as variables would be too many for a full program."""
     n_force = 0
+    looks_for_all_velocities = False
     hinges = slice(0, 0)
     far_pairs: Pairs = ()
     schedule: tuple[float, ...] = ()
@@ -71,6 +72,9 @@ class SmoothBody:
         """On panels that adapt, whatever those of a search."""
         solved = self.on_adaptive_panels(friction, angles, rates, delta).require()
         return BalancedMotion(solved.z, solved.centre, solved.power, solved.bending_power), solved.residual
+
+    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> None:
+        """Not looked for."""
 
     def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
         """None: a point at rest moves along the body, and does not come and go."""

@@ -1,6 +1,6 @@
 """Damaged and hostile files: refused in bounded time and memory, with nothing executed and nothing believed.
 
-The quick tests mutate 600 files, the slow ones 6,000 more; each of the kinds in `store_samples.KINDS` takes its share. A
+The quick tests mutate 600 files, the slow ones 6,000 more; each of the kinds in `shared.store_samples.KINDS` takes its share. A
 further 1,000 are sealed anew after the mutation, as somebody would who wants HDF5 to see them, and 1,000 get right checksums of
 HDF5's own besides; both are read in processes with limits of memory and time.
 """
@@ -18,8 +18,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from store_forgery import SUPERBLOCK, checked_blocks, checksum_at, forged, lookup3
-from store_samples import HDF5_KINDS, KINDS, ROW_KINDS, Samples, archive
+from shared.store_forgery import SUPERBLOCK, checked_blocks, checksum_at, forged, lookup3
+from shared.store_samples import HDF5_KINDS, KINDS, ROW_KINDS, Samples, archive
 
 from colloc.results.archive import save_archive
 from colloc.results.store import load, save
