@@ -51,6 +51,8 @@ _HOME = {
     "gaits.problem_file": ("load_problem",),
     "mechanics.body": ("Chain",),
     "smooth.modal_body": ("ModalBody",),
+    "smooth.concertina": ("Concertina",),
+    "smooth.prescribed_body": ("Wave",),
     "mechanics.friction": ("Friction",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),

@@ -79,6 +79,12 @@ class Concertina(PrescribedBody):
     bumps : {1, 2}
     backwards : bool
         One bump: run from head to tail, towards the tail (for mu_b < mu_f).
+
+    Examples
+    --------
+    >>> from colloc import Concertina, Problem
+    >>> Problem("crawler", body=Concertina(epsilon=0.05)).gait.describe()
+    'a prescribed motion, symmetry antipodal'
     """
 
     epsilon: float = 0.1

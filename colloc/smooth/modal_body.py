@@ -38,6 +38,13 @@ class ModalBody(SmoothBody, Modes):
         sin(2 pi s), cos(2 pi s), sin(4 pi s), ...: an even number of them.
     panels, order : int
         Gauss panels on the body and nodes on each, for the optimisation; certificates use panels that adapt.
+
+    Examples
+    --------
+    >>> from colloc import Friction, Harmonic, ModalBody, Problem
+    >>> body = ModalBody(modes=6)
+    >>> Problem("low-modes", body=body, friction=Friction(mu_t=100), gait=Harmonic(1, "antipodal")).formulation
+    'implicit velocity'
     """
 
     coordinate, quantity = "mode", "mode"

@@ -108,6 +108,13 @@ class Wave(PrescribedBody):
         Along the body; a standing wave has one.
     steepness : float
         Of "tanh" only.
+
+    Examples
+    --------
+    >>> from colloc import Friction, Problem, Wave
+    >>> problem = Problem("wave", body=Wave("sine", amplitude=1.0), friction=Friction(mu_t=100))
+    >>> problem.gait.describe()
+    'a prescribed motion, symmetry antipodal'
     """
 
     profile: str = "sine"
