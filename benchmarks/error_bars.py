@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.independent_replay import Crawler, played
 from benchmarks.zoo import zoo_problem
 from colloc import Chain, Friction, Harmonic
-from colloc.results.certificate import corner_phases, gait_path, measured
+from colloc.results.certificate import gait_path, measured
 from colloc.search.optimise import optimum
 from colloc.verification.replay import Path as GaitPath
 
@@ -76,7 +76,7 @@ def solved_gait(number: int) -> dict[str, list[float]] | None:
     solution = optimum(problem)
     if not solution.levels or not solution.last.optimal:
         return None
-    breaks, body = corner_phases(solution.gait), problem.body
+    breaks, body = solution.gait.corner_phases, problem.body
     assert isinstance(body, Chain)  # the zoo has no others
     return compared(body, problem.friction, gait_path(solution), solution.delta_per_period, breaks)
 

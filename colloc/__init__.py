@@ -38,7 +38,9 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
+    from colloc.smooth.concertina import Concertina
     from colloc.smooth.modal_body import ModalBody
+    from colloc.smooth.prescribed_body import Wave
     from colloc.studies.calls import Starts, multistart, solve, sweep
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
@@ -49,6 +51,8 @@ _HOME = {
     "gaits.problem_file": ("load_problem",),
     "mechanics.body": ("Chain",),
     "smooth.modal_body": ("ModalBody",),
+    "smooth.concertina": ("Concertina",),
+    "smooth.prescribed_body": ("Wave",),
     "mechanics.friction": ("Friction",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
@@ -70,6 +74,7 @@ __all__ = [
     "Axis",
     "Chain",
     "CollocError",
+    "Concertina",
     "Corners",
     "Fourier",
     "FreePath",
@@ -85,6 +90,7 @@ __all__ = [
     "Starts",
     "StoreError",
     "Study",
+    "Wave",
     "certify",
     "ellipse",
     "load",

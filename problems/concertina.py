@@ -1,4 +1,4 @@
-"""The isotropic concertina crawler of the paper's figure 13, A to D (section VI).
+"""The isotropic concertina crawler of the paper's figure 13, A to D (section VI); its motion is prescribed.
 
 A straight body forms a bump of arc length epsilon behind its middle (stage 1), passes it on to the front (stage 2) and
 flattens it there (stage 3); the second half period is the mirror image, Theta(s, t + 1/2) = -Theta(s, t). The paper
@@ -12,9 +12,8 @@ in stage 2 (colloc.smooth.concertina). As epsilon -> 0: d ~ epsilon, W_inner ~ e
     python -m scripts.continue_epsilon
 """
 
-from colloc.gaits.problem import Reference
-from colloc.smooth.concertina import Concertina
+from colloc import Concertina, Problem, Reference
 
-PROBLEM = Concertina("concertina", epsilon=0.1, amplitude=1.3, delta=2.5e-5)
-REFERENCE = Reference(1.0, 0.05, "the limit epsilon -> 0: the bound 1/min(mu) of the paper, eq. lambdaupper")
+PROBLEM = Problem("concertina", body=Concertina(epsilon=0.1, amplitude=1.3), delta=2.5e-5)
+REFERENCE = Reference(0.862892, 2e-6, "python -m scripts.continue_epsilon; as epsilon -> 0 it tends to the paper's bound, 1")
 EPSILONS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)

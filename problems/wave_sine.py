@@ -1,14 +1,10 @@
 """Travelling sine wave with large transverse friction (paper, figure 5B): Theta = sin(2 pi (s + t)), mu_t = 100.
 
-The paper prints an efficiency of 0.76; with its printed parameters the computation converges to 0.737066 (and to 0.7623
-for mu_t = 1000). python -m scripts.waves
+The motion is prescribed: nothing is optimised. The paper prints an efficiency of 0.76; with its printed parameters the
+computation converges to 0.737066 (and to 0.7623 for mu_t = 1000). python -m scripts.waves
 """
 
-from colloc.gaits.problem import Reference
-from colloc.mechanics.friction import Friction
-from colloc.smooth.motion import sine_wave
+from colloc import Friction, Problem, Reference, Wave
 
-MOTION = sine_wave(amplitude=1.0, waves=1.0)
-FRICTION = Friction(100.0, 1.0, 1.0)
-DELTA = 1e-4
+PROBLEM = Problem(name="wave_sine", body=Wave("sine", amplitude=1.0, waves=1.0), friction=Friction(100.0, 1.0, 1.0), delta=1e-4)
 REFERENCE = Reference(0.737066, 1e-6, "design notes, section 8; composite Gauss panels")

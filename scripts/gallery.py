@@ -18,17 +18,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from colloc.gaits.problem import Problem, Reference
-from colloc.mechanics.friction import Friction
+from colloc.gaits.problem import Reference
 from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
-from colloc.pictures.style import GREY, snapshot_colours, styled
+from colloc.pictures.style import styled
 from colloc.results.solution import Solution, versions
 from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait
-from colloc.smooth.concertina import Concertina
-from colloc.smooth.motion import Motion
-from colloc.smooth.period import measured_period
-from scripts.models.smooth_record import snapshots
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
@@ -50,11 +45,6 @@ class Example:
     def reference(self) -> Reference | None:
         return self.stated.get("REFERENCE")
 
-    @property
-    def optimised(self) -> bool:
-        """A gait is sought; otherwise a motion is prescribed."""
-        return isinstance(self.stated.get("PROBLEM"), Problem)
-
 
 def examples() -> list[Example]:
     """All files in problems/."""
@@ -63,29 +53,6 @@ def examples() -> list[Example]:
 
 def _problem_files() -> list[Path]:
     return sorted((ROOT / "problems").glob("[!_]*.py"))
-
-
-def _motion(stated: dict[str, Any]) -> tuple[Motion, Friction, float]:
-    """The prescribed motion of a smooth body, friction and delta."""
-    problem = stated.get("PROBLEM")
-    if isinstance(problem, Concertina):
-        return problem.motion(), problem.friction, problem.delta
-    return stated["MOTION"], stated["FRICTION"], stated["DELTA"]
-
-
-def prescribed_row(example: Example) -> dict[str, Any]:
-    """Numbers of a file about a smooth body."""
-    problem = example.stated.get("PROBLEM")
-    motion, friction, delta = _motion(example.stated)
-    p = problem.measured_period(intervals=2) if isinstance(problem, Concertina) else measured_period(motion, friction, delta)
-    return {
-        "status": "computed",
-        "efficiency": p.efficiency,
-        "error": p.errors["efficiency"],
-        "distance": p.d,
-        "work": p.W,
-        "delta": delta,
-    }
 
 
 def solved_row(solution: Solution) -> dict[str, Any]:
@@ -103,21 +70,18 @@ def solved_row(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _picture(example: Example, solution: Solution | None) -> None:
+def _picture(example: Example, solution: Solution) -> None:
     PICTURES.mkdir(parents=True, exist_ok=True)
     with styled():
-        figure = Figure(figsize=_SIZE if solution is not None else (_SIZE[0], _LOW))
-        if solution is not None:
-            grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
-            draw_filmstrip(figure.add_subplot(grid[0, 0]), solution, count=9)
-            draw_lab(figure.add_subplot(grid[1, 0]), solution)
-            t, beside = np.linspace(0.0, 1.0, 801), figure.add_subplot(grid[:, 1])
-            if solution.problem.body.n_joint == 2:
-                draw_shape_path(beside, solution.problem, solution.gait.angles(t))
-            else:
-                draw_angles(beside, t, solution.gait.angles(t), solution.problem.body)
+        figure = Figure(figsize=_SIZE)
+        grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
+        draw_filmstrip(figure.add_subplot(grid[0, 0]), solution, count=9)
+        draw_lab(figure.add_subplot(grid[1, 0]), solution)
+        t, beside = np.linspace(0.0, 1.0, 801), figure.add_subplot(grid[:, 1])
+        if solution.problem.body.n_joint == 2 and solution.problem.gait.free:
+            draw_shape_path(beside, solution.problem, solution.gait.angles(t))
         else:
-            _draw_snapshots(figure, example.stated)
+            draw_angles(beside, t, solution.gait.angles(t), solution.problem.body)
         path = PICTURES / f"{example.name}.png"
         figure.savefig(path, dpi=_RESOLUTION)
     _quantised(Image.open(path)).save(path, optimize=True)
@@ -143,25 +107,6 @@ def _sheet() -> None:
     _quantised(Image.open(SHEET)).save(SHEET, optimize=True)
 
 
-def _draw_snapshots(figure: Figure, stated: dict[str, Any]) -> None:
-    motion, friction, delta = _motion(stated)
-    shown = snapshots(motion, friction, delta, count=6)
-    axes = figure.add_subplot()
-    spacing = max(1.15 * float(np.ptp(shown.x, axis=0).max()), 0.6)
-    tall = float(np.ptp(shown.y))
-    higher = max(1.0, min(_TALLEST, round(_FLAT * spacing / max(tall, 1e-300))))
-    low = higher * float(shown.y.min()) - 0.08 * spacing
-    for k, (t, colour) in enumerate(zip(shown.t, snapshot_colours(shown.t.size), strict=True)):
-        middle = 0.5 * (shown.x[:, k].min() + shown.x[:, k].max())
-        axes.plot(shown.x[:, k] - middle + k * spacing, higher * shown.y[:, k], color=colour, lw=2.4)
-        axes.text(k * spacing, low, f"t = {t:.2f}", ha="center", va="top", color=GREY)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    axes.set_ylim(low - 0.12 * spacing, higher * float(shown.y.max()) + 0.05 * spacing)
-    if higher > 1:
-        axes.set_title(f"heights drawn {higher:.0f} times as large", color=GREY)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     known = [path.stem for path in _problem_files()]
@@ -174,8 +119,8 @@ def main() -> None:
         if names and example.name not in names:
             continue
         begin = time.process_time()
-        solution = best_gait(example.stated["PROBLEM"], example.stated.get("STARTS", STARTS)) if example.optimised else None
-        row = solved_row(solution) if solution is not None else prescribed_row(example)
+        solution = best_gait(example.stated["PROBLEM"], example.stated.get("STARTS", STARTS))
+        row = solved_row(solution)
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row
         _picture(example, solution)

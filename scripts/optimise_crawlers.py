@@ -15,7 +15,7 @@ from colloc.search.bump_optimum import best_start, optimise_bump, prescribed_ver
 from colloc.smooth.bump_body import BumpBody
 from colloc.smooth.concertina import Concertina
 from scripts.figures_smooth import crawler_comparison
-from scripts.models.epsilon_study import delta_for
+from scripts.models.epsilon_study import Crawler, delta_for
 
 EPSILONS, PIECES, ANGLE, SOFTER = (0.1, 0.05, 0.02, 0.01), 12, 1.5, 32
 
@@ -30,7 +30,7 @@ def main() -> None:
     print(f"{'epsilon':>8} {'prescribed':>11} {'+-':>8} {'optimised':>11} {'+-':>8} {'loss ratio':>10} {'CPU s':>8}  optimum")
     for epsilon in options.epsilons:
         body, delta = BumpBody(epsilon, modes=4, panels=6), delta_for(epsilon)
-        prescribed = Concertina(epsilon=epsilon, amplitude=ANGLE, friction=friction, delta=delta).measured_period(intervals=2)
+        prescribed = Crawler(Concertina(epsilon=epsilon, amplitude=ANGLE), friction, delta).measured_period(intervals=2)
         clock = time.process_time()
         above = 2 if starts else 8  # the optimum before is a better start than the prescribed crawler
         start = best_start(body, friction, [prescribed_vertices(body, ANGLE, PIECES), *starts], above * SOFTER * delta)

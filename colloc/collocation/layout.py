@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.path_classes import FreePath
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL
 from colloc.numerics.mesh import Mesh, uniform_mesh
@@ -41,12 +40,10 @@ def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
 def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
     """Index arrays of all variables of a problem on a mesh."""
     n_joint, full = problem.body.n_joint, problem.formulation == FULL
-    gait, path = problem.gait, problem.has_path
-    size = gait.size(n_joint, mesh.n) if isinstance(gait, FreePath) else gait.size(n_joint)
     # without them angles, rates and velocities along a path follow from its parameters
-    n_point = mesh.n_point if full or not path else 0
+    n_point = mesh.n_point if full or not problem.gait.unit_speed else 0
     sizes = {
-        "parameters": (size, 1),
+        "parameters": (problem.gait.size(n_joint, mesh.n), 1),
         "theta": (1, mesh.n_site),
         "distance": (1, mesh.n + 1),
         "work": (1, mesh.n + 1),

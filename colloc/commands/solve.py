@@ -19,7 +19,7 @@ from colloc.commands.options import add_bound, add_printing, add_problem, change
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.results.level import REDUCED, Level
+from colloc.results.level import PRESCRIBED, REDUCED, Level
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
@@ -107,6 +107,8 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
 def _search_lines(solution: Solution) -> list[str]:
     """What was solved last, and what the gait is the best of."""
     level = solution.last
+    if level.program == PRESCRIBED:
+        return [f"nothing is free: the motion is prescribed, measured on a mesh of {level.edges.size - 1} intervals"]
     rows = f"{level.x.size} variables, {level.lam_g.size} constraints"
     how = f"{level.iterations} iterations of IPOPT" if level.program != REDUCED else level.status
     lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {level.kkt_error:.0e}"]

@@ -1,4 +1,4 @@
-"""Gaits, classes of gaits and bodies as plain dictionaries (JSON), and back. The name of the first field tells the kind."""
+"""Gaits, classes of gaits and bodies as plain dictionaries (JSON), and back. The names of the fields tell the kind."""
 
 from __future__ import annotations
 
@@ -11,17 +11,20 @@ import numpy as np
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
+from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_body import ModalBody
+from colloc.smooth.prescribed_body import Wave
 
 AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners)
-CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon)
-BODIES: list[type] = [Chain, ModalBody]
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Phases)
+CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Prescribed)
+BODIES: list[type] = [Chain, ModalBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 
 
@@ -32,8 +35,9 @@ def fields(value: Any) -> dict[str, Any]:
 
 
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
-    for kind in kinds:
-        # the first field tells the kind
+    exact = [kind for kind in kinds if {f.name for f in dataclasses.fields(kind)} == set(given)]
+    for kind in (*exact, *kinds):
+        # fields that are left out have defaults: the first one tells the kind
         if dataclasses.fields(kind)[0].name in given:
             return kind(**given)
     raise KeyError(f"one of {', '.join(dataclasses.fields(kind)[0].name for kind in kinds)}")

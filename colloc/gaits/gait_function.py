@@ -21,6 +21,9 @@ class GaitFunction:
     joint 2: +0.0000 -2.0000 cos 2πt +1.0000 sin 2πt
     """
 
+    is_series = False
+    """Whether it is a Fourier series of the phase."""
+
     @property
     def n_joint(self) -> int:
         raise NotImplementedError

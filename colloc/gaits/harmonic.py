@@ -20,6 +20,9 @@ from colloc.gaits.symmetry import SYMMETRIES, fraction
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
+_COARSE = 16
+"""Intervals a period, at least, from which a mesh is grown; also two for every harmonic."""
+
 
 @named_arguments
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,6 +45,8 @@ class Fourier(GaitFunction):
     mean: np.ndarray
     cos: np.ndarray
     sin: np.ndarray
+
+    is_series = True
 
     def __post_init__(self) -> None:
         for name, ndim in (("mean", 1), ("cos", 2), ("sin", 2)):
@@ -72,6 +77,17 @@ class Fourier(GaitFunction):
         return 2 * np.pi
 
     @property
+    def shape_speed(self) -> float:
+        """Root-mean-square shape speed, in rad per radian of phase."""
+        k = np.arange(1, self.n_harmonic + 1)
+        return float(np.sqrt(0.5 * np.sum(k**2 * (self.cos**2 + self.sin**2))))
+
+    @property
+    def corner_phases(self) -> np.ndarray:
+        """Phases in (0, 1) where the rates jump: none."""
+        return np.empty(0)
+
+    @property
     def n_harmonic(self) -> int:
         return self.cos.shape[1]
 
@@ -90,7 +106,7 @@ class Fourier(GaitFunction):
         return -self.cos @ (k * sin) + self.sin @ (k * cos)
 
     def lines(self, coordinate: str = "joint") -> list[str]:
-        """The formula, joint by joint, or whatever the body's shape coordinates are."""
+        """The formula, joint by joint, or mode by mode."""
         found = []
         for j in range(self.n_joint):
             terms = [_rounded(self.mean[j])]
@@ -154,6 +170,11 @@ class Harmonic:
     harmonics: int = 1
     symmetry: str = "none"
 
+    free = True
+    unit_speed = False
+    delta_start = None
+    moves_knots = True
+
     def __post_init__(self) -> None:
         if not isinstance(self.harmonics, (int, np.integer)) or not 1 <= self.harmonics <= 64:
             raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
@@ -168,6 +189,22 @@ class Harmonic:
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
         return round(self.fraction * (30 + 10 * self.harmonics))
+
+    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        """Intervals that a mesh with so many points on each needs at least, and for what."""
+        return max(2, -(-4 * self.harmonics // per_interval)), f"{self.harmonics} harmonics"
+
+    def first_edges(self, edges: np.ndarray) -> np.ndarray:
+        """The mesh from which a finer one is grown: a coarse uniform one."""
+        return np.linspace(edges[0], edges[-1], max(int(_COARSE * self.fraction), 2 * self.harmonics) + 1)
+
+    def series(self, harmonics: int) -> Harmonic:
+        """Fourier series that stand for its gaits: its members are such."""
+        return self
+
+    def own_checks(self, gait: Fourier) -> list[tuple[str, float, float, str]]:
+        """What a certificate checks of a member beyond what all gaits have to keep."""
+        return []
 
     def describe(self) -> str:
         """The class in words, for reports."""
@@ -194,7 +231,7 @@ class Harmonic:
                 columns.append(column.ravel())
         return np.array(columns).T
 
-    def size(self, n_joint: int) -> int:
+    def size(self, n_joint: int, n_interval: int | None = None) -> int:
         """Number of parameters."""
         return self._basis(n_joint).shape[1]
 

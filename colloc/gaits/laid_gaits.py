@@ -67,7 +67,7 @@ def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float
 
     Harmonic gaits measure it per period, paths at unit shape speed.
     """
-    return at_unit_speed * (path_length(gait) if isinstance(gait_class, Harmonic) else 1.0)
+    return at_unit_speed * (1.0 if gait_class.unit_speed else path_length(gait))
 
 
 def prolonged(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, SYMMETRIES, fraction
 from colloc.system.argument_names import named_arguments
@@ -21,6 +22,11 @@ from colloc.system.errors import ProblemError
 
 _ARCS, _PARAMETERS = 120, 250
 """Arcs of a free path over a period, and at most so many parameters in them all."""
+
+_DELTA_START = 0.01
+"""Where searches begin in delta at unit shape speed [body lengths per radian of path]."""
+JOINS, CURVATURE = 1e-8, 1e-6
+"""Largest jump [rad] and relative excess of the curvature that a certificate allows."""
 
 
 def _check_symmetry(symmetry: object) -> None:
@@ -53,6 +59,12 @@ class FreePath:
     symmetry: str = NONE
     winding: int | None = None
 
+    free = True
+    unit_speed = True
+    delta_start = _DELTA_START
+    moves_knots = False
+    of_arcs = True
+
     def __post_init__(self) -> None:
         value = self.curvature
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
@@ -78,6 +90,26 @@ class FreePath:
         """The class in words, for reports."""
         turns = "" if self.winding is None else f", winding {self.winding}"
         return f"paths of curvature <= {self.curvature:g} per rad, symmetry {self.symmetry}{turns}"
+
+    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        """Intervals that a mesh needs at least, and for what."""
+        return 4, "a path"
+
+    def first_edges(self, edges: np.ndarray) -> np.ndarray:
+        """The mesh from which a finer one is grown: its own, because its arcs are the intervals."""
+        return edges
+
+    def series(self, harmonics: int) -> Harmonic:
+        """Fourier series in arc length that stand for its gaits."""
+        return Harmonic(harmonics, self.symmetry)
+
+    def own_checks(self, gait: ArcPath) -> list[tuple[str, float, float, str]]:
+        """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""
+        excess = max(gait.largest_curvature() / self.curvature - 1, 0.0)
+        return [
+            ("joins", gait.largest_jump(), JOINS, "jump of the joint angles where arcs or symmetric halves meet [rad]"),
+            ("curvature", excess, CURVATURE, "of the path between nodes, relative excess over its bound"),
+        ]
 
     def size(self, n_joint: int, n_interval: int) -> int:
         """Number of parameters."""
@@ -131,6 +163,12 @@ class Polygon:
     axis: str = "corner"
     shortest_side: float = 0.02
 
+    free = True
+    unit_speed = True
+    delta_start = _DELTA_START
+    moves_knots = False
+    of_arcs = False
+
     def __post_init__(self) -> None:
         if isinstance(self.corners, bool) or not isinstance(self.corners, (int, np.integer)) or not 2 <= self.corners <= 64:
             raise ProblemError(f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}.")
@@ -172,7 +210,23 @@ class Polygon:
             return self.corners
         return (self.corners + sum(self.half_ends)) // 2
 
-    def size(self, n_joint: int) -> int:
+    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        """Intervals that a mesh needs at least, and for what."""
+        return 2 * self.pieces, "the sides"
+
+    def first_edges(self, edges: np.ndarray) -> np.ndarray:
+        """The mesh from which a finer one is grown: its own, because corners are knots."""
+        return edges
+
+    def series(self, harmonics: int) -> Harmonic:
+        """Fourier series in arc length that stand for its gaits."""
+        return Harmonic(harmonics, self.symmetry)
+
+    def own_checks(self, gait: Corners) -> list[tuple[str, float, float, str]]:
+        """What a certificate checks of a member beyond what all gaits have to keep."""
+        return []
+
+    def size(self, n_joint: int, n_interval: int | None = None) -> int:
         """Number of parameters."""
         return n_joint * (self.pieces + 1)
 

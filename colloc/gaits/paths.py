@@ -13,8 +13,11 @@ import numpy as np
 
 from colloc.gaits.arcs import advance, direction
 from colloc.gaits.gait_function import GaitFunction
-from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced
+from colloc.gaits.symmetry import SYMMETRIES, both_halves, fraction, imaged, reduced
 from colloc.system.errors import ProblemError
+
+_BESIDE = 1e-10
+_FINE_PHASES = 20000
 
 
 def _finite(name: str, value: object, ndim: int) -> np.ndarray:
@@ -119,6 +122,29 @@ class ArcPath(GaitFunction):
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         return self._both(t)[1]
 
+    @property
+    def shape_speed(self) -> float:
+        """Root-mean-square shape speed, in rad per radian of phase."""
+        return self.length / (2 * np.pi)
+
+    @property
+    def corner_phases(self) -> np.ndarray:
+        """Phases in (0, 1) where the rates jump: none."""
+        return np.empty(0)
+
+    def largest_jump(self) -> float:
+        """Largest jump of the angles where arcs meet and where a symmetry continues them [rad]."""
+        seams = np.concatenate([self.edges, 1 - self.edges, 0.5 + self.edges])
+        seams = seams[(seams > _BESIDE) & (seams < 1 - _BESIDE)]
+        jump = np.linalg.norm(self.angles(seams + _BESIDE) - self.angles(seams - _BESIDE), axis=0).max()
+        return float(max(jump - 2 * _BESIDE * self.length, 0.0))
+
+    def largest_curvature(self) -> float:
+        """From the directions of the rates alone, at phases spread over the period [1/rad]."""
+        tangent = self.rates(np.linspace(0.0, 1.0, _FINE_PHASES + 1)) / self.length
+        turn = 2 * np.arcsin(0.5 * np.linalg.norm(np.diff(tangent), axis=0))
+        return float(turn.max()) * _FINE_PHASES / self.length
+
     def curvatures(self) -> np.ndarray:
         """Curvature of each arc [1/rad], ``(n,)``; signed, positive to the left, for two joints."""
         turn = np.diff(self.tangents)
@@ -204,6 +230,16 @@ class Corners(GaitFunction):
     def speed_unit(self) -> float:
         """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
         return self.length
+
+    @property
+    def shape_speed(self) -> float:
+        """Root-mean-square shape speed, in rad per radian of phase."""
+        return self.length / (2 * np.pi)
+
+    @property
+    def corner_phases(self) -> np.ndarray:
+        """Phases in (0, 1) where the rates jump."""
+        return both_halves(self.symmetry, self.phases)
 
     @property
     def phases(self) -> np.ndarray:

@@ -13,8 +13,9 @@ import numpy as np
 from colloc.gaits.gait_fields import BODIES, CLASSES, GAITS, AnyClass, AnyGait, body_from, class_from, fields, gait_from
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
+from colloc.gaits.prescribed import Prescribed
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -22,8 +23,6 @@ from colloc.numerics.schemes import scheme
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
-PATH_DELTA_START = 0.01
-_PATH_CLASSES = (FreePath, Polygon)
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 LONGEST_NAME = 200
@@ -76,7 +75,8 @@ class Problem:
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
     gait : Harmonic, FreePath or Polygon
-        The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md).
+        The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md). By default one
+        harmonic or, for a body whose motion is prescribed, that motion (`colloc.gaits.prescribed`).
     delta : float
         Regularisation speed of friction at which the problem is finally solved, in body lengths per period; for free paths
         and polygons at unit shape speed, in body lengths per radian of path. By default 1e-4 for chains; 1e-2 for smooth
@@ -121,7 +121,7 @@ class Problem:
     guess: AnyGait = None
     body: Body = Chain()
     friction: Friction = Friction()
-    gait: AnyClass = Harmonic()
+    gait: AnyClass = None
     delta: float = None  # type: ignore[assignment]
     delta_start: float = None  # type: ignore[assignment]
     joint_limit: float = None  # type: ignore[assignment]
@@ -132,14 +132,18 @@ class Problem:
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
+        self._check_body()
+        schedule = self.body.schedule
+        self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
         self._check_parts()
         usual = self.body.usual
-        start = PATH_DELTA_START if self.has_path else usual.delta_start
+        start = usual.delta_start if self.gait.delta_start is None else self.gait.delta_start
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
         if self.guess is None:
-            self._fill(guess=travelling_wave(self.body, self.joint_limit))
+            free = self.gait.free
+            self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
         if not isinstance(self.guess, GAITS):
             raise ProblemError(f"guess must be a {_names(GAITS)}, not {type(self.guess).__name__}.")
         self._check_symmetry()
@@ -151,6 +155,10 @@ class Problem:
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
 
+    def _check_body(self) -> None:
+        if isinstance(self.body, type) or not isinstance(self.body, Body):
+            raise ProblemError(f"body must be a {_names(BODIES)}, not {type(self.body).__name__}.")
+
     def _check_parts(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
@@ -161,13 +169,9 @@ class Problem:
         for field, kinds in (("friction", (Friction,)), ("gait", CLASSES)):
             if not isinstance(getattr(self, field), kinds):
                 raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(getattr(self, field)).__name__}.")
-        if isinstance(self.body, type) or not isinstance(self.body, Body):
-            raise ProblemError(f"body must be a {_names(BODIES)}, not {type(self.body).__name__}.")
-
-    @property
-    def has_path(self) -> bool:
-        """Whether the class bounds the path itself (free paths, polygons) rather than its harmonics."""
-        return isinstance(self.gait, _PATH_CLASSES)
+        if self.gait.free == bool(self.body.schedule):
+            what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
+            raise ProblemError(f"{what}; leave gait out, or take another body.")
 
     def _check_numbers(self) -> None:
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
@@ -202,13 +206,9 @@ class Problem:
 
     def _check_resolution(self) -> None:
         collocation, kind = scheme(self.scheme), type(self.gait).__name__
-        if isinstance(self.gait, Harmonic):
-            per_interval = collocation.s - collocation.left
-            fewest, what = max(2, -(-4 * self.gait.harmonics // per_interval)), f"{self.gait.harmonics} harmonics"
-        else:
-            if collocation.left:
-                raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
-            fewest, what = (2 * self.gait.pieces, "the sides") if isinstance(self.gait, Polygon) else (4, "a path")
+        if self.gait.unit_speed and collocation.left:
+            raise ProblemError(f"the class {kind} needs a gauss-N or radau-N scheme, not {self.scheme}.")
+        fewest, what = self.gait.fewest_intervals(collocation.s - collocation.left)
         if self.intervals < fewest:
             raise ProblemError(
                 f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot resolve {what}; "
@@ -221,7 +221,7 @@ class Problem:
                 f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
                 f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."
             )
-        if self.has_path and self.body.n_joint < 2:
+        if self.gait.unit_speed and self.body.n_joint < 2:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
             raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
@@ -237,7 +237,7 @@ class Problem:
         if isinstance(self.gait, Harmonic):
             near = fourier_through(self.guess, self.gait)
             guess: AnyGait = self.gait.fourier(self.gait.parameters(near), self.body.n_joint)
-            rms = np.sqrt(0.5 * np.sum(np.arange(1, guess.n_harmonic + 1) ** 2 * (guess.cos**2 + guess.sin**2)))
+            rms = guess.shape_speed
         else:
             guess = self.guess
             points = symmetric_samples(guess, self.gait.symmetry)
@@ -248,11 +248,12 @@ class Problem:
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
             )
         angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
-        largest = np.abs(self.body.limited @ angles).max(axis=1)
-        if (largest > self.joint_limit + self.body.usual.excess).any():
-            which = int(np.argmax(largest))
+        largest = self.body.largest_angles(angles).max()
+        if largest > self.joint_limit + self.body.usual.excess:
+            each = np.abs(self.body.limited @ angles).max(axis=1, initial=0.0)
+            which = self.body.limit_names[np.argmax(each)] if each.size else "the tangent"
             raise ProblemError(
-                f"guess is inadmissible: {self.body.limit_names[which]} reaches {largest[which]:.4g} rad, "
+                f"guess is inadmissible: {which} reaches {largest:.4g} rad, "
                 f"beyond the limit {self.joint_limit:.4g}; make its amplitude smaller."
             )
         depth = self.body.crossing_depth(angles)

@@ -42,21 +42,14 @@ def largest_amplitude(problem: Problem, gait: Fourier) -> float:
     return largest_factor(problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES))
 
 
-def shape_speed(gait: Fourier) -> float:
-    """Root-mean-square shape speed, in rad per radian of phase."""
-    k = np.arange(1, gait.n_harmonic + 1)
-    return float(np.sqrt(0.5 * np.sum(k**2 * (gait.cos**2 + gait.sin**2))))
-
-
 def seed_class(problem: Problem) -> Harmonic:
     """The harmonics that starts are drawn from: the problem's own, or a few where its class bounds the path."""
-    return problem.gait if isinstance(problem.gait, Harmonic) else Harmonic(PATH_SEED_HARMONICS, problem.gait.symmetry)
+    return problem.gait.series(PATH_SEED_HARMONICS)
 
 
 def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
     """Whether a gait is as slow as ``smallest_shape_speed`` allows: then that bound, and no mechanics, decided its size."""
-    speed = shape_speed(gait) if isinstance(gait, Fourier) else gait.length / (2 * np.pi)
-    return speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
+    return gait.shape_speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
 def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
@@ -79,7 +72,7 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
     again = np.random.default_rng([seed, block, row + 1])
     for _ in range(_ATTEMPTS):
         gait = _scaled(problem, unit)
-        if shape_speed(gait) > _CLEARLY_MOVING * problem.smallest_shape_speed:
+        if gait.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
         unit = again.random(dimension)
     raise ProblemError(
@@ -120,7 +113,7 @@ def perturbed_gait(problem: Problem, optima: Sequence[AnyGait], seed: int, start
         drawn = Fourier(mean, cos, sin)
         member = seed_class(problem).fourier(seed_class(problem).parameters(drawn), problem.body.n_joint)
         gait = _multiplied(problem, member, min(1.0, 1.0 / largest_amplitude(problem, member)))
-        if shape_speed(gait) > _CLEARLY_MOVING * problem.smallest_shape_speed:
+        if gait.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
     raise ProblemError(f"found no admissible start within {spread:g} rad of the known optimum; change the spread.")
 

@@ -30,6 +30,13 @@ def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.where(image, other, phase), image
 
 
+def both_halves(symmetry: str, phases: np.ndarray) -> np.ndarray:
+    """Phases in (0, 1) of instants ``(n,)`` of the solved part and of their images."""
+    images = {NONE: phases, BILATERAL: 1 - phases, ANTIPODAL: 0.5 + phases}[symmetry]
+    both = np.concatenate([phases, images])
+    return np.unique(both[(both > 0) & (both < 1)])
+
+
 def imaged(symmetry: str, angles: np.ndarray, rates: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Angles and rates ``(n_joint, n_time)``, those of the columns `image` turned into their images."""
     if symmetry == BILATERAL:

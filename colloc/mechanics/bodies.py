@@ -157,7 +157,8 @@ class Usual(NamedTuple):
 
     delta, delta_start: regularisation speeds of the end and the start of a search [body lengths per period]. limit: on the
     angles of `Body.limited`, largest_limit: the most that may be asked for, limit_name: what the bound is called. Allowed are
-    an excess over it [rad] and a relative change of the efficiency for delta -> 0.
+    an excess over it [rad] and a relative change of the efficiency for delta -> 0. A replay begins with at least so many
+    instants, and so many for each point of the mesh, which an optimiser may have exploited.
     """
 
     delta: float
@@ -167,6 +168,8 @@ class Usual(NamedTuple):
     limit_name: str
     excess: float
     delta_influence: float
+    instants: int = 1600
+    instants_a_point: int = 10
 
 
 @runtime_checkable
@@ -212,6 +215,11 @@ class Body(Protocol):
 
     def describe(self) -> str:
         """The body in words, for reports."""
+
+    @property
+    def schedule(self) -> tuple[float, ...]:
+        """Of a body whose motion is prescribed: phases from 0 to the part of the period that is solved, between which it is
+        smooth in time. Its shape coordinates are the point (cos 2 pi t, sin 2 pi t). Empty for bodies that are free to move."""
 
     # mechanics
     def sliding(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:

@@ -57,6 +57,7 @@ class Chain(Links):
 
     formulations = (FULL, IMPLICIT)
     coordinate, quantity = "joint", "joint angle"
+    schedule: tuple[float, ...] = ()
     looks_for_all_velocities = True
     usual = Usual(
         delta=1e-4, delta_start=0.1, limit=float(np.pi), largest_limit=float(np.pi), limit_name="joint limits", excess=1e-6,

@@ -47,7 +47,7 @@ class _Scene:
     def __init__(self, solution: Solution, shown: Frames, arrows: bool, width: int) -> None:
         self.shown, self.hinges = shown, solution.problem.body.hinges
         low, high = _window(shown)
-        planar = solution.problem.body.n_joint >= 2
+        planar = solution.problem.gait.free and solution.problem.body.n_joint >= 2
         share = 0.68 if planar else 0.97
         span = high - low
         tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width

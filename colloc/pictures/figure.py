@@ -215,7 +215,8 @@ def solution_figure(solution: Solution) -> Figure:
         )  # fmt: skip
         lab, plane, speeds, power = (figure.add_subplot(grid[k]) for k in range(4))
         draw_lab(lab, solution)
-        if len(angles) == 2:
+        planar = len(angles) == 2 and solution.problem.gait.free
+        if planar:
             draw_shape_path(plane, solution.problem, angles)
         else:  # no one plane shows them all
             draw_angles(plane, t, angles, solution.problem.body)
@@ -223,7 +224,7 @@ def solution_figure(solution: Solution) -> Figure:
         draw_power(power, solution, t)
         titles = (
             "in the lab (black: at the end)",
-            "shape space (disc: t = 0)" if len(angles) == 2 else f"{solution.problem.body.quantity}s",
+            "shape space (disc: t = 0)" if planar else f"{solution.problem.body.quantity}s",
             "speeds along the body; what is near δ sticks",
             f"W = {solution.measured.work:.4f} a period (ticks: mesh)",
         )

@@ -89,7 +89,7 @@ def panels(solution: Solution) -> dict[str, Panel]:
         "convergence": Panel(COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),
         "mesh": Panel(COLUMN, 2.2, lambda axes: draw_mesh(axes, solution, mesh_errors(solution))),
     }
-    for j in range(len(angles) - 1):
+    for j in range(len(angles) - 1 if solution.problem.gait.free else 0):
         found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, _plane(solution, angles, j))
     return found
 

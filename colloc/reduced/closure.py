@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import seed_class
@@ -63,10 +63,10 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
     delta : float, optional
         In the units of the problem's class; by default the problem's.
     """
-    if problem.gait.symmetry != NONE or not isinstance(gait, Fourier):
+    if problem.gait.symmetry != NONE or not gait.is_series:
         return gait
     delta = problem.delta if delta is None else delta
-    if problem.has_path:
+    if problem.gait.unit_speed:
         delta *= path_length(gait)
     harmonics: Harmonic = seed_class(problem)
     space, v = space_near(problem.with_(gait=harmonics, guess=gait, intervals=_INTERVALS + 4 * harmonics.harmonics), gait)

@@ -15,7 +15,6 @@ from colloc.collocation.path_equations import chord
 from colloc.collocation.path_transcription import path_through, transcribe_fit
 from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.path_classes import FreePath
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
@@ -62,7 +61,7 @@ class PathSpace:
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
         gait, n_joint = problem.gait, problem.body.n_joint
-        self.shapes, self._arcs = np.arange(fit.lower.size), isinstance(gait, FreePath)
+        self.shapes, self._arcs = np.arange(fit.lower.size), gait.of_arcs
         self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
         self.own = np.arange(fit.lower.size)
         if self._arcs:

@@ -1,13 +1,19 @@
-"""Programs and classes of gaits for a problem of any kind: which of them a class of gaits wants."""
+"""Programs and classes of gaits for a problem of any kind: which of them a class of gaits wants.
+
+A class in whose parameters the angles are linear, as `Harmonic`, needs nothing here. Another kind registers its own.
+"""
 
 from __future__ import annotations
+
+from functools import singledispatch
 
 import numpy as np
 
 from colloc.collocation.path_transcription import transcribe_path
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
-from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.gait_fields import AnyClass, AnyGait
+from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
@@ -21,9 +27,18 @@ def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray
 
     Self-contact is constrained between links two apart, and between the pairs `far` (see `colloc.search.far_contact`).
     """
-    if problem.has_path:
-        return transcribe_path(problem, problem.guess if gait is None else gait, edges, far)
+    return _program(problem.gait, problem, problem.guess if gait is None else gait, edges, far)
+
+
+@singledispatch
+def _program(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, far: Pairs) -> GaitProgram:
     return transcribe(problem, edges, far)
+
+
+@_program.register(FreePath)
+@_program.register(Polygon)
+def _path_program(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, far: Pairs) -> GaitProgram:
+    return transcribe_path(problem, gait, edges, far)
 
 
 def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
@@ -49,8 +64,19 @@ def space_near(
     NotConvergedError
         If no path of the class is found near the gait.
     """
-    space = PathSpace(problem, gait, edges, scheme) if problem.has_path else HarmonicSpace(problem, edges, scheme)
+    space = _space(problem.gait, problem, gait, edges, scheme)
     return space, space.parameters(gait)
+
+
+@singledispatch
+def _space(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, scheme: str) -> SearchSpace:
+    return HarmonicSpace(problem, edges, scheme)
+
+
+@_space.register(FreePath)
+@_space.register(Polygon)
+def _path_space(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, scheme: str) -> SearchSpace:
+    return PathSpace(problem, gait, edges, scheme)
 
 
 def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
@@ -21,7 +19,6 @@ from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import Path, Replay, replay
 
 KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK = 1e-6, 1e-8, 1e-6, 1e-9, 1e-4, 1e-6, 1e-4, 1e-7
-CURVATURE = 1e-6
 """Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
 order; so the rotation is limited by what it changes there, to as much as collocation may be wrong by (GAP). What delta may
 change is the body's own (`colloc.mechanics.bodies.Usual`)."""
@@ -42,16 +39,6 @@ def gait_path(solution: Solution) -> Path:
     return lambda t: (gait.angles(t), gait.rates(t))
 
 
-def corner_phases(gait: AnyGait) -> np.ndarray:
-    """Phases in (0, 1) where the rates of a gait jump."""
-    if not isinstance(gait, Corners):
-        return np.empty(0)
-    phases = gait.phases
-    images = {"none": phases, "bilateral": 1 - phases, "antipodal": 0.5 + phases}[gait.symmetry]
-    both = np.concatenate([phases, images])
-    return np.unique(both[(both > 0) & (both < 1)])
-
-
 def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
     """Replay the last level's gait on a much finer grid and measure everything a claim of success rests on.
 
@@ -61,7 +48,7 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     tolerance : float
         Relative error of the replayed efficiency; a replay that does not reach it fails its check.
     instants : int, optional
-        Instants of the first replay grid; by default at least ten times the collocation points of a period.
+        Instants of the first replay grid; by default many times the collocation points of a period.
 
     Raises
     ------
@@ -78,7 +65,9 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     problem = solution.problem
     path = gait_path(solution)
     if instants is None:
-        instants = max(1600, 2 * int(np.ceil(5 * solution.mesh.n_point / problem.gait.fraction)))
+        usual = problem.body.usual
+        each = 0.5 * usual.instants_a_point / problem.gait.fraction
+        instants = max(usual.instants, 2 * int(np.ceil(each * solution.mesh.n_point)))
     known = measured(
         problem.body,
         problem.friction,
@@ -86,7 +75,7 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
         solution.delta_per_period,
         tolerance=tolerance,
         instants=instants,
-        breaks=corner_phases(solution.gait),
+        breaks=solution.gait.corner_phases,
     )
     fine = known.fine
     checks = (
@@ -162,6 +151,8 @@ def _optimality(solution: Solution) -> list[Check]:
 def _second_order(solution: Solution) -> Check:
     """Whether the gait is a local optimum and no other critical point, in the space of its class."""
     problem, level = solution.problem, solution.last
+    if not problem.gait.free:
+        return Check("second order", 0.0, SADDLE, "nothing is free in a prescribed motion")
     space, v = space_near(problem, solution.gait, level.edges, level.scheme)
     space = space.with_far(problem.body.far_pairs)
     space.move_checks(v)
@@ -221,31 +212,9 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
     return Check("one motion", fine.ambiguity, MOTIONS, meaning)
 
 
-_BESIDE = 1e-10
-
-
-def _largest_jump(gait: ArcPath) -> float:
-    """Largest jump of the angles of a free path where its arcs meet and where a symmetry continues it."""
-    seams = np.concatenate([gait.edges, 1 - gait.edges, 0.5 + gait.edges])
-    seams = seams[(seams > _BESIDE) & (seams < 1 - _BESIDE)]
-    jump = np.linalg.norm(gait.angles(seams + _BESIDE) - gait.angles(seams - _BESIDE), axis=0).max()
-    return float(max(jump - 2 * _BESIDE * gait.length, 0.0))
-
-
 def _class(solution: Solution) -> list[Check]:
-    """How far a free path bends more than its class allows, from the directions of its rates alone."""
-    gait = solution.gait
-    if not isinstance(gait, ArcPath):
-        return []
-    t = np.linspace(0.0, 1.0, _FINE_PHASES + 1)
-    tangent = gait.rates(t) / gait.length
-    turn = 2 * np.arcsin(0.5 * np.linalg.norm(np.diff(tangent), axis=0))
-    curvature = float(turn.max()) * _FINE_PHASES / gait.length
-    excess = max(curvature / solution.problem.gait.curvature - 1, 0.0)
-    return [
-        Check("joins", _largest_jump(gait), VIOLATION, "jump of the joint angles where arcs or symmetric halves meet [rad]"),
-        Check("curvature", excess, CURVATURE, "of the path between nodes, relative excess over its bound"),
-    ]
+    """What members of its class have to keep besides."""
+    return [Check(*line) for line in solution.problem.gait.own_checks(solution.gait)]
 
 
 def _mesh(solution: Solution) -> list[Check]:

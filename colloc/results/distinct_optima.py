@@ -25,7 +25,7 @@ SERIES_HARMONICS = 16
 
 def series_class(problem: Problem) -> Harmonic:
     """The class of the Fourier series that stand for gaits of a problem: its own, if that is one of harmonics."""
-    return Harmonic(SERIES_HARMONICS, problem.gait.symmetry) if problem.has_path else problem.gait
+    return problem.gait.series(SERIES_HARMONICS)
 
 
 def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-REDUCED = "reduced"
+REDUCED, PRESCRIBED = "reduced", "prescribed"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,7 +38,7 @@ class Level:
         Collocation scheme, which refinement may have raised in order; "" for the problem's.
     program : str
         What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
-        formulation.
+        formulation; "prescribed" where nothing is free.
     """
 
     delta: float

@@ -61,6 +61,7 @@ _GAIT_ARRAYS = {
     "tangents": ("heading in rad, or unit vector", "component, edge"),
     "length": ("rad", ""),
     "corners": ("rad", "joint, vertex"),
+    "schedule": ("period", "stage"),
 }
 
 

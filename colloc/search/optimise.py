@@ -18,6 +18,7 @@ from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
+from colloc.search.prescribed import measured
 from colloc.search.reduced_search import Found, descended, refined, searched
 from colloc.search.saddles import off_saddles
 from colloc.system.errors import NotConvergedError
@@ -58,6 +59,11 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
         Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
     """
     begin, levels = time.perf_counter(), list(before)
+    if not problem.gait.free:
+        level, message = measured(problem)
+        if on_level is not None:
+            on_level(level)
+        return Solution(problem, [level], seconds=time.perf_counter() - begin, message=message)
     scaled, unit = in_friction_units(problem)
 
     def report(level: Level) -> None:
@@ -109,8 +115,8 @@ def maximise_efficiency(
     'solved'
     """
     begin = time.perf_counter()
-    solution = literal_optimum(problem, on_level) if literal else optimum(problem, on_level, before)
-    if is_trivial(solution):
+    solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
+    if problem.gait.free and is_trivial(solution):
         solution.message = (
             "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
             "efficiency). Try another guess, or an imposed symmetry."
@@ -149,7 +155,7 @@ def best_gait(
         ``solution.starts`` and ``solution.others`` say what it is the best of; where it shrank to the bound on the shape speed,
         ``solution.finite`` is the best gait that did not, if there is one.
     """
-    if starts == 1 or before:
+    if starts == 1 or before or not problem.gait.free:
         return maximise_efficiency(problem, on_level, before)
     begin = time.perf_counter()
     scaled, unit = in_friction_units(problem)
@@ -197,7 +203,7 @@ def _certified(solution: Solution) -> None:
         advice = " and ".join(dict.fromkeys(ADVICE.get(c.name, FINER) for c in failed))
         parts = [f"the certificate failed: {failures}. Try {advice}.", solution.message]
         solution.message = " ".join(p for p in parts if p)
-    elif on_speed_floor(problem, solution.gait):
+    elif problem.gait.free and on_speed_floor(problem, solution.gait):
         solution.message = (
             f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: the gait shrinks as far "
             "as it may, smaller ones are more efficient still. Lower the bound (and delta with it) to see how far that goes."

@@ -35,6 +35,8 @@ class SmoothSolution:
     power : rate of work against friction
     centre : (2, n_time)
         Velocity of the centre of mass, in the same axes.
+    force : (3, n_time)
+        Net force and torque about the tail or, where the velocities were solved for, about the part at rest.
     bending_power : power of what bends the body; equals `power` in balance
     power_inside : the part of it done on the arcs `regions`
     slowest : smallest speed of a whole panel: how fast the part at stick creeps
@@ -48,6 +50,7 @@ class SmoothSolution:
     z: np.ndarray
     power: np.ndarray
     centre: np.ndarray
+    force: np.ndarray
     bending_power: np.ndarray
     power_inside: np.ndarray
     slowest: np.ndarray
@@ -116,6 +119,7 @@ def solve_smooth(
     refinements: int = 40,
     regions: tuple[tuple[float, float], ...] = (),
     method: str = "auto",
+    slide: np.ndarray | None = None,
 ) -> SmoothSolution:
     """Velocities that put a smooth body in force and torque balance at phases t.
 
@@ -139,6 +143,8 @@ def solve_smooth(
     regions : tuple of (float, float)
         Arcs whose power is reported separately; their ends should be breaks of the motion.
     method : {"auto", "newton", "fixed_point"}
+    slide : (3, n_time), optional
+        Tail velocities to slide with, in the place of those that balance.
 
     Raises
     ------
@@ -150,11 +156,14 @@ def solve_smooth(
     t = np.atleast_1d(np.asarray(t, dtype=float))
     n = t.size
     out = {name: np.zeros(n) for name in ("power", "bending_power", "power_inside", "slowest", "residual", "quadrature_error")}
-    out["centre"] = np.zeros((2, n))
+    out["centre"], out["force"] = np.zeros((2, n)), np.zeros((3, n))
     z_tail, n_panel, iterations = np.zeros((3, n)), np.zeros(n, dtype=int), np.zeros(n, dtype=int)
 
     active, edges = np.arange(n), motion.first_edges(t, panels)
     anchor, velocity = np.full(n, len(edges) // 2), np.zeros((3, n))
+    if slide is not None:
+        anchor, velocity = np.zeros(n, dtype=int), slide.copy()
+        velocity[2] += motion.rate(np.zeros((1, n)), t)[0]
     for level in range(refinements + 1):
         grid = Panels(edges, order)
         # work in units of the largest rate: the law is homogeneous once delta scales along
@@ -164,7 +173,10 @@ def solve_smooth(
         def make(members: np.ndarray, reference: int, fields: PanelFields = fields) -> PanelBatch:
             return PanelBatch(fields, friction, members, reference)
 
-        if level == 0:
+        if slide is not None:
+            state = starting_state(anchor, velocity / speed)
+            state.residual[:] = 0.0
+        elif level == 0:
             # one cheap pass finds what rests, so that the anchor is right before anything is judged
             state = starting_state(anchor, velocity / speed)
             solve(state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
@@ -173,7 +185,8 @@ def solve_smooth(
             state = starting_state(state.anchor, state.velocity)
         else:
             state = starting_state(anchor, velocity / speed)
-        solve(state, make, 5, d, tolerance, max_iterations, method)
+        if slide is None:
+            solve(state, make, 5, d, tolerance, max_iterations, method)
         iterations[active] += state.iterations
         velocity = state.velocity * speed
 
@@ -188,6 +201,7 @@ def solve_smooth(
             out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * speed[members]
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
             inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
+            out["force"][:, chosen] = whole[:3].sum(axis=1)
             out["power"][chosen] = whole[3].sum(axis=0) * speed[members]
             out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * speed[members]
             out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]

@@ -30,15 +30,12 @@ In the limit epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b if it runs 
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import Motion
-from colloc.smooth.period import Period, measured_period, period
+from colloc.smooth.prescribed_body import PrescribedBody
 from colloc.system.errors import ProblemError
 
 _ODD_SCALE = 7**3.5 / 6**3
@@ -67,12 +64,11 @@ def even_slope(x: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Concertina:
-    """A concertina crawler and the friction it crawls on.
+class Concertina(PrescribedBody):
+    """A concertina crawler.
 
     Parameters
     ----------
-    name : str
     epsilon : float
         Half-width of each bump region [body lengths].
     amplitude : float
@@ -81,20 +77,20 @@ class Concertina:
         Arc length of a bump over that of its region, 2 epsilon; the paper's is 1/2. The rest is the margin by which the
         resting part is longer than the sliding one.
     bumps : {1, 2}
-    friction : Friction
-    delta : float
-        Regularisation speed [body lengths per period].
     backwards : bool
         One bump: run from head to tail, towards the tail (for mu_b < mu_f).
+
+    Examples
+    --------
+    >>> from colloc import Concertina, Problem
+    >>> Problem("crawler", body=Concertina(epsilon=0.05)).gait.describe()
+    'a prescribed motion, symmetry antipodal'
     """
 
-    name: str = "concertina"
     epsilon: float = 0.1
     amplitude: float = 1.0
     share: float = 0.5
     bumps: int = 1
-    friction: Friction = Friction()
-    delta: float = 1e-6
     backwards: bool = False
 
     def __post_init__(self) -> None:
@@ -107,12 +103,6 @@ class Concertina:
             raise ProblemError(f"share must lie between 0 and 1, not {self.share!r}.")
         if not 0 < self.amplitude < np.pi / 2:
             raise ProblemError(f"amplitude must lie between 0 and pi/2, not {self.amplitude!r}.")
-        if not (np.isfinite(self.delta) and self.delta > 0):
-            raise ProblemError(f"delta must be positive, not {self.delta!r}.")
-
-    def with_(self, **changes: Any) -> Concertina:
-        """A copy with some fields changed, validated anew."""
-        return dataclasses.replace(self, **changes)
 
     @property
     def width(self) -> float:
@@ -126,11 +116,6 @@ class Concertina:
         return tuple((c - self.epsilon, c + self.epsilon) for c in centres)
 
     @property
-    def bound(self) -> float:
-        """No body is more efficient than this (paper, eq. lambdaupper)."""
-        return 1.0 / self.friction.smallest
-
-    @property
     def stroke(self) -> float:
         """Distance per period if nothing slips that should rest."""
         x, weight = _CHORD_NODES, 0.5 * _CHORD_WEIGHTS
@@ -138,17 +123,14 @@ class Concertina:
             return float(2 * self.width * np.sum(weight * (1 - np.cos(self.amplitude * odd_profile(x)))))
         return float(2 * self.width * np.sum(weight * np.sin(self.amplitude * even_profile(x))))
 
-    def motion(self) -> Motion:
-        """The prescribed motion."""
+    def prescribed(self) -> Motion:
         return _one_bump(self) if self.bumps == 1 else _two_bumps(self)
 
-    def period(self, **settings: Any) -> Period:
-        """Distance and work of one period; settings as for `colloc.smooth.period.period`."""
-        return period(self.motion(), self.friction, self.delta, regions=self.regions, **settings)
-
-    def measured_period(self, **settings: Any) -> Period:
-        """The same with an error estimate, see `colloc.smooth.period.measured_period`."""
-        return measured_period(self.motion(), self.friction, self.delta, regions=self.regions, **settings)
+    def describe(self) -> str:
+        bumps = "one bump" if self.bumps == 1 else "two bumps"
+        return (
+            f"smooth, {bumps} of width {self.width:g} and amplitude {self.amplitude:g} rad in regions of {2 * self.epsilon:g}"
+        )
 
 
 def _ramp(t: np.ndarray, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.spaces import space_near
-from colloc.results.certificate import corner_phases
 from colloc.results.distinct_optima import ERROR, Outcome, fourier_series
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import run_guess
@@ -145,7 +144,7 @@ def efficiency_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTAN
             problem.delta * gait.delta_unit,
             instants=instants,
             most_instants=most_instants,
-            breaks=corner_phases(gait),
+            breaks=gait.corner_phases,
         )
     except CollocError:
         return 0.0

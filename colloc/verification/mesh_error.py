@@ -190,6 +190,9 @@ def constraint_violation(problem: Problem, mesh: Mesh, gait: AnyGait) -> np.ndar
     """Largest excess over a joint limit or penetration of any two links inside each interval, ``(n_interval,)``; 0 if none."""
     t = (mesh.edges[:-1, None] + mesh.h[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)).ravel()
     angles, body = gait.angles(t), problem.body
-    rows = [np.abs(body.limited @ angles).max(axis=0) - problem.joint_limit, body.crossing_depth(angles, body.far_pairs)]
+    rows = [
+        np.abs(body.limited @ angles).max(axis=0, initial=0.0) - problem.joint_limit,
+        body.crossing_depth(angles, body.far_pairs),
+    ]
     rows += [smooth_minimum(near.first, near.second, near.width)[0] for near in body.contacts(angles)]
     return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)

@@ -36,14 +36,12 @@ AIM = 0.4
 """The planned error is this fraction of the request: the gait, and its kinks with it, will still move."""
 _MORE_NODES, _MOST_NODES = (0, 2, 4), 9
 _HANDICAP = 1.1
-_FIRST_INTERVALS = 16
-"""Intervals a period, at least, from which a mesh is grown; also two for every harmonic."""
 _SNAP = 0.3
 GRADE = 0.2
 """Where an interval with a kink at one end is cut, as a fraction of its length from there. Beside a kink velocities go like
 x log|x|; cutting in the middle costs schemes of high order twice the points."""
-_ONE_KINK = 0.02
-"""Kinks nearer to each other than this part of the first mesh's spacing share a knot."""
+_ONE_KINK = 0.02 / 16
+"""Kinks nearer to each other than this part of the solved period share a knot: 2 % of the spacing of a first mesh."""
 _LEFT = 0.2
 """How far, in mean intervals, a kink can have moved from the knot that it left."""
 _NARROWEST = 1e-7
@@ -75,7 +73,7 @@ class MeshPlan:
 def kink_knots(problem: Problem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
     """Phases of the kinks of a gait's velocities, one for each group of very close ones."""
     kinks = kink_phases(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, fine)
-    apart = _ONE_KINK * problem.gait.fraction / _FIRST_INTERVALS
+    apart = _ONE_KINK * problem.gait.fraction
     knots: list[float] = []
     for kink in kinks:
         if not knots or kink - knots[-1] > apart:
@@ -153,8 +151,9 @@ def planned_mesh(
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself kinked
         on_knots = kinks[:0] if switches and (rule.left or rule.right) else kinks
         # knots of a path are where its arcs and sides end: there they may be added, not moved
-        snap = 0.0 if problem.has_path else _SNAP
-        edges = moved_knots(np.union1d(_first_edges(problem, mesh), knots), np.union1d(on_knots, _beside(mesh, on_knots)), snap)
+        snap = _SNAP if problem.gait.moves_knots else 0.0
+        first = np.union1d(problem.gait.first_edges(mesh.edges), knots)
+        edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
         plan = _split(problem, rule, edges, knots, on_knots, gait, delta, fine, tolerance, aim, budget)
         if best is None or (plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best))):
@@ -185,17 +184,6 @@ def _family(given: Scheme) -> list[Scheme]:
         return [given]
     nodes = [given.s + more for more in _MORE_NODES if more == 0 or given.s + more <= _MOST_NODES]
     return [scheme(f"{match[1]}-{s}") for s in nodes]
-
-
-def _first_edges(problem: Problem, mesh: Mesh) -> np.ndarray:
-    """The mesh from which one is grown; a path's own, because its arcs or sides are the intervals."""
-    if problem.has_path:
-        return mesh.edges
-    return np.linspace(mesh.edges[0], mesh.edges[-1], _first_intervals(problem) + 1)
-
-
-def _first_intervals(problem: Problem) -> int:
-    return max(int(_FIRST_INTERVALS * problem.gait.fraction), 2 * problem.gait.harmonics)
 
 
 def _points(plan: MeshPlan) -> float:

@@ -6,14 +6,57 @@ keeps delta over the bump's speed falling too (paper, section VI).
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
+from colloc.gaits.problem import Problem
+from colloc.mechanics.friction import Friction
 from colloc.smooth.concertina import Concertina
+from colloc.smooth.period import Period, measured_period, period
+from colloc.system.errors import ProblemError
 
 DELTA_0, EPSILON_0 = 1e-4, 0.2
+
+
+@dataclass(frozen=True)
+class Crawler:
+    """A concertina crawler and the friction it crawls on, whose work inside the bumps' regions is told apart."""
+
+    body: Concertina
+    friction: Friction = Friction()
+    delta: float = 1e-6
+    name: str = "concertina"
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.delta) and self.delta > 0):
+            raise ProblemError(f"delta must be positive, not {self.delta!r}.")
+
+    @classmethod
+    def of(cls, problem: Problem) -> Crawler:
+        """The crawler of a problem."""
+        assert isinstance(problem.body, Concertina)
+        return cls(problem.body, problem.friction, problem.delta, problem.name)
+
+    def with_(self, **changes: Any) -> Crawler:
+        """A copy with some fields changed, also those of the body."""
+        own = {f.name for f in fields(self)}
+        body = replace(self.body, **{name: value for name, value in changes.items() if name not in own})
+        return replace(self, **({"body": body} | {name: value for name, value in changes.items() if name in own}))
+
+    @property
+    def bound(self) -> float:
+        """No body is more efficient than this (paper, eq. lambdaupper)."""
+        return 1.0 / self.friction.smallest
+
+    def period(self, **settings: Any) -> Period:
+        """Distance and work of one period; settings as for `colloc.smooth.period.period`."""
+        return period(self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings)
+
+    def measured_period(self, **settings: Any) -> Period:
+        """The same with an error estimate, see `colloc.smooth.period.measured_period`."""
+        return measured_period(self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings)
 
 
 @dataclass(frozen=True)
@@ -39,7 +82,7 @@ def delta_for(epsilon: float, delta_0: float = DELTA_0, epsilon_0: float = EPSIL
     return delta_0 * (epsilon / epsilon_0) ** 2
 
 
-def epsilon_point(crawler: Concertina, *, intervals: int = 2, **settings: Any) -> EpsilonPoint:
+def epsilon_point(crawler: Crawler, *, intervals: int = 2, **settings: Any) -> EpsilonPoint:
     """The crawler's period with an error bar.
 
     The error is the difference from half the intervals and a lower panel order, plus the difference from a computation
@@ -53,7 +96,7 @@ def epsilon_point(crawler: Concertina, *, intervals: int = 2, **settings: Any) -
         for name, source in (("d", "d"), ("W_inner", "W_inner"), ("W_outer", "W"), ("efficiency", "efficiency"))
     }
     return EpsilonPoint(
-        crawler.epsilon,
+        crawler.body.epsilon,
         crawler.delta,
         fine.d,
         fine.W_inner,

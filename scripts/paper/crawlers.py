@@ -7,15 +7,15 @@ from functools import partial
 import numpy as np
 
 from problems import concertina, concertina_anisotropic
-from scripts.models.epsilon_study import EpsilonPoint, delta_for, epsilon_point, fitted_orders
+from scripts.models.epsilon_study import Crawler, EpsilonPoint, delta_for, epsilon_point, fitted_orders
 from scripts.models.smooth_record import snapshots
 from scripts.paper.parallel import parallel_map
 from scripts.paper.study import Arrays, Context
 
 CRAWLERS = {
-    "isotropic": concertina.PROBLEM,
-    "forward easiest": concertina_anisotropic.PROBLEMS[0],
-    "transverse easiest": concertina_anisotropic.PROBLEM,
+    "isotropic": Crawler.of(concertina.PROBLEM),
+    "forward easiest": Crawler.of(concertina_anisotropic.PROBLEMS[0]),
+    "transverse easiest": Crawler.of(concertina_anisotropic.PROBLEM),
 }
 """The paper's crawler, one whose forward friction is smallest, and one with two bumps whose transverse friction is."""
 
@@ -48,6 +48,6 @@ def crawlers(context: Context) -> Arrays:
         if name not in SHOWN:
             continue
         shown = crawler.with_(epsilon=settings["shown"], delta=delta_for(settings["shown"]))
-        made = snapshots(shown.motion(), shown.friction, shown.delta, settings["snapshots"], panels=200)
+        made = snapshots(shown.body.prescribed(), shown.friction, shown.delta, settings["snapshots"], panels=200)
         result |= {f"{name}/t": made.t, f"{name}/x": made.x, f"{name}/y": made.y}
     return result

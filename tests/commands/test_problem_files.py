@@ -9,13 +9,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SCRIPTS = {
-    "concertina": ("scripts.continue_epsilon", r"0\.001 .*0\.99"),
-    "concertina_anisotropic": ("scripts.continue_epsilon", r"forwards-1.7-1-1.3"),
-    "smooth_low_mode": ("scripts.optimise_smooth", r"0\.8555.*certified"),
-    "wave_sine": ("scripts.waves", r"B anisotropic .* 0\.737066"),
-}
-"""Files that state something else than a chain's problem: the script that solves them, and what it prints among the rest."""
 NAMES = sorted(path.stem for path in (ROOT / "problems").glob("*.py") if path.stem != "__init__")
 
 
@@ -23,13 +16,9 @@ NAMES = sorted(path.stem for path in (ROOT / "problems").glob("*.py") if path.st
 @pytest.mark.parametrize("name", NAMES)
 def test_every_problem_file_is_solved_by_its_command(name, tmp_path):
     file = ROOT / "problems" / f"{name}.py"
-    if name in SCRIPTS:
-        script, summary = SCRIPTS[name]
-        command = ["-m", script] + [str(file)] * (name != "wave_sine")  # scripts.waves knows its waves
-    else:
-        command = ["-m", "colloc", "solve", str(file), "--output", f"{tmp_path}/"]
-        saved = re.escape(f"saved {tmp_path}/{name}.h5, {tmp_path}/{name}.png")
-        summary = rf"{name}: solved in [\d.]+ s\n  efficiency d/W  0\.\d+ (.|\n)*{saved}\n$"
+    command = ["-m", "colloc", "solve", str(file), "--output", f"{tmp_path}/"]
+    saved = re.escape(f"saved {tmp_path}/{name}.h5, {tmp_path}/{name}.png")
+    summary = rf"{name}: solved in [\d.]+ s\n  efficiency d/W  0\.\d+ (.|\n)*{saved}\n$"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}  # scripts are no part of what is installed
     done = subprocess.run(
         [sys.executable, *command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False

@@ -17,7 +17,6 @@ from colloc.gaits.path_samples import (
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.reduced.spaces import nearest_parameters, transcribed
-from colloc.results.certificate import _largest_jump, corner_phases
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.replay import replay
 
@@ -149,7 +148,7 @@ def test_replay_of_the_small_triangle_reaches_two_fifths():
         gait = Corners(np.array([[c + e, c, c], [-c, -c, -c - e]]))
         assert gait.length == pytest.approx((2 + np.sqrt(2)) * e)
         result = replay(
-            Chain(), Friction(), lambda t, g=gait: (g.angles(t), g.rates(t)), 1e-9 * gait.length, breaks=corner_phases(gait)
+            Chain(), Friction(), lambda t, g=gait: (g.angles(t), g.rates(t)), 1e-9 * gait.length, breaks=gait.corner_phases
         )
         assert result.efficiency == pytest.approx(0.4, rel=2e-3)
         assert result.distance == pytest.approx(e / 12, rel=2e-3)
@@ -168,7 +167,7 @@ def test_replay_does_not_depend_on_the_pace_of_a_polygon():
         inside = np.clip(breaks[k] + h * (x - np.sin(2 * np.pi * x) / (2 * np.pi)), 1e-12, 1 - 1e-12)
         return gait.angles(inside), gait.rates(inside) * (1 - np.cos(2 * np.pi * x))
 
-    sharp = replay(Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 1e-8, breaks=corner_phases(gait))
+    sharp = replay(Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 1e-8, breaks=gait.corner_phases)
     smooth = replay(Chain(), Friction(), slow_at_corners, 1e-8, instants=3200)
     assert sharp.distance == pytest.approx(smooth.distance, rel=1e-5)
     assert sharp.work == pytest.approx(smooth.work, rel=1e-5)
@@ -243,13 +242,13 @@ def test_problems_of_every_class_survive_their_description():
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_the_certificate_sees_a_path_that_does_not_join(symmetry):
     path = member(symmetry)
-    assert _largest_jump(path) < 1e-8
+    assert path.largest_jump() < 1e-8
     for place in (5, -1) if symmetry == "bilateral" else (5,):
         shapes = path.shapes.copy()
         shapes[:, place] += 1e-6
         # arcs are drawn from their starts: the last shape is drawn by nobody, so its arc is bent instead
         tangents = path.tangents + (1e-5 if place == -1 else 0.0) * (np.arange(path.edges.size) == path.edges.size - 1)
-        assert _largest_jump(ArcPath(path.edges, shapes, tangents, path.length, symmetry)) > 1e-7
+        assert ArcPath(path.edges, shapes, tangents, path.length, symmetry).largest_jump() > 1e-7
 
 
 def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from colloc.commands.verify import main as recheck
+from colloc.gaits.path_classes import FreePath
 from colloc.gaits.paths import ArcPath
 from colloc.mechanics.body import Chain
 from colloc.reduced.second_order import Curvature
@@ -170,7 +171,7 @@ def circle(radius):
 
 
 def of_path(gait, curvature):
-    stated = SimpleNamespace(gait=gait, problem=SimpleNamespace(gait=SimpleNamespace(curvature=curvature)))
+    stated = SimpleNamespace(gait=gait, problem=SimpleNamespace(gait=FreePath(curvature)))
     return {check.name for check in verify._class(stated) if not check.passed}
 
 
@@ -180,10 +181,10 @@ def test_curvature_between_the_nodes_of_a_free_path():
 
 def test_joins_of_a_free_path(monkeypatch):
     def run(f):
-        monkeypatch.setattr(verify, "_largest_jump", lambda gait: f * 1e-8)
+        monkeypatch.setattr(ArcPath, "largest_jump", lambda gait: f * 1e-8)
         return of_path(circle(0.5), 2.1)
 
-    assert verify._largest_jump(circle(0.5)) < 1e-9
+    assert circle(0.5).largest_jump() < 1e-9
     judged("joins", run)
 
 

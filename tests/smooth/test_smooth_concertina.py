@@ -8,17 +8,17 @@ import pytest
 from colloc.mechanics.friction import Friction
 from colloc.smooth.concertina import Concertina
 from colloc.system.errors import ProblemError
-from scripts.models.epsilon_study import EpsilonPoint, delta_for, epsilon_point, fitted_order, fitted_orders, table
+from scripts.models.epsilon_study import Crawler, EpsilonPoint, delta_for, epsilon_point, fitted_order, fitted_orders, table
 
-SIDEWAYS = Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2, friction=Friction(1.0, 3.0, 3.0), delta=1e-6)
-ONE = Concertina(epsilon=0.05, amplitude=1.3, delta=1e-6)
+SIDEWAYS = Crawler(Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2), Friction(1.0, 3.0, 3.0), delta=1e-6)
+ONE = Crawler(Concertina(epsilon=0.05, amplitude=1.3), delta=1e-6)
 
 
 @pytest.mark.parametrize("crawler", [ONE, SIDEWAYS, ONE.with_(backwards=True)])
 def test_rate_is_the_derivative_of_the_angle(crawler):
-    motion, h = crawler.motion(), 1e-6
+    motion, h = crawler.body.prescribed(), 1e-6
     s = np.linspace(0, 1, 1501)[:, None] * np.ones((1, 4))
-    t = np.array([0.1, 0.2, 0.3, 0.45]) if crawler.bumps == 1 else np.array([0.1, 0.3, 0.6, 0.9])
+    t = np.array([0.1, 0.2, 0.3, 0.45]) if crawler.body.bumps == 1 else np.array([0.1, 0.3, 0.6, 0.9])
     numeric = (motion.angle(s, t + h) - motion.angle(s, t - h)) / (2 * h)
     scale = np.abs(motion.rate(s, t)).max()
     np.testing.assert_allclose(motion.rate(s, t), numeric, atol=1e-5 * scale)
@@ -26,13 +26,13 @@ def test_rate_is_the_derivative_of_the_angle(crawler):
 
 def test_the_second_half_is_the_mirror_image():
     s, t = np.linspace(0, 1, 301)[:, None] * np.ones((1, 3)), np.array([0.1, 0.25, 0.4])
-    motion = ONE.motion()
+    motion = ONE.body.prescribed()
     np.testing.assert_allclose(motion.angle(s, t + 0.5), -motion.angle(s, t), atol=1e-12)
 
 
 def test_two_bumps_are_antisymmetric_and_keep_their_length():
     """Theta(1 - s) = -Theta(s), and the chord along the body never changes, in all stages."""
-    motion = SIDEWAYS.motion()
+    motion = SIDEWAYS.body.prescribed()
     t = np.linspace(0.0, 0.999, 41)
     s = np.linspace(0, 1, 20001)[:, None] * np.ones((1, t.size))
     angle = motion.angle(s, t)
@@ -45,8 +45,8 @@ def test_two_bumps_are_antisymmetric_and_keep_their_length():
 def test_the_anchor_holds_and_the_stroke_is_the_geometry(crawler):
     """The distance is what the shape shortens or shifts, less a creep of order delta; nothing rotates."""
     p = crawler.period(intervals=2, quadrature_tolerance=1e-8)
-    assert p.d == pytest.approx(crawler.stroke, rel=2e-4)
-    assert p.d < crawler.stroke
+    assert p.d == pytest.approx(crawler.body.stroke, rel=2e-4)
+    assert p.d < crawler.body.stroke
     assert p.nodes.slowest.max() < 30 * crawler.delta
     assert abs(p.rotation) < 1e-12
     assert p.efficiency < crawler.bound
@@ -79,8 +79,8 @@ def test_a_bump_that_takes_half_its_region_tears_the_anchor_loose_on_very_rough_
     """With mu_t = 10 the bump drags harder than the anchor's margin; a smaller share of the region mends it."""
     rough = ONE.with_(friction=Friction(10.0, 1.0, 1.0), epsilon=0.02)
     loose, firm = (rough.with_(share=share).period(intervals=1, nodes=4) for share in (0.5, 0.15))
-    assert loose.d < 0.8 * rough.stroke
-    assert firm.d == pytest.approx(rough.with_(share=0.15).stroke, rel=1e-2)
+    assert loose.d < 0.8 * rough.body.stroke
+    assert firm.d == pytest.approx(rough.with_(share=0.15).body.stroke, rel=1e-2)
 
 
 def test_fitted_orders_of_exact_powers():
@@ -103,7 +103,7 @@ def test_the_error_bar_covers_a_much_smaller_delta():
 @pytest.mark.parametrize("name", ["concertina", "concertina_anisotropic"])
 def test_problem_files_state_a_crawler(name):
     study = runpy.run_path(f"problems/{name}.py")
-    assert isinstance(study["PROBLEM"], Concertina)
+    assert isinstance(study["PROBLEM"].body, Concertina)
     assert min(study["EPSILONS"]) < 0.01
 
 

@@ -133,7 +133,7 @@ def problem(**changes) -> Problem:
 
 
 def test_the_optimum_beats_the_paper_s_wave_and_is_certified(tmp_path):
-    found = maximise_efficiency(problem())
+    found = maximise_efficiency(problem(body=ModalBody(4, "fourier", panels=4)))
     reference = measured_period(sine_wave(), SIDEWAYS, found.problem.delta)
     assert found.status == "solved", found.message
     assert found.last.program == "implicit velocity"
@@ -146,7 +146,7 @@ def test_the_optimum_beats_the_paper_s_wave_and_is_certified(tmp_path):
         assert period.efficiency == pytest.approx(found.efficiency, rel=1e-6) if scale == 1.0 else True
         assert scale == 1.0 or period.efficiency < found.efficiency - 1e-6
     read = load(save(found, tmp_path / "wave.h5"))
-    assert (read.problem.hash, read.problem.body) == (found.problem.hash, FOURIER)
+    assert (read.problem.hash, read.problem.body) == (found.problem.hash, found.problem.body)
     np.testing.assert_array_equal(read.sample(0.3).tail, found.sample(0.3).tail)
 
 

@@ -22,7 +22,6 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
-from colloc.results.certificate import corner_phases
 from colloc.results.delta_limit import efficiency_at_zero_delta, mesh_errors, resolution_warning
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.results.solution import SOLVED
@@ -356,7 +355,7 @@ def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
     solution = optimum(stated)
     gait = solution.gait
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
-    exact = replay(stated.body, stated.friction, path, stated.delta * gait.length, breaks=corner_phases(gait), tolerance=1e-8)
+    exact = replay(stated.body, stated.friction, path, stated.delta * gait.length, breaks=gait.corner_phases, tolerance=1e-8)
     # at the problem's own number, which is at unit shape speed, it would come out 40 times too large
     assert mesh_errors(solution).sum() == pytest.approx(abs(solution.efficiency / exact.efficiency - 1), rel=0.2)
 

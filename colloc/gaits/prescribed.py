@@ -1,0 +1,134 @@
+"""The class of gaits with nothing free: a body whose motion is prescribed runs through its phases.
+
+The shape coordinates of such a body are a point on a circle, ``(cos 2 pi t, sin 2 pi t)``: closed, and the same for all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.gaits.gait_function import GaitFunction
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves, fraction
+from colloc.system.errors import ProblemError
+
+_INTERVALS_A_STAGE = 4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Phases(GaitFunction):
+    """A body's run through its phases: the only gait of its class.
+
+    Parameters
+    ----------
+    schedule : (n + 1,)
+        Phases from 0 to the part of the period that is solved, between which the motion is smooth in time.
+    symmetry : {"none", "antipodal"}
+    """
+
+    schedule: tuple[float, ...] = (0.0, 1.0)
+    symmetry: str = NONE
+
+    delta_unit = 1.0
+    speed_unit = 2 * np.pi
+    shape_speed = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "schedule", tuple(float(t) for t in self.schedule))
+
+    @property
+    def n_joint(self) -> int:
+        return 2
+
+    @property
+    def corner_phases(self) -> np.ndarray:
+        """Phases in (0, 1) at which the motion may start to move otherwise."""
+        return both_halves(self.symmetry, np.array(self.schedule))
+
+    def lines(self, coordinate: str = "joint") -> list[str]:
+        """The gait in words: its class says all."""
+        return []
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        """Points on the circle ``(2, n_time)`` at phases t."""
+        phase = 2 * np.pi * np.asarray(t, dtype=float)
+        return np.stack([np.cos(phase), np.sin(phase)])
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """Their rates per period."""
+        phase = 2 * np.pi * np.asarray(t, dtype=float)
+        return 2 * np.pi * np.stack([-np.sin(phase), np.cos(phase)])
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """Nothing is free: a problem of this class asks what a given motion achieves.
+
+    Parameters
+    ----------
+    stages : tuple of float
+        Phases from 0 to the part of the period that is solved, between which the motion is smooth in time.
+    symmetry : {"none", "antipodal"}
+        Antipodal: the second half period is the mirror image of the first.
+    """
+
+    stages: tuple[float, ...] = (0.0, 1.0)
+    symmetry: str = NONE
+
+    free = False
+    unit_speed = False
+    delta_start = None
+    moves_knots = False
+
+    def __post_init__(self) -> None:
+        stages = tuple(float(t) for t in self.stages)
+        object.__setattr__(self, "stages", stages)
+        if self.symmetry not in (NONE, ANTIPODAL):
+            raise ProblemError(f"gait.symmetry of a prescribed motion must be none or antipodal, not {self.symmetry!r}.")
+        if len(stages) < 2 or stages[0] != 0.0 or stages[-1] != self.fraction or min(np.diff(stages)) <= 0:
+            raise ProblemError(f"gait.stages must ascend from 0 to {self.fraction:g}, not {stages}.")
+
+    @property
+    def fraction(self) -> float:
+        """The part of the period that has to be solved."""
+        return fraction(self.symmetry)
+
+    def intervals(self, n_joint: int) -> int:
+        """Intervals of a first mesh: some in every stage."""
+        return _INTERVALS_A_STAGE * (len(self.stages) - 1)
+
+    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        """Intervals that a mesh needs at least, and for what."""
+        return len(self.stages) - 1, "the stages"
+
+    def edges(self, n: int) -> np.ndarray:
+        """A mesh of about n intervals on which every stage ends at a knot."""
+        each = max(1, round(n / (len(self.stages) - 1)))
+        parts = [np.linspace(a, b, each + 1)[:-1] for a, b in zip(self.stages, self.stages[1:], strict=False)]
+        return np.concatenate([*parts, self.stages[-1:]])
+
+    def first_edges(self, edges: np.ndarray) -> np.ndarray:
+        """The mesh from which a finer one is grown."""
+        return edges
+
+    def describe(self) -> str:
+        """The class in words, for reports."""
+        return f"a prescribed motion, symmetry {self.symmetry}"
+
+    def size(self, n_joint: int, n_interval: int | None = None) -> int:
+        """Number of parameters."""
+        return 0
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Phases:
+        """The only one."""
+        return Phases(self.stages, self.symmetry)
+
+    def series(self, harmonics: int) -> Harmonic:
+        """Fourier series that stand for its gaits: the circle is one."""
+        return Harmonic(1, self.symmetry)
+
+    def own_checks(self, gait: Phases) -> list[tuple[str, float, float, str]]:
+        """What a certificate checks of a member beyond what all gaits have to keep."""
+        return []

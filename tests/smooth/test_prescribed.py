@@ -1,0 +1,108 @@
+"""Prescribed motions are problems with nothing free: measured, certified, stored and drawn like gaits that were searched."""
+
+import numpy as np
+import pytest
+
+from colloc.gaits.gait_fields import body_from, class_from, fields
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.prescribed import Prescribed
+from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.pictures.figure import solution_figure
+from colloc.pictures.motion_frames import frames
+from colloc.pictures.report_page import report_page
+from colloc.results.solution import SOLVED
+from colloc.results.store import load, save
+from colloc.search.optimise import best_gait, measured
+from colloc.smooth.concertina import Concertina
+from colloc.smooth.modal_body import ModalBody
+from colloc.smooth.period import measured_period, period
+from colloc.smooth.prescribed_body import Wave
+from colloc.system.errors import ProblemError
+
+ALONG = Friction(100.0, 1.0, 1.0)
+BODIES = [Wave(), Wave("tanh", 1.3, 2.0), Wave("standing"), Concertina(epsilon=0.2), Concertina(epsilon=0.1, bumps=2)]
+
+
+@pytest.fixture(scope="module")
+def wave():
+    return best_gait(Problem("wave", body=Wave(), friction=ALONG, delta=1e-3))
+
+
+def test_the_paper_s_wave_is_certified_and_agrees_with_its_own_period(wave):
+    assert wave.status == SOLVED, wave.message
+    reference = measured_period(Wave().prescribed(), ALONG, 1e-3)
+    assert wave.certificate.efficiency == pytest.approx(reference.efficiency, abs=1e-9)
+    assert wave.certificate.distance == pytest.approx(reference.d, abs=1e-9)
+    assert wave.last.program == "prescribed"
+
+
+def test_it_is_read_as_it_was_written(wave, tmp_path):
+    read = load(save(wave, tmp_path / "wave.h5"))
+    assert (read.problem.hash, read.problem.body, read.problem.gait) == (wave.problem.hash, Wave(), wave.problem.gait)
+    np.testing.assert_array_equal(read.sample(0.7).tail, wave.sample(0.7).tail)
+    assert frames(read, count=5).ends.shape == (2, 97, 5)
+
+
+@pytest.mark.slow
+def test_it_gets_a_report_and_a_figure(wave):
+    assert "a sine wave of amplitude 1 rad" in report_page(wave)
+    assert len(solution_figure(wave).axes) == 5
+
+
+def test_the_friction_that_is_drawn_has_no_resultant():
+    """The body is in balance, and its arrows stand at Gauss nodes of equal panels."""
+    body, t = Wave(), np.linspace(0.0, 0.4, 5)
+    gait = Prescribed(body.schedule, "antipodal").member(np.empty(0), 2)
+    at = (ALONG, gait.angles(t), gait.rates(t), 1e-2)
+    _, force = body.rubbing(*at, body.solve(*at).z, count=600)
+    weights = np.tile([5 / 18, 8 / 18, 5 / 18], 200) / 200
+    np.testing.assert_allclose(np.einsum("n,ant->at", weights, force), 0.0, atol=1e-6 * np.abs(force).max())
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
+def test_the_work_on_the_mesh_is_that_of_the_general_solver(body):
+    problem = Problem("any", body=body, friction=Friction(2.0, 1.0, 1.0), delta=1e-2, mesh_tolerance=0, scheme="gauss-2")
+    reference = period(body.prescribed(), problem.friction, 1e-2, intervals=4, nodes=2)
+    level, _ = measured(problem)
+    assert level.work == pytest.approx(reference.W, rel=1e-6)  # the same quadrature in time
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
+def test_bodies_answer_every_question_and_can_be_kept(body):
+    assert isinstance(body, Body)
+    assert body_from(fields(body)) == body
+    gait = Problem("any", body=body).gait
+    assert gait == class_from(fields(gait)) == Prescribed(body.prescribed().stages, body.symmetries[0])
+
+
+def test_sliding_at_the_balanced_velocity_leaves_no_force_and_elsewhere_does():
+    body, t = Concertina(epsilon=0.2, amplitude=1.2), np.array([0.05, 0.2, 0.45])
+    gait = Prescribed(body.schedule, "antipodal").member(np.empty(0), 2)
+    at = (Friction(), gait.angles(t), gait.rates(t))
+    solved = body.solve(*at, 1e-3)
+    assert np.abs(body.sliding(*at, solved.z, np.full((1, 3), 1e-3)).force).max() < 1e-8
+    assert np.abs(body.sliding(*at, solved.z + 0.1, np.full((1, 3), 1e-3)).force).max() > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"gait": Harmonic()}, "leave gait out"),
+        ({"gait": Prescribed((0.0, 0.25, 1.0))}, "may have the symmetry antipodal"),
+        ({"body": Chain(), "gait": Prescribed()}, "not prescribed"),
+        ({"body": ModalBody(), "gait": Prescribed()}, "not prescribed"),
+        ({"body": Wave(amplitude=1.8)}, "the tangent reaches 1.8 rad"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(changes, message):
+    with pytest.raises(ProblemError, match=message):
+        Problem(**({"name": "any", "body": Wave(), "friction": ALONG} | changes))
+
+
+@pytest.mark.parametrize("profile", ["square", 1])
+def test_unknown_waves_are_refused(profile):
+    with pytest.raises(ProblemError, match="profile must be"):
+        Wave(profile)
