@@ -1,0 +1,78 @@
+"""A body and a class of gaits that the library does not know, as the documentation writes them: one file each."""
+
+import re
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colloc.gaits import gait_fields
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.results.store import load, save
+from colloc.search.optimise import maximise_efficiency
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+
+def run(page, monkeypatch):
+    """All code of a page in one module; what it registers is forgotten afterwards."""
+    monkeypatch.setattr(gait_fields, "BODIES", list(gait_fields.BODIES))
+    monkeypatch.setattr(gait_fields, "CLASSES", gait_fields.CLASSES)
+    module = types.ModuleType("own_parts")
+    monkeypatch.setitem(sys.modules, "own_parts", module)
+    for block in re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+        exec(compile(block, page, "exec"), module.__dict__)
+    return module
+
+
+def test_a_body_of_your_own_is_solved_certified_kept_and_read(monkeypatch, tmp_path, capsys):
+    own = run("own_body.md", monkeypatch)
+    assert capsys.readouterr().out == "solved\n"
+    found, body = own.found, own.problem.body
+    assert isinstance(body, Body)
+    read = load(save(found, tmp_path / "belts.h5"))
+    assert (read.problem.body, read.problem.hash) == (body, found.problem.hash)
+    # the joints follow the belts, and move as those of the chain do
+    joints = body.belts @ found.sample([0.3]).angles
+    np.testing.assert_allclose(body.outline(found.sample([0.3]).angles), Chain((0.2,) * 5).outline(joints), atol=1e-14)
+
+
+def test_slopes_of_the_own_body_are_those_of_finite_differences(monkeypatch):
+    body, friction, h = run("own_body.md", monkeypatch).BeltSnake(gear=0.5), Friction(2.0, 1.0, 1.5), 1e-6
+    y = np.array([0.7, -0.4, 1.0, 2.0])[:, None]
+
+    def motion(y):
+        solved = body.solve(friction, y[:2], y[2:], 1e-2, tolerance=1e-13)
+        now = body.motion(friction, y[:2], y[2:], 1e-2, solved)
+        return solved, np.concatenate([now.z, now.centre, now.power[None]])
+
+    slopes = body.slopes(friction, y[:2], y[2:], 1e-2, motion(y)[0])
+    for j, step in enumerate(h * np.eye(4)[:, :, None]):
+        numeric = (motion(y + step)[1] - motion(y - step)[1]) / (2 * h)
+        np.testing.assert_allclose(slopes[:, j], numeric, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_four_motors_do_better_than_two(monkeypatch):
+    own = run("own_body.md", monkeypatch)
+    gait = own.found.gait
+    guess = Fourier(*(own.problem.body.belts @ part for part in (gait.mean, gait.cos, gait.sin)))
+    free = maximise_efficiency(own.problem.with_(body=Chain((0.2,) * 5), guess=guess))
+    assert free.status == "solved"
+    assert free.efficiency > own.found.efficiency
+
+
+def test_a_class_of_your_own_is_searched_certified_kept_and_read(monkeypatch, tmp_path, capsys):
+    own = run("own_gait_class.md", monkeypatch)
+    assert capsys.readouterr().out == "solved\n"
+    gait = own.found.gait
+    np.testing.assert_array_equal(gait.cos[0, 1], 0.0)
+    np.testing.assert_array_equal([gait.cos[1, 0], gait.sin[1, 0]], 0.0)
+    read = load(save(own.found, tmp_path / "eight.h5"))
+    assert type(read.problem.gait) is own.OwnHarmonics
+    assert read.problem.hash == own.problem.hash
