@@ -50,6 +50,9 @@ KEPT = {
     "sweep_scaling.md": "python -m benchmarks.sweep_scaling --cells 24 --tasks 500 --dask",
     "bound_table.md": "python -m scripts.bound_table",
     "without_contact.md": "python -m scripts.without_contact",
+    "several_motions.md": "python -m scripts.several_motions",
+    "several_motions.png": "python -m scripts.several_motions",
+    "error_bars.jsonl": "python -m benchmarks.error_bars --gaits 300",
     "small_polygons.md": "python -m scripts.small_polygons",
     "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
 }

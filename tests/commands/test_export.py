@@ -58,6 +58,12 @@ def test_the_fastest_pacing_keeps_some_joint_at_its_limit():
     assert (np.abs(made.speeds) / limits[:, None]).max(axis=0).min() > 0.995
 
 
+def test_the_shortest_period_is_the_way_of_a_joint_over_its_speed():
+    gait = Fourier(np.zeros(1), np.array([[0.7]]), np.zeros((1, 1)))
+    made = timed(path_of(gait), 1e5, limits=0.5)
+    assert made.period == pytest.approx(4 * 0.7 / 0.5, abs=2e-5)
+
+
 def test_without_limits_or_with_loose_ones_the_pace_is_even():
     for settings in ({}, {"limits": 100.0}):
         made = timed(path_of(WAVE), 50.0, 4.0, **settings)

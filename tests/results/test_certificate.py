@@ -113,11 +113,13 @@ def test_collocated_against_replayed_efficiency(failures, three_link, replays, s
     judged("replay gap", run)
 
 
-def test_closure(failures, three_link, monkeypatch):
-    path = verify.gait_path(three_link)
+@pytest.mark.parametrize("joint", [0, 1])
+def test_closure(failures, three_link, monkeypatch, joint):
+    """One joint that does not come back is enough."""
+    path, astray = verify.gait_path(three_link), np.eye(2)[:, [joint]]
 
     def run(f):
-        monkeypatch.setattr(verify, "gait_path", lambda solution: lambda t: (path(t)[0] + f * 1e-9 * t, path(t)[1]))
+        monkeypatch.setattr(verify, "gait_path", lambda solution: lambda t: (path(t)[0] + f * 1e-9 * t * astray, path(t)[1]))
         return failures()
 
     judged("closure", run)

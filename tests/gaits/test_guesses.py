@@ -1,0 +1,22 @@
+"""How far shapes may be enlarged: up to the joint limit, or to where links touch, and no further."""
+
+import numpy as np
+import pytest
+
+from colloc.gaits.guesses import SAFE, largest_factor
+from colloc.mechanics.body import Chain
+
+STRAIGHT = np.zeros((2, 1))
+
+
+def test_a_straight_body_may_be_enlarged_without_end():
+    assert largest_factor(Chain(), np.pi, STRAIGHT) == np.inf
+
+
+def test_shapes_whose_links_do_not_meet_end_at_the_joint_limit():
+    assert largest_factor(Chain(), 2.0, np.array([[0.5], [-0.25]])) == pytest.approx(SAFE * 4.0)
+
+
+def test_others_end_where_their_links_touch():
+    """Equal links bent the same way: the ends meet as a triangle, at 2 pi/3."""
+    assert largest_factor(Chain(), np.pi, np.array([[0.5], [0.5]])) == pytest.approx(SAFE * 4 * np.pi / 3, rel=1e-6)
