@@ -36,7 +36,19 @@ ORDER = (
             "howto/paper.md",
         ),
     ),
-    ("Theory", ("theory.md", "convergence.md", "gait_classes.md", "bound.md", "bodies.md", "smooth_bodies.md", "own_body.md", "own_gait_class.md")),
+    (
+        "Theory",
+        (
+            "theory.md",
+            "convergence.md",
+            "gait_classes.md",
+            "bound.md",
+            "bodies.md",
+            "smooth_bodies.md",
+            "own_body.md",
+            "own_gait_class.md",
+        ),
+    ),
     ("Reference", ("commands.md", "api.md", "modules.md", "architecture.md", "changelog.md", "cite.md")),
 )
 PICTURES = (".png", ".gif")
