@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from colloc.gaits.path_classes import FreePath, Polygon
     from colloc.gaits.paths import ArcPath, Corners
     from colloc.gaits.problem import Problem, Reference
+    from colloc.gaits.relaxed import Relaxed
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
@@ -52,6 +53,7 @@ __all__ = [
     "Problem",
     "ProblemError",
     "Reference",
+    "Relaxed",
     "Solution",
     "StoreError",
     "certify",
@@ -73,6 +75,7 @@ _HOME = {
     "gaits.paths": ("ArcPath", "Corners"),
     "search.optimise": ("maximise_efficiency",),
     "gaits.problem": ("Problem", "Reference"),
+    "gaits.relaxed": ("Relaxed",),
     "verification.replay": ("replay",),
     "results.solution": ("Solution",),
     "results.store": ("load", "save"),

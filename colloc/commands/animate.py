@@ -17,6 +17,8 @@ import numpy as np
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_result, new_parser, output_kind, output_path
+from colloc.results.relaxed_solution import RelaxedSolution
+from colloc.results.relaxed_store import is_relaxed, load_relaxed
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -97,7 +99,7 @@ def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
 
 
 def animate(
-    solution: Solution,
+    solution: Solution | RelaxedSolution,
     path: Path,
     *,
     periods: int = 2,
@@ -110,7 +112,7 @@ def animate(
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or RelaxedSolution
     path : Path
         Ends in ``.gif`` or ``.mp4``.
     periods : int
@@ -134,7 +136,7 @@ def animate(
         raise ProblemError(f"{periods} periods of {count} pictures cannot be drawn; change --periods, --seconds or --fps.")
     if not 200 <= width <= 4000:
         raise ProblemError(f"--width must lie between 200 and 4000, not {width}.")
-    solution.last  # noqa: B018  raises where there is no gait
+    solution.gait  # noqa: B018  raises where there is none
     if path.suffix == ".mp4":
         _ffmpeg()  # before anything is drawn
     from colloc.pictures.animation import pictures
@@ -160,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
-    solution = load(source)
+    solution = load_relaxed(source) if is_relaxed(source) else load(source)
     path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('gif', 'mp4'))}"))
     settings = {"periods": options.periods, "seconds": options.seconds, "fps": options.fps, "width": options.width}
     animate(solution, path, **settings, arrows=not options.no_arrows)

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
+from colloc.system.processors import one_thread_each
 
 SUBCOMMANDS = {
     "solve": ("solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
@@ -45,6 +46,7 @@ def help_text() -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``colloc``; returns the exit code."""
+    one_thread_each()
     words = list(sys.argv[1:] if arguments is None else arguments)
     return exit_code(lambda: _command(words), as_json="--json" in words)
 

@@ -8,15 +8,17 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.mixture import Mixture
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.relaxed import Relaxed
 
 AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners)
-CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon)
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture)
+CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed)
 
 
 def fields(value: AnyGait | AnyClass) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
+from colloc.gaits.relaxed import Relaxed
+from colloc.gaits.symmetry import BILATERAL, BOTH
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
@@ -23,7 +25,7 @@ from colloc.system.errors import ProblemError
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
 FULL, IMPLICIT = "full", "implicit velocity"
 FORMULATIONS = (FULL, IMPLICIT)
-_PATH_CLASSES = (FreePath, Polygon)
+_PATH_CLASSES = (FreePath, Polygon, Relaxed)
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 LONGEST_NAME = 200
@@ -67,7 +69,7 @@ class Problem:
         (`colloc.gaits.guesses`).
     body : Chain
     friction : Friction
-    gait : Harmonic, FreePath or Polygon
+    gait : Harmonic, FreePath, Polygon or Relaxed
         The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md).
     delta : float
         Regularisation speed of friction at which the problem is finally solved, in body lengths per period; for free paths
@@ -178,8 +180,10 @@ class Problem:
             )
 
     def _check_symmetry(self) -> None:
-        if self.gait.symmetry == "bilateral" and not self.body.symmetric:
-            raise ProblemError("a bilateral gait needs a body whose lengths read the same from both ends.")
+        if self.gait.symmetry in (BILATERAL, BOTH) and not self.body.symmetric:
+            raise ProblemError(
+                f"a gait of symmetry {self.gait.symmetry!r} needs a body whose lengths read the same from both ends."
+            )
         if self.has_path and self.body.n_joint < 2:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:

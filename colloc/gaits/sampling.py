@@ -15,6 +15,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import BILATERAL, BOTH
 from colloc.mechanics.contact import SAFE, crossing_depth, largest_factor
 from colloc.system.errors import ProblemError
 
@@ -49,7 +50,10 @@ def shape_speed(gait: Fourier) -> float:
 
 def seed_class(problem: Problem) -> Harmonic:
     """The harmonics that starts are drawn from: the problem's own, or a few where its class bounds the path."""
-    return problem.gait if isinstance(problem.gait, Harmonic) else Harmonic(PATH_SEED_HARMONICS, problem.gait.symmetry)
+    if isinstance(problem.gait, Harmonic):
+        return problem.gait
+    symmetry = problem.gait.symmetry
+    return Harmonic(PATH_SEED_HARMONICS, BILATERAL if symmetry == BOTH else symmetry)
 
 
 def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from colloc.mechanics.balance import instant
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import force_density
+from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
 
 _STRAIGHT = 1e-2
@@ -52,7 +53,7 @@ def link_ends(body: Chain, angles: np.ndarray, theta: np.ndarray, tail: np.ndarr
     return np.stack([tail[0] + c * x - s * y, tail[1] + s * x + c * y])
 
 
-def frames(solution: Solution, count: int = 241, per_link: int | None = None, periods: int = 3) -> Frames:
+def frames(solution: Solution | RelaxedSolution, count: int = 241, per_link: int | None = None, periods: int = 3) -> Frames:
     """Sample a solution's motion and the friction that acts on it.
 
     Parameters

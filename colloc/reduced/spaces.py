@@ -9,11 +9,13 @@ from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
+from colloc.system.errors import ProblemError
 
 
 def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:
@@ -21,9 +23,15 @@ def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray
 
     Self-contact is constrained between links two apart, and between the pairs `far` (see `colloc.search.far_contact`).
     """
+    _check_has_program(problem)
     if problem.has_path:
         return transcribe_path(problem, problem.guess if gait is None else gait, edges, far)
     return transcribe(problem, edges, far)
+
+
+def _check_has_program(problem: Problem) -> None:
+    if isinstance(problem.gait, Relaxed):
+        raise ProblemError("relaxed gaits have a search of their own: colloc solve, or colloc.search.relaxed_search.")
 
 
 def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
@@ -49,6 +57,7 @@ def space_near(
     NotConvergedError
         If no path of the class is found near the gait.
     """
+    _check_has_program(problem)
     space = PathSpace(problem, gait, edges, scheme) if problem.has_path else HarmonicSpace(problem, edges, scheme)
     return space, space.parameters(gait)
 

@@ -6,13 +6,14 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import net_force
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
-from colloc.verification.replay import Path, Replay, replay
+from colloc.verification.replay import MixedPath, Path, Replay, replay
 
 KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK, DELTA = 1e-6, 1e-8, 1e-6, 1e-9, 1e-4, 1e-6, 1e-4, 1e-7, 1e-2
 CURVATURE = 1e-6
@@ -59,7 +60,44 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     path = gait_path(solution)
     if instants is None:
         instants = max(1600, 2 * int(np.ceil(5 * solution.mesh.n_point / problem.gait.fraction)))
-    delta, breaks = solution.delta_per_period, corner_phases(solution.gait)
+    gait, delta = solution.gait, solution.delta_per_period
+    return gait_certificate(
+        problem, path, delta, corner_phases(gait), instants, tolerance,
+        claimed=solution.efficiency, before=tuple(_optimality(solution)), after=(*_class(solution), *_mesh(solution)),
+    )  # fmt: skip
+
+
+def gait_certificate(
+    problem: Problem,
+    path: Path | MixedPath,
+    delta: float,
+    breaks: np.ndarray,
+    instants: int = 1600,
+    tolerance: float = 1e-6,
+    *,
+    claimed: float | None = None,
+    before: tuple[Check, ...] = (),
+    after: tuple[Check, ...] = (),
+) -> Certificate:
+    """The certificate of any gait, found in whatever way, by its replay at three deltas.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose body, friction and joint limit are meant.
+    path : callable
+        The gait's angles and rates, and of a relaxed gait shares (`colloc.verification.replay`).
+    delta : float
+        Per period.
+    breaks : (n,)
+        Phases where the rates jump.
+    instants, tolerance
+        Of the replay, see `certify`.
+    claimed : float, optional
+        An efficiency that the replay has to confirm.
+    before, after : tuple of Check
+        What else has to hold.
+    """
 
     def replayed_at(part: float, near: Replay | None) -> Replay:
         return replay(
@@ -71,13 +109,7 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     replays = fine, at_tenth, replayed_at(0.01, at_tenth)
     errors = [replayed.efficiency * (replayed.error + replayed.turning) for replayed in replays]
     limit = extrapolated_limit([replayed.efficiency for replayed in replays], errors)
-    checks = (
-        *_optimality(solution),
-        *_motion(solution, fine, path, tolerance),
-        *_class(solution),
-        *_mesh(solution),
-        *_delta(fine, limit.value),
-    )
+    checks = (*before, *_motion(problem, path, fine, breaks, tolerance, claimed), *after, *_delta(fine, limit.value))
     measured = (fine.efficiency, fine.distance, fine.work, errors[0])
     return Certificate(checks, *measured, limit.value, fine.instants, limit.error)
 
@@ -93,19 +125,25 @@ def _optimality(solution: Solution) -> list[Check]:
     ]
 
 
-def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> list[Check]:
-    problem, level = solution.problem, solution.last
-    ends, _ = path(np.array([0.0, 1.0]))
-    angles, _ = path(np.linspace(0.0, 1.0, _FINE_PHASES + 1))
+def _motion(
+    problem: Problem, path: Path | MixedPath, fine: Replay, breaks: np.ndarray, tolerance: float, claimed: float | None
+) -> list[Check]:
+    ends = path(np.array([0.0, 1.0]))[0]
+    angles = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))[0]
     beyond = max(float(np.abs(angles).max()) - problem.joint_limit, 0.0)
     depth = max(float(crossing_depth(problem.body, angles).max()), passing_depth(problem.body, angles))
-    return [
+    checks = [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
         Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),
         Check("net rotation", fine.turning, ROTATION, "over a period, times the body's reach over the distance"),
         Check("joint limits", beyond, ADMISSIBLE, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
-        Check("replay gap", level.efficiency / fine.efficiency - 1, GAP, "collocated over replayed efficiency, less 1"),
+    ]
+    if claimed is not None:
+        gap = claimed / fine.efficiency - 1
+        checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
+    return [
+        *checks,
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
     ]

@@ -23,6 +23,9 @@ from colloc.system.errors import ProblemError
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
+MixedPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Of a relaxed gait: joint angles; rates ``(n_direction, n_joint, n_time)`` in every direction; their shares of the time
+``(n_direction, n_time)``, of sum 1."""
 
 _ONE_SIDED = 1e-12
 _NARROWEST = 1e-10
@@ -103,16 +106,26 @@ class _Panels(NamedTuple):
 
 
 def _evaluated(
-    body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None
+    body: Chain, friction: Friction, path: Path | MixedPath, delta: float, t: np.ndarray, near: np.ndarray | None
 ) -> tuple[np.ndarray, ...]:
     """The last six of `_Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``."""
-    angles, rates = path(t.ravel())
-    solved = solve_balance(body, friction, angles, rates, delta, start=near).require()
-    motion = chain_motion(body, friction, angles, rates, delta, solved)
+    angles, rates, *mixed = path(t.ravel())
+    shares = mixed[0] if mixed else np.ones((1, t.size))
+    rates = rates if mixed else rates[None]
+    motions, residual = [], np.zeros(t.size)
+    for some in rates:  # of a relaxed gait one direction after the other; a gait has one
+        solved = solve_balance(body, friction, angles, some, delta, start=near).require()
+        motions.append(chain_motion(body, friction, angles, some, delta, solved))
+        residual = np.maximum(residual, solved.residual)
+
+    def mean(name: str) -> np.ndarray:
+        return sum(share * getattr(motion, name) for share, motion in zip(shares, motions, strict=True))
+
+    centre = mean("centre")
     (x, y), (gx, gy) = body.joints(angles), body.centre(body.posture(angles))
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, solved.residual, lever)
-    return motion.z.T.reshape(*t.shape, 3), *(value.reshape(t.shape) for value in values)
+    values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), residual, lever)
+    return mean("z").T.reshape(*t.shape, 3), *(value.reshape(t.shape) for value in values)
 
 
 def _halves(panels: _Panels, new: tuple[np.ndarray, ...]) -> _Panels:
@@ -138,7 +151,7 @@ def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarr
 def replay(
     body: Chain,
     friction: Friction,
-    path: Path,
+    path: Path | MixedPath,
     delta: float,
     *,
     instants: int = 1600,
@@ -153,7 +166,8 @@ def replay(
     ----------
     body, friction
     path : callable
-        Joint angles and rates at phases in [0, 1].
+        Joint angles and rates at phases in [0, 1]; of a relaxed gait (`MixedPath`) rates and shares of its directions. Then
+        the body moves, and pays, as the mean over the directions.
     delta : float
         Regularisation speed, per period.
     instants : int
