@@ -26,7 +26,7 @@ PARTS = {
     "mesh_tolerance": "The whole solve: error against time",
     "smooth_panels": "Smooth bodies",
     "map_resolution": "The tabulated velocity map",
-    "formulations": "Three formulations, the same starts",
+    "formulations": "The reduced search and the literal route",
     "kernel": "The compiled kernel beside NumPy",
     "cost": "Where the time goes",
     "scaling": "Growth with mesh, links and harmonics",

@@ -23,11 +23,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
+from colloc.system.late_binding import bind
+
 if TYPE_CHECKING:
     from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
     from colloc.gaits.path_classes import FreePath, Polygon
     from colloc.gaits.paths import ArcPath, Corners
     from colloc.gaits.problem import Problem, Reference
+    from colloc.gaits.problem_file import load_problem
     from colloc.gaits.relaxed import Relaxed
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
@@ -36,11 +39,35 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
+    from colloc.studies.calls import Starts, multistart, solve, sweep
+    from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
     from colloc.verification.replay import replay
 
+_HOME = {
+    "gaits.problem": ("Problem", "Reference"),
+    "gaits.problem_file": ("load_problem",),
+    "mechanics.body": ("Chain",),
+    "mechanics.friction": ("Friction",),
+    "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
+    "gaits.path_classes": ("FreePath", "Polygon"),
+    "gaits.relaxed": ("Relaxed",),
+    "gaits.paths": ("ArcPath", "Corners"),
+    "search.optimise": ("maximise_efficiency",),
+    "studies.calls": ("solve", "multistart", "Starts", "sweep"),
+    "studies.study": ("Study", "Axis"),
+    "results.solution": ("Solution",),
+    "results.store": ("load", "save"),
+    "results.certificate": ("certify",),
+    "verification.replay": ("replay",),
+    "mechanics.fixed_point": ("solve_balance",),
+    "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
+}
+"""Where the public names live, in the order of use; each is imported when it is first used."""
+
 __all__ = [
     "ArcPath",
+    "Axis",
     "Chain",
     "CollocError",
     "Corners",
@@ -55,32 +82,30 @@ __all__ = [
     "Reference",
     "Relaxed",
     "Solution",
+    "Starts",
     "StoreError",
+    "Study",
     "certify",
     "ellipse",
     "load",
+    "load_problem",
     "maximise_efficiency",
+    "multistart",
     "replay",
     "save",
+    "solve",
     "solve_balance",
+    "sweep",
 ]
 
-_HOME = {
-    "mechanics.body": ("Chain",),
-    "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
-    "mechanics.fixed_point": ("solve_balance",),
-    "mechanics.friction": ("Friction",),
-    "gaits.harmonic": ("Fourier", "Harmonic", "ellipse"),
-    "gaits.path_classes": ("FreePath", "Polygon"),
-    "gaits.paths": ("ArcPath", "Corners"),
-    "search.optimise": ("maximise_efficiency",),
-    "gaits.problem": ("Problem", "Reference"),
-    "gaits.relaxed": ("Relaxed",),
-    "verification.replay": ("replay",),
-    "results.solution": ("Solution",),
-    "results.store": ("load", "save"),
-    "results.certificate": ("certify",),
-}
+# what a solution offers and packages above it do
+bind(
+    {
+        "plot": "colloc.pictures.figure:solution_figure",
+        "animate": "colloc.pictures.movie:write_movie",
+        "report": "colloc.pictures.report_page:write_report",
+    }
+)
 
 
 def __dir__() -> list[str]:

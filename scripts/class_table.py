@@ -18,10 +18,9 @@ import numpy as np
 
 from colloc import Friction, Problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from
-from colloc.gaits.laid_gaits import laid_into, over_links
+from colloc.gaits.laid_gaits import delta_in, laid_into, over_links, prolonged
 from colloc.gaits.path_samples import path_length
 from colloc.results.solution import Solution
-from colloc.search.class_transfer import RESTARTS, delta_in, maximise_from
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
@@ -30,6 +29,8 @@ from scripts.class_rows import FEWER, Row, equal_links, named_gait, rows
 
 SMALLER = 0.1
 """Factor in delta where it changes the efficiency by more than a certificate allows."""
+FAR = 100.0
+"""A search from a gait that is no optimum begins at so many times the final delta."""
 
 
 class TooLong(Exception):
@@ -54,11 +55,11 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
         delta = delta_in(row.gait_class, guess, DELTA)
         body = equal_links(links)
         start = laid_into(row.gait_class, guess, body)
-        stated = Problem("class", start, body, friction, row.gait_class, delta, RESTARTS[-1] * delta, intervals=row.intervals)
+        stated = Problem("class", start, body, friction, row.gait_class, delta, FAR * delta, intervals=row.intervals)
         if known is None:
             solution = maximise_efficiency(stated, watch)
         else:
-            solution = maximise_from(stated, guess, row.gait_class, known, watch)
+            solution = maximise_efficiency(prolonged(stated, guess, row.gait_class), watch)
         for unit in (DELTA, SMALLER * DELTA):
             less, at = delta_in(row.gait_class, solution.gait, unit), solution.problem.delta
             if less < 0.5 * at and delta_matters(solution):

@@ -1,7 +1,8 @@
 """Solve every problem file for the gallery of the documentation: python -m scripts.gallery [NAME ...]
 
-Writes results/curated/gallery.json (numbers) and results/curated/gallery/NAME.png (a picture each). The test
-tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own REFERENCE.
+Writes results/curated/gallery.json (numbers), results/curated/gallery/NAME.png (a picture each) and results/curated/gallery.png
+(all of them). The test tests/commands/test_gallery.py solves the same files and holds them against these numbers and their own
+REFERENCE.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from PIL import Image
 
 from colloc.gaits.problem import Problem, Reference
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import draw_filmstrip, draw_shape_path
-from colloc.pictures.style import styled
+from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
+from colloc.pictures.style import GREY, snapshot_colours, styled
 from colloc.results.solution import Solution, versions
 from colloc.search.global_search import STARTS
 from colloc.search.modal_optimum import ModalOptimum, optimise_modal
@@ -35,7 +36,11 @@ from scripts.models.smooth_record import snapshots
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
-_SIZE, _RESOLUTION = (7.2, 2.1), 75
+SHEET = ROOT / "results/curated/gallery.png"
+_SIZE, _RESOLUTION, _COLOURS = (9.0, 3.7), 110, 64
+_COLUMNS, _THUMBNAIL = 2, 620
+_FLAT, _TALLEST = 0.15, 20.0
+"""A body that is flatter than this part of its width is drawn higher, at most so many times."""
 
 
 @dataclass(frozen=True)
@@ -121,29 +126,58 @@ def _picture(example: Example, solution: Solution | None) -> None:
     with styled():
         figure = Figure(figsize=_SIZE)
         if solution is not None:
-            grid = figure.add_gridspec(1, 2, width_ratios=(2.6, 1))
-            draw_filmstrip(figure.add_subplot(grid[0]), solution, count=6)
-            t = np.linspace(0.0, 1.0, 801)
-            if solution.problem.body.n_joint > 1:
-                draw_shape_path(figure.add_subplot(grid[1]), solution.problem, solution.sample(t).angles)
+            grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
+            draw_filmstrip(figure.add_subplot(grid[0, 0]), solution, count=9)
+            draw_lab(figure.add_subplot(grid[1, 0]), solution)
+            t, beside = np.linspace(0.0, 1.0, 801), figure.add_subplot(grid[:, 1])
+            if solution.problem.body.n_joint == 2:
+                draw_shape_path(beside, solution.problem, solution.gait.angles(t))
+            else:
+                draw_angles(beside, t, solution.gait.angles(t))
         else:
             _draw_snapshots(figure, example.stated)
-        figure.savefig(PICTURES / f"{example.name}.png", dpi=_RESOLUTION)
+        path = PICTURES / f"{example.name}.png"
+        figure.savefig(path, dpi=_RESOLUTION)
+    _quantised(Image.open(path)).save(path, optimize=True)
+
+
+def _quantised(image: Image.Image) -> Image.Image:
+    return image.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+
+
+def _sheet() -> None:
+    """All pictures on one sheet, with their names."""
+    paths = sorted(PICTURES.glob("*.png"))
+    rows = -(-len(paths) // _COLUMNS)
+    with styled(font_size=10):
+        height = _SIZE[1] / _SIZE[0] * _THUMBNAIL + 26
+        figure = Figure(figsize=(_COLUMNS * _THUMBNAIL / 100, rows * height / 100), dpi=100)
+        for path, axes in zip(paths, figure.subplots(rows, _COLUMNS).flat, strict=False):
+            axes.imshow(Image.open(path).convert("RGB"))
+            axes.set_title(path.stem, weight="bold")
+        for axes in figure.axes:
+            axes.set_axis_off()
+        figure.savefig(SHEET)
+    _quantised(Image.open(SHEET)).save(SHEET, optimize=True)
 
 
 def _draw_snapshots(figure: Figure, stated: dict[str, Any]) -> None:
     motion, friction, delta = _motion(stated)
     shown = snapshots(motion, friction, delta, count=6)
     axes = figure.add_subplot()
-    spacing, low = max(1.15 * float(np.ptp(shown.x, axis=0).max()), 0.6), float(shown.y.min()) - 0.1
-    for k, t in enumerate(shown.t):
+    spacing = max(1.15 * float(np.ptp(shown.x, axis=0).max()), 0.6)
+    tall = float(np.ptp(shown.y))
+    higher = max(1.0, min(_TALLEST, round(_FLAT * spacing / max(tall, 1e-300))))
+    low = higher * float(shown.y.min()) - 0.08 * spacing
+    for k, (t, colour) in enumerate(zip(shown.t, snapshot_colours(shown.t.size), strict=True)):
         middle = 0.5 * (shown.x[:, k].min() + shown.x[:, k].max())
-        colour = matplotlib.colormaps["cividis_r"](0.15 + 0.85 * k / shown.t.size)
-        axes.plot(shown.x[:, k] - middle + k * spacing, shown.y[:, k], color=colour, lw=1.8)
-        axes.text(k * spacing, low, f"t = {t:.2f}", ha="center", va="top", fontsize=7)
+        axes.plot(shown.x[:, k] - middle + k * spacing, higher * shown.y[:, k], color=colour, lw=2.4)
+        axes.text(k * spacing, low, f"t = {t:.2f}", ha="center", va="top", color=GREY)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_ylim(low - 0.12, max(0.2, float(shown.y.max()) + 0.05))
+    axes.set_ylim(low - 0.12 * spacing, higher * float(shown.y.max()) + 0.05 * spacing)
+    if higher > 1:
+        axes.set_title(f"heights drawn {higher:.0f} times as large", color=GREY)
 
 
 def main() -> None:
@@ -165,6 +199,7 @@ def main() -> None:
         _picture(example, solution)
         print(f"{example.name:28} {row['status']:20} {row.get('efficiency', float('nan')):10.6f} {row['cpu_seconds']:7.1f} s")
     table["versions"] = versions()
+    _sheet()
     TABLE.write_text(json.dumps(table, indent=1, sort_keys=True) + "\n")
 
 

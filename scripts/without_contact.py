@@ -20,13 +20,14 @@ import numpy as np
 from colloc import Corners, FreePath, Friction, Harmonic, Polygon, Problem
 from colloc.bounds.infinitesimal import small_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait, fields, gait_from
+from colloc.gaits.laid_gaits import delta_in, laid_into, prolonged
 from colloc.gaits.path_samples import path_length
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.class_transfer import RESTARTS, delta_in, laid_into, maximise_from
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
 from scripts.class_rows import equal_links, named_gait
+from scripts.class_table import FAR
 from scripts.link_gaps import INSTANTS, LYING, gaps
 
 GAP = 0.05
@@ -102,7 +103,7 @@ def stated(case: Case, start: AnyGait) -> Problem:
     body, limit = equal_links(case.links), joint_limit(case)
     delta = delta_in(case.gait_class, start, case.delta)
     laid = laid_into(case.gait_class, start, body, limit, case.speed)
-    problem = Problem("apart", laid, body, Friction(), case.gait_class, delta, RESTARTS[-1] * delta, limit, case.speed)
+    problem = Problem("apart", laid, body, Friction(), case.gait_class, delta, FAR * delta, limit, case.speed)
     return problem.with_(intervals={Polygon: 30, FreePath: 60, Harmonic: 78}[type(case.gait_class)])
 
 
@@ -110,9 +111,8 @@ def solved(case: Case, known: dict) -> Solution:
     """The search of a case."""
     start = guess(case, known)
     before = known.get(case.start, {}) if isinstance(case.start, str) else {}
-    if "efficiency" in before:
-        return maximise_from(stated(case, start), start, case.gait_class, before["efficiency"])
-    return maximise_efficiency(stated(case, start))
+    problem = stated(case, start)
+    return maximise_efficiency(prolonged(problem, start, case.gait_class) if "efficiency" in before else problem)
 
 
 def attempt(case: Case, known: dict) -> dict:

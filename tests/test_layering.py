@@ -89,10 +89,24 @@ def test_packages_and_modules_are_small():
 
 
 def test_no_public_name_is_shadowed_by_a_package():
-    """Importing colloc.x sets the attribute x of colloc, so a function of that name would vanish once it is used."""
+    """Importing colloc.x sets the attribute x of colloc, so a function of that name would vanish once it is used.
+
+    ``colloc.solve`` is both: its module can be called (tests/test_face.py).
+    """
     import colloc
 
-    assert not set(colloc.__all__) & (set(PACKAGES) | BESIDE)
+    assert set(colloc.__all__) & (set(PACKAGES) | BESIDE) == {"solve"}
+
+
+def test_what_is_bound_late_exists():
+    """The face names functions of higher packages for lower ones; these are the only imports that do not point down."""
+    import colloc  # binds
+    from colloc.system import late_binding
+
+    assert colloc
+    assert all(callable(late_binding.bound(name)) for name in late_binding._WHERE)
+    users = {name for name, path in modules().items() if "late_binding import bound" in path.read_text(encoding="utf-8")}
+    assert users == {"results.solution"}
 
 
 def test_the_page_names_what_exists_and_fits_a_screen():

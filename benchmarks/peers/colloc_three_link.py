@@ -10,9 +10,9 @@ import numpy as np
 
 from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import INTERVALS
-from colloc import Harmonic, Problem, ellipse, maximise_efficiency
+from colloc import Harmonic, Problem, ellipse
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import optimum
+from colloc.search.optimise import maximise_efficiency, optimum
 
 
 def solve(refined: bool, start: np.ndarray) -> dict:

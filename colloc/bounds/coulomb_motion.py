@@ -16,6 +16,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_bounds
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.solution_branches import all_balanced_velocities
 
 DELTA = 1e-9
 """Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
@@ -69,22 +70,35 @@ class Motion:
 _FIELDS = ("angles", "rates", "velocity", "spin", "power")
 
 
-def solved_motion(
+def balanced_motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA) -> Motion:
+    """One motion for each of some shapes and joint rates ``(n_joint, n)``; those that do not converge are left out."""
+    return _one_motion(body, friction, angles, rates, delta)[0]
+
+
+def _one_motion(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float
+) -> tuple[Motion, np.ndarray]:
+    solution = solve_balance(body, friction, angles, rates, delta, max_iterations=_MAX_ITERATIONS)
+    kept = np.flatnonzero(solution.converged)
+    return _motion(body, friction, angles[:, kept], rates[:, kept], solution.z[:, kept], delta), kept
+
+
+def all_motions(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
 ) -> tuple[Motion, np.ndarray]:
-    """Solve the balance for shapes and joint rates ``(n_joint, n)``: the motions that converged, and their mask ``(n,)``."""
-    solution = solve_balance(body, friction, angles, rates, delta, max_iterations=_MAX_ITERATIONS)
-    kept = solution.converged
-    angles, rates, z = angles[:, kept], rates[:, kept], solution.z[:, kept]
+    """All balanced motions for shapes and joint rates ``(n_joint, n)``, and of which of these each is, ``(n_motion,)``."""
+    if friction.isotropic:
+        return _one_motion(body, friction, angles, rates, delta)
+    found = all_balanced_velocities(body, friction, angles, rates, delta)
+    root, source = np.nonzero(found.sign)
+    return _motion(body, friction, angles[:, source], rates[:, source], found.z[root, :, source].T, delta), source
+
+
+def _motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> Motion:
     now = instant(body, friction, angles, rates, z, delta)
     middle = body.n_link // 2
     velocity = np.stack([now.velocity.vs[middle], now.velocity.vn[middle]])
-    return Motion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0]), kept
-
-
-def balanced_motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA) -> Motion:
-    """Solve the balance for shapes and joint rates ``(n_joint, n)``; motions that do not converge are left out."""
-    return solved_motion(body, friction, angles, rates, delta)[0]
+    return Motion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0])
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:

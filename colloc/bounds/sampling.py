@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import Motion, admissible, fundamental, solved_motion, unit_directions
+from colloc.bounds.coulomb_motion import Motion, admissible, all_motions, fundamental, unit_directions
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 
@@ -41,8 +41,8 @@ class Domain:
         return inside & admissible(self.body, angles, _EDGE)
 
     def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[Motion, np.ndarray]:
-        """Balanced motions and the mask of those that converged."""
-        return solved_motion(self.body, self.friction, angles, rates, _DELTA)
+        """All balanced motions, and the column of shapes and rates that each is of."""
+        return all_motions(self.body, self.friction, angles, rates, _DELTA)
 
     def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> Motion:
         """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions.
@@ -97,11 +97,13 @@ class Domain:
             new_rates /= np.sqrt((new_rates**2).sum(axis=0))
             flat_angles, flat_rates = new_angles.reshape(n_joint, -1), new_rates.reshape(n_joint, -1)
             tried = np.flatnonzero(self.holds(flat_angles))
-            motion, kept = self.solved(flat_angles[:, tried], flat_rates[:, tried])
+            motion, source = self.solved(flat_angles[:, tried], flat_rates[:, tried])
             found = np.full(flat_angles.shape[1], -np.inf)
             place = np.zeros(flat_angles.shape[1], dtype=int)
-            found[tried[kept]] = value(motion)
-            place[tried[kept]] = np.arange(motion.size)
+            reached = value(motion)
+            rising = np.argsort(reached)  # of several motions the best is written last
+            found[tried[source[rising]]] = reached[rising]
+            place[tried[source[rising]]] = rising
             choice = np.argmax(found.reshape(n, -1), axis=1) + np.arange(n) * 2 * _FRAMES
             up = found[choice] > best
             both = top.joined(motion.take(place[choice[up]]))

@@ -1,9 +1,9 @@
 """Direct collocation of gaits given by their path: arcs of bounded curvature, or polygons.
 
 Decision variables: the path's parameters (see `gaits.path_classes`); the tail's orientation theta at every site; distance x
-and work W at every edge. Rates are unit tangents and delta is measured at unit shape speed; the tail velocity is not a
-variable but the one that balances the body. As in `collocation.transcription`, x is the displacement of the centre of mass
-along a fixed direction and the first orientation is free.
+and work W at every edge; in the formulation "full" also joint angles, rates, tail velocity and link forces at every point.
+Rates are unit tangents and delta is measured at unit shape speed. As in `collocation.transcription`, x is the displacement of
+the centre of mass along a fixed direction and the first orientation is free.
 """
 
 from __future__ import annotations

@@ -15,7 +15,6 @@ import numpy as np
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, new_parser
-from colloc.results.certificate import gait_path
 from colloc.results.distinct_optima import SAME_EFFICIENCY, SAME_GAIT
 from colloc.results.solution import Solution
 from colloc.results.store import load
@@ -56,7 +55,7 @@ def gait_distance(a: Solution, b: Solution) -> float | None:
     if a.problem.body != b.problem.body:
         return None
     t = np.arange(_PHASES) / _PHASES
-    p, q = (gait_path(solution)(t)[0] for solution in (a, b))
+    p, q = (solution.gait.angles(t) for solution in (a, b))
     images = [q, -q] + ([q[::-1], -q[::-1]] if a.problem.body.symmetric else [])
     return min(path_distance(p, image) for image in images)
 

@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import add_result, new_parser, output_kind, output_path
-from colloc.results.certificate import gait_path
+from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -45,6 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--periods", type=int, default=1, metavar="N", help="repeat the period N times (default: 1)")
     parser.add_argument("--format", choices=("csv", "json"), default=None, help="default: by the suffix of --output, else csv")
     parser.add_argument("--output", metavar="PATH", help="folder or file (default: beside the result)")
+    add_printing(parser)
     return parser
 
 
@@ -107,16 +107,20 @@ def _export(options: argparse.Namespace) -> int:
     kind = output_kind(options, ("csv", "json"))
     path = output_path(options.output, source.with_suffix(f".{kind}"))
     limits = options.max_speed
-    trajectory = timed(gait_path(solution), options.rate, options.period, None if limits is None else np.array(limits))
+    trajectory = timed(solution.gait, options.rate, options.period, None if limits is None else np.array(limits))
     facts = about(solution, trajectory, options.rate, limits)
     text = (json_text if kind == "json" else csv_text)(facts, trajectory, options.periods)
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
+    samples = trajectory.time.size * options.periods
     fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])
-    print(f"saved {path}: {trajectory.time.size * options.periods} samples, period {trajectory.period:g} s")
-    print(f"  joint speeds up to {fastest} rad/s; {facts['distance_per_period_body_lengths']:.4g} body lengths a period")
-    if solution.status != "solved":
-        print(f"  note: the result is not certified ({solution.status})")
+    lines = [
+        f"saved {path}: {samples} samples, period {trajectory.period:g} s",
+        f"  joint speeds up to {fastest} rad/s; {facts['distance_per_period_body_lengths']:.4g} body lengths a period",
+    ]
+    if not solution.success:
+        lines.append(f"  note: the result is not certified ({solution.status})")
+    tell(options, {**facts, "file": str(path), "samples": samples}, lines)
     return OK
 
 

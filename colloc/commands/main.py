@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
+from colloc.system.errors import ProblemError
 from colloc.system.processors import one_thread_each
 
 SUBCOMMANDS = {
@@ -16,6 +17,7 @@ SUBCOMMANDS = {
         "multistart",
         "solve a problem from many random starts; distinct optima with their frequencies",
     ),
+    "open": ("open", "what an archive of starts holds; the whole result of one of them"),
     "sweep": ("sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
     "verify": ("verify", "check a result again by independent replay, without CasADi"),
     "compare": ("compare", "hold two results against each other"),
@@ -65,8 +67,7 @@ def _command(words: list[str]) -> int:
         if words[0].endswith(".py"):
             near = [f"solve {words[0]}"]
         hint = f"do you mean colloc {near[0]}?" if near else f"choose one of {', '.join(SUBCOMMANDS)}."
-        print(f"colloc: there is no command {words[0]!r}; {hint}", file=sys.stderr)
-        return BAD_PROBLEM
+        raise ProblemError(f"there is no command {words[0]!r}; {hint}")
     return importlib.import_module(f"colloc.commands.{SUBCOMMANDS[words[0]][0]}").main(words[1:])
 
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colloc.commands.ending import NONE_FOUND, OK, run
+from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from colloc.results.archive import StartName
 
 _MOST_BASINS_SHOWN = 12
+_SEARCH = {"seed": 0, "sampler": LATIN_HYPERCUBE}
 _RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 
 
@@ -164,15 +165,18 @@ def _run(options: argparse.Namespace, command: str) -> int:
     outcomes = [o for k, o in archive.of_search(options.sampler, options.seed).items() if k < options.starts]
     found = basins(problem, outcomes)
     if options.json:
-        print(json.dumps(summary_dict(problem, outcomes, found, path)))
+        print(json.dumps({**summary_dict(problem, outcomes, found, path), "interrupted": interrupted}))
     else:
         lines = summary_lines(problem, outcomes, found)
         if found:
             best = max(basin.best.efficiency for basin in found)
             lines.append(gap_line(problem, best, upper_bound(problem, path.parent, compute=options.bound)))
+            which = "".join(f" --{k} {getattr(options, k)}" for k, v in _SEARCH.items() if getattr(options, k) != v)
+            lines.append(f"  colloc open {path} --start {found[0].best.start}{which}   makes a result of the best")
         print("\n".join([*lines, *_others_lines(archive.outcomes, len(outcomes)), f"  saved {path}"]))
     if interrupted:
-        raise KeyboardInterrupt("run the same command again to go on.")
+        print("colloc: interrupted; run the same command again to go on.", file=sys.stderr)
+        return INTERRUPTED
     return OK if found else NONE_FOUND
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -72,6 +73,11 @@ def add_printing(parser: argparse.ArgumentParser) -> None:
     """``--json`` and ``--quiet``."""
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")
     parser.add_argument("--quiet", action="store_true", help="no progress, only the final summary")
+
+
+def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
+    """What a command ends with: one JSON object of the facts if that was asked for, else lines for people."""
+    print(json.dumps(facts) if options.json else "\n".join(lines), flush=True)
 
 
 def add_bound(parser: argparse.ArgumentParser) -> None:

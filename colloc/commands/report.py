@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import add_result, new_parser, output_path
+from colloc.commands.options import add_printing, add_result, new_parser, output_path, tell
 from colloc.gaits.problem import Reference
-from colloc.pictures.report_page import report_page
+from colloc.pictures.report_page import write_report
 from colloc.results.store import load
 from colloc.system.progress import StatusLine
-from colloc.system.replaced_file import replaced_file
 
 _EPILOG = """\
 The page needs no network and no other file: certificate, animation with friction, shape space, speeds, power, convergence,
@@ -32,6 +31,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--problem", metavar="FILE.py", help="problem file whose REFERENCE to hold the result against")
     parser.add_argument("--figures", action="store_true", help="also write publication figures, PDF and PNG, one panel each")
     parser.add_argument("--output", metavar="PATH", help="folder, or .html file (default: beside the result)")
+    add_printing(parser)
     return parser
 
 
@@ -44,20 +44,19 @@ def _report(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
     path = output_path(options.output, source.with_suffix(".html"))
-    with StatusLine() as line:
+    with StatusLine(enabled=not (options.quiet or options.json)) as line:
         line.say("writing the page")
-        page = report_page(solution, _reference(options.problem), _gap(solution, source.parent))
-        with replaced_file(path) as temporary:
-            Path(temporary).write_text(page, encoding="utf-8")
+        write_report(solution, path, _reference(options.problem), source.parent)
         figures: list[Path] = []
         if options.figures and solution.levels:
             from colloc.pictures.publication import save_panels
 
             line.say("drawing the figures")
             figures = save_panels(solution, path.with_suffix(""))
-    print(f"saved {path} ({len(page) / 1000:.0f} kB, self-contained)")
-    for figure in figures:
-        print(f"  {figure}")
+    size = path.stat().st_size
+    facts = {"status": "written", "file": str(path), "bytes": size, "figures": [str(f) for f in figures]}
+    saved = f"saved {path} ({size / 1000:.0f} kB, self-contained)"
+    tell(options, facts, [saved, *(f"  {figure}" for figure in figures)])
     return OK
 
 
@@ -67,15 +66,6 @@ def _reference(problem_file: str | None) -> Reference | None:
     from colloc.gaits.problem_file import read_problem_file
 
     return read_problem_file(problem_file).reference
-
-
-def _gap(solution, folder: Path) -> str:
-    from colloc.bounds.optimality_gap import gap_line, upper_bound
-
-    if not solution.certificate.replayed:
-        return ""
-    bound = upper_bound(solution.problem, folder, compute=False)
-    return gap_line(solution.problem, solution.certificate.efficiency, bound)
 
 
 if __name__ == "__main__":

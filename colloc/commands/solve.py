@@ -14,13 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.harmonic import Fourier
-from colloc.gaits.paths import ArcPath
 from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.relaxed import Relaxed
@@ -94,11 +90,12 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
             f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} +- "
             f"{certificate.error_at_zero_delta:.0e} for delta -> 0",
-            f"  distance d      {certificate.distance:.6f}      work W  {certificate.work:.6f}      "
-            f"at delta {solution.last.delta:.0e}",
+            f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
+            f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  search          {text}" for text in _search_lines(solution)]
-        lines += [f"  gait            {text}" for text in _gait_lines(solution)]
+        gait = [f"class: {solution.problem.gait.describe()}", *solution.gait.lines()]
+        lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]
         if reference is not None:
             difference = certificate.efficiency - reference.efficiency
@@ -123,24 +120,6 @@ def _search_lines(solution: Solution) -> list[str]:
         size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
         lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
     return lines
-
-
-def _gait_lines(solution: Solution) -> list[str]:
-    gait = solution.gait
-    lines = [f"class: {solution.problem.gait.describe()}"]
-    if isinstance(gait, Fourier):
-        for j in range(gait.n_joint):
-            terms = [f"{gait.mean[j]:+.4f}"]
-            for k in range(gait.n_harmonic):
-                wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
-                terms.append(f"{gait.cos[j, k]:+.4f} cos {wave} {gait.sin[j, k]:+.4f} sin {wave}")
-            lines.append(f"joint {j + 1}: " + " ".join(terms))
-        return lines
-    what = f"path of length {gait.length:.4f} rad"
-    if isinstance(gait, ArcPath):
-        turned = "" if gait.winding is None else f", winding {gait.winding}"
-        return [*lines, f"{what}{turned}, largest curvature {np.abs(gait.curvatures()).max():.3f} per rad"]
-    return [*lines, what, *(f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in gait.corners.T)]
 
 
 def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
@@ -181,6 +160,8 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
             "efficiency_error": certificate.efficiency_error,
             "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
             "error_at_zero_delta": certificate.error_at_zero_delta,
+            "distance_error": certificate.distance_error,
+            "work_error": certificate.work_error,
             "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
         }
     if reference is not None:

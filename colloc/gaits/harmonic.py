@@ -15,18 +15,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gaits.gait_function import GaitFunction
 from colloc.gaits.symmetry import SYMMETRIES, fraction
+from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
 
-@dataclass(frozen=True, eq=False)
-class Fourier:
+@named_arguments
+@dataclass(frozen=True, eq=False, repr=False)
+class Fourier(GaitFunction):
     """Joint angles ``mean + sum_k cos[:, k-1] cos(2 pi k t) + sin[:, k-1] sin(2 pi k t)``.
 
     Parameters
     ----------
     mean : (n_joint,)
     cos, sin : (n_joint, n_harmonic)
+
+    Examples
+    --------
+    >>> from colloc import Fourier
+    >>> wave = Fourier(mean=[0, 0, 0], cos=[[0.6], [0.0], [-0.6]], sin=[[0.2], [0.6], [0.2]])
+    >>> wave.angles([0.0, 0.25]).round(6).tolist()
+    [[0.6, 0.2], [0.0, 0.6], [-0.6, 0.2]]
     """
 
     mean: np.ndarray
@@ -79,6 +89,17 @@ class Fourier:
         k, cos, sin = self._waves(np.asarray(t, dtype=float))
         return -self.cos @ (k * sin) + self.sin @ (k * cos)
 
+    def lines(self) -> list[str]:
+        """The formula, joint by joint."""
+        found = []
+        for j in range(self.n_joint):
+            terms = [_rounded(self.mean[j])]
+            for k in range(self.n_harmonic):
+                wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
+                terms.append(f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}")
+            found.append(f"joint {j + 1}: " + " ".join(terms))
+        return found
+
     def resized(self, n_harmonic: int) -> Fourier:
         """The same gait with harmonics added (zero) or cut."""
         keep = min(n_harmonic, self.n_harmonic)
@@ -87,11 +108,30 @@ class Fourier:
         return Fourier(self.mean, cos, sin)
 
 
+def _rounded(value: float) -> str:
+    """With its sign; no minus before zeros."""
+    return f"{round(float(value), 4) + 0.0:+.4f}"
+
+
 def ellipse(A0: float, A1: float, B1: float) -> Fourier:
-    """The paper's one-harmonic gait of a three-link body (section V), symmetric about angle 1 = -angle 2."""
+    """The paper's one-harmonic gait of a three-link body (section V), symmetric about angle 1 = -angle 2.
+
+    Parameters
+    ----------
+    A0, A1, B1 : float
+        ``angle 1 = A0 + A1 cos 2πt + B1 sin 2πt`` and ``angle 2 = -A0 - A1 cos 2πt + B1 sin 2πt`` [rad].
+
+    Examples
+    --------
+    >>> from colloc import ellipse
+    >>> ellipse(A0=0.3, A1=1.0, B1=0.5).angles([0.0])
+    array([[ 1.3],
+           [-1.3]])
+    """
     return Fourier(np.array([A0, -A0]), np.array([[A1], [-A1]]), np.array([[B1], [B1]]))
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Harmonic:
     """The class of gaits with `harmonics` harmonics and a given symmetry.
@@ -103,6 +143,12 @@ class Harmonic:
     ----------
     harmonics : int
     symmetry : {"none", "bilateral", "antipodal"}
+
+    Examples
+    --------
+    >>> from colloc import Harmonic
+    >>> Harmonic(harmonics=2, symmetry="bilateral").describe()
+    '2 harmonics, symmetry bilateral'
     """
 
     harmonics: int = 1

@@ -16,6 +16,7 @@ import numpy as np
 
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, SYMMETRIES, fraction
+from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
 _ARCS, _PARAMETERS = 120, 250
@@ -27,6 +28,7 @@ def _check_symmetry(symmetry: object) -> None:
         raise ProblemError(f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {symmetry!r}.")
 
 
+@named_arguments
 @dataclass(frozen=True)
 class FreePath:
     """Closed paths of bounded curvature at unit shape speed: |q''| <= curvature in arc length.
@@ -39,6 +41,12 @@ class FreePath:
     winding : int, optional
         How often the tangent turns over a period, counter-clockwise in the plane of (joint 1, joint 2): 1 or -1 for simple
         loops, 0 for an eight; odd if antipodal. Two joints only. By default that of the guess.
+
+    Examples
+    --------
+    >>> from colloc import FreePath
+    >>> FreePath(curvature=8, symmetry="bilateral").describe()
+    'paths of curvature <= 8 per rad, symmetry bilateral'
     """
 
     curvature: float = 8.0
@@ -95,6 +103,7 @@ class FreePath:
         return np.concatenate([[path.length / (2 * np.pi)], path.tangents.ravel(order="F"), path.shapes.ravel(order="F")])
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Polygon:
     """Closed polygons with a given number of corners, which are free.
@@ -109,6 +118,12 @@ class Polygon:
         a side. With an odd number of corners it meets one of each, and this does not matter.
     shortest_side : float
         Lower bound on the length of a side [rad].
+
+    Examples
+    --------
+    >>> from colloc import Polygon
+    >>> Polygon(corners=3).describe()
+    'polygons of 3 corners, symmetry none'
     """
 
     corners: int = 3

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.arcs import advance, direction
+from colloc.gaits.gait_function import GaitFunction
 from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced
 from colloc.system.errors import ProblemError
 
@@ -31,8 +32,8 @@ def _checked_symmetry(symmetry: str) -> None:
         raise ProblemError(f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not {symmetry!r}.")
 
 
-@dataclass(frozen=True, eq=False)
-class ArcPath:
+@dataclass(frozen=True, eq=False, repr=False)
+class ArcPath(GaitFunction):
     """A closed path of circular arcs that join smoothly.
 
     Parameters
@@ -46,6 +47,19 @@ class ArcPath:
     length : float
         Of the whole closed path [rad].
     symmetry : {"none", "bilateral", "antipodal"}
+
+    Examples
+    --------
+    >>> from colloc import ArcPath
+    >>> import numpy as np
+    >>> circle = ArcPath(  # four quarters of a circle of radius 1 round the straight body
+    ...     edges=np.linspace(0, 1, 5),
+    ...     shapes=[[1, 0, -1, 0, 1], [0, 1, 0, -1, 0]],
+    ...     tangents=[np.pi * np.array([0.5, 1, 1.5, 2, 2.5])],
+    ...     length=2 * np.pi,
+    ... )
+    >>> circle.curvatures().round(6).tolist()
+    [1.0, 1.0, 1.0, 1.0]
     """
 
     edges: np.ndarray
@@ -118,6 +132,12 @@ class ArcPath:
             return None
         return round(float(self.tangents[0, -1] - self.tangents[0, 0]) / (2 * np.pi * fraction(self.symmetry)))
 
+    def lines(self) -> list[str]:
+        """Length, winding and sharpest bend."""
+        turned = "" if self.winding is None else f", winding {self.winding}"
+        sharpest = np.abs(self.curvatures()).max()
+        return [f"path of length {self.length:.4f} rad{turned}, largest curvature {sharpest:.3f} per rad"]
+
     def resampled(self, edges: np.ndarray) -> ArcPath:
         """The same path with other edges; exact if every old edge is a new one."""
         k, h, tau = self._at(edges)
@@ -127,8 +147,8 @@ class ArcPath:
         return ArcPath(edges, shapes, tangents, self.length, self.symmetry)
 
 
-@dataclass(frozen=True, eq=False)
-class Corners:
+@dataclass(frozen=True, eq=False, repr=False)
+class Corners(GaitFunction):
     """A closed polygon.
 
     Parameters
@@ -137,6 +157,13 @@ class Corners:
         Joint angles [rad] at the corners, in order. Without a symmetry the last is joined to the first. With one these are
         the vertices of half the path, ends included; an end that lies within an edge is no corner of the polygon.
     symmetry : {"none", "bilateral", "antipodal"}
+
+    Examples
+    --------
+    >>> from colloc import Corners
+    >>> triangle = Corners([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]])
+    >>> round(triangle.length, 3)
+    3.073
     """
 
     corners: np.ndarray
@@ -198,3 +225,8 @@ class Corners:
     def rates(self, t: np.ndarray) -> np.ndarray:
         """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
         return self._both(t)[1]
+
+    def lines(self) -> list[str]:
+        """Length and corners."""
+        corners = [f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T]
+        return [f"path of length {self.length:.4f} rad", *corners]

@@ -20,6 +20,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.numerics.schemes import scheme
+from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
 DELTA_START, PATH_DELTA_START = 0.1, 0.01
@@ -49,6 +50,12 @@ class Reference:
         Largest difference that counts as agreement.
     source : str
         Where the value comes from.
+
+    Examples
+    --------
+    >>> from colloc import Reference
+    >>> Reference(efficiency=0.259, tolerance=0.0015, source="S. Alben (2019)").efficiency
+    0.259
     """
 
     efficiency: float
@@ -56,7 +63,8 @@ class Reference:
     source: str
 
 
-@dataclass(frozen=True)
+@named_arguments
+@dataclass(frozen=True, repr=False)
 class Problem:
     """Maximise d/W over a class of gaits.
 
@@ -91,6 +99,20 @@ class Problem:
         forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
+
+    Examples
+    --------
+    >>> from colloc import Chain, Friction, Harmonic, Problem
+    >>> problem = Problem(
+    ...     name="mine",
+    ...     body=Chain((0.3, 0.2, 0.2, 0.3)),
+    ...     friction=Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3),
+    ...     gait=Harmonic(harmonics=2, symmetry="bilateral"),
+    ... )
+    >>> problem
+    <Problem mine: 4 links, friction (1.7, 1, 1.3), 2 harmonics, symmetry bilateral, delta 1e-04>
+    >>> problem.with_(delta=1e-6).delta
+    1e-06
     """
 
     name: str
@@ -225,6 +247,13 @@ class Problem:
         if depth.max() > _SLACK:
             when = np.argmax(depth) / _CHECKED_PHASES
             raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
+
+    def __repr__(self) -> str:
+        mu = self.friction
+        return (
+            f"<Problem {self.name}: {self.body.n_link} links, friction ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}), "
+            f"{self.gait.describe()}, delta {self.delta:.0e}>"
+        )
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""

@@ -55,6 +55,23 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
     return ProblemFile(problem, reference, source, starts)
 
 
+def load_problem(path: str | os.PathLike[str]) -> Problem:
+    """The problem that a file states; the file is executed.
+
+    Raises
+    ------
+    ProblemError
+        As for `read_problem_file`.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> colloc.load_problem("problems/three_link.py")
+    <Problem three_link: 3 links, friction (1, 1, 1), 1 harmonic, symmetry bilateral, delta 1e-04>
+    """
+    return read_problem_file(path).problem
+
+
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
     """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is for the messages.
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
+from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
 TAIL = None
@@ -37,6 +38,7 @@ class LinkVelocity(NamedTuple):
     w: Array
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Chain:
     """A chain of straight links joined end to end.
@@ -45,6 +47,12 @@ class Chain:
     ----------
     lengths : tuple of float
         Link lengths from tail to head; they add up to the body length, 1.
+
+    Examples
+    --------
+    >>> from colloc import Chain
+    >>> Chain((0.25, 0.5, 0.25)).n_joint
+    2
     """
 
     lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)

@@ -167,6 +167,15 @@ def solve_balance(
     ------
     ProblemError
         For arrays of wrong shape or kind, non-finite numbers, or delta or tolerance that are not positive.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> import numpy as np
+    >>> angles, rates = np.array([[0.5], [0.2]]), np.array([[1.0], [0.0]])
+    >>> solved = colloc.solve_balance(colloc.Chain(), colloc.Friction(), angles, rates, delta=1e-6)
+    >>> solved.require().z.round(3).ravel().tolist()
+    [0.02, 0.255, -0.887]
     """
     angles, rates = _real("angles", angles), _real("rates", rates)
     n_time = angles.shape[1]

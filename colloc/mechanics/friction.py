@@ -12,9 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
+from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
 
+@named_arguments
 @dataclass(frozen=True)
 class Friction:
     """Friction coefficients, in units of the weight.
@@ -23,6 +25,12 @@ class Friction:
     ----------
     mu_t, mu_f, mu_b : float
         Transverse, forward (towards the head) and backward coefficient; all positive (paper, eq. friction).
+
+    Examples
+    --------
+    >>> from colloc import Friction
+    >>> Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3).isotropic
+    False
     """
 
     mu_t: float = 1.0

@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 import re
 from io import StringIO
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.problem import Reference
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.style import INK, styled
 from colloc.results.solution import SOLVED, Solution
+from colloc.system.replaced_file import replaced_file
 
 _MOST_PLANES = 6
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
@@ -106,6 +109,17 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             **found,
         )
     )
+
+
+def write_report(solution: Solution, path: Path, reference: Reference | None = None, known: Path | None = None) -> Path:
+    """Write the page; `known` is the folder where upper bounds are kept, by default that of the page."""
+    gap = ""
+    if solution.certificate.replayed:
+        bound = upper_bound(solution.problem, known or path.parent, compute=False)
+        gap = gap_line(solution.problem, solution.certificate.efficiency, bound)
+    with replaced_file(path) as temporary:
+        Path(temporary).write_text(report_page(solution, reference, gap), encoding="utf-8")
+    return path
 
 
 def _headline(solution: Solution) -> str:

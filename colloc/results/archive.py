@@ -133,6 +133,21 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
     return Archive(problem, path, *(found or ()))
 
 
+def archive_at(path: str | os.PathLike[str]) -> Archive:
+    """The archive with this HDF5 file, whatever its problem is.
+
+    Raises
+    ------
+    StoreError
+        If there is none, or it is damaged.
+    """
+    rows = row_path(path)
+    stated = read_rows(rows, ROWS).values.get(_PROBLEM) if rows.exists() else None
+    if stated is None:
+        raise StoreError(f"there is no archive of starts at {rows}; colloc multistart makes one.")
+    return open_archive(Problem.from_dict(stated), Path(path).with_suffix(".h5"))
+
+
 def save_archive(archive: Archive, command: str = "") -> Path:
     """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well.
 

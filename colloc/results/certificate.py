@@ -9,6 +9,7 @@ from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import net_force
 from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.mechanics.friction import Friction
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import extrapolated_limit
 from colloc.results.solution import Solution
@@ -20,6 +21,8 @@ CURVATURE = 1e-6
 """Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
 order; so the rotation is limited by what it changes there, to as much as collocation may be wrong by (GAP). DELTA is the
 paper's own claim (less than 1 % below delta = 1e-4)."""
+MOTIONS = DELTA
+"""Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
 _FINE_PHASES = 20000
 
@@ -55,6 +58,13 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
     ------
     NotConvergedError
         If the balance cannot be solved at some instant of the replay.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> colloc.certify(colloc.solve(problem, starts=1), tolerance=1e-7).passed
+    True
     """
     problem = solution.problem
     path = gait_path(solution)
@@ -107,11 +117,27 @@ def gait_certificate(
     fine = replayed_at(1.0, None)
     at_tenth = replayed_at(0.1, fine)
     replays = fine, at_tenth, replayed_at(0.01, at_tenth)
-    errors = [replayed.efficiency * (replayed.error + replayed.turning) for replayed in replays]
+    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
     limit = extrapolated_limit([replayed.efficiency for replayed in replays], errors)
-    checks = (*before, *_motion(problem, path, fine, breaks, tolerance, claimed), *after, *_delta(fine, limit.value))
-    measured = (fine.efficiency, fine.distance, fine.work, errors[0])
-    return Certificate(checks, *measured, limit.value, fine.instants, limit.error)
+    checks = (
+        *before,
+        *_motion(problem, path, fine, breaks, tolerance, claimed),
+        _one_motion(problem.friction, fine),
+        *after,
+        *_delta(fine, limit.value),
+    )
+    return Certificate(
+        checks,
+        fine.efficiency,
+        fine.distance,
+        fine.work,
+        errors[0],
+        limit.value,
+        fine.instants,
+        limit.error,
+        distance_error=fine.distance_error + fine.turning * fine.distance + fine.other_distance,
+        work_error=fine.work_error + fine.other_work,
+    )
 
 
 def _optimality(solution: Solution) -> list[Check]:
@@ -140,13 +166,29 @@ def _motion(
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
     ]
     if claimed is not None:
-        gap = claimed / fine.efficiency - 1
+        gap = _beyond(claimed / fine.efficiency - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
     return [
         *checks,
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
     ]
+
+
+def _beyond(value: float, unknown: float) -> float:
+    """The part of a difference that something of unknown sign does not explain."""
+    return float(np.copysign(max(abs(value) - unknown, 0.0), value))
+
+
+def _one_motion(friction: Friction, fine: Replay) -> Check:
+    """How far the efficiency depends on which of several balanced motions the body takes."""
+    if friction.isotropic:
+        meaning = "relative; equal coefficients leave one balanced motion"
+    elif fine.several == 0:
+        meaning = f"relative; no other balanced motion was found at {fine.instants} instants"
+    else:
+        meaning = f"relative; several motions are balanced at {fine.several:.2g} of the period"
+    return Check("one motion", fine.ambiguity, MOTIONS, meaning)
 
 
 _BESIDE = 1e-10

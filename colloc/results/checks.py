@@ -27,7 +27,7 @@ class Check:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certificate:
     """The verdict of an independent replay.
 
@@ -38,13 +38,15 @@ class Certificate:
         Of the replay, over one period, at the solution's delta.
     efficiency_error : float
         Error of that efficiency: what refining the replay changes, and what following another point of the body would
-        (net rotation times the body's reach over the distance).
+        (net rotation times the body's reach over the distance), and what the body's other balanced motions would, if any.
     efficiency_at_zero_delta : float
         Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed.
     instants : int
         Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
     error_at_zero_delta : float
         Error of the extrapolation (`colloc.results.delta_limit.extrapolated_limit`); NaN if an older file does not state it.
+    distance_error, work_error : float
+        The same of distance and work; NaN if an older file does not state it.
     """
 
     checks: tuple[Check, ...]
@@ -55,6 +57,18 @@ class Certificate:
     efficiency_at_zero_delta: float
     instants: int
     error_at_zero_delta: float = float("nan")
+    distance_error: float = float("nan")
+    work_error: float = float("nan")
+
+    def __repr__(self) -> str:
+        if not self.replayed:
+            return "<Certificate: nothing was replayed>"
+        failed = ", ".join(check.name for check in self.failures)
+        verdict = f"fails on {failed}" if failed else f"all {len(self.checks)} checks hold"
+        return f"<Certificate: {verdict}; d/W = {self.efficiency:.6g} +- {self.efficiency_error:.0e}>"
+
+    def __str__(self) -> str:
+        return "\n".join(check.line() for check in self.checks)
 
     @property
     def replayed(self) -> bool:

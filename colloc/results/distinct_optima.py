@@ -33,7 +33,7 @@ def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
     return fourier_through(gait, series_class(problem))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Outcome:
     """What became of one start.
 
@@ -72,8 +72,11 @@ class Outcome:
     seconds: float = 0.0
     cpu_seconds: float = 0.0
 
+    def __repr__(self) -> str:
+        return f"<Outcome of start {self.start}: {self.status}, d/W = {self.efficiency:.6g}, {self.cpu_seconds:.1f} s>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Basin:
     """A distinct certified optimum and the starts that ended there.
 
@@ -89,6 +92,9 @@ class Basin:
     best: Outcome
     starts: tuple[int, ...]
     frequency: float
+
+    def __repr__(self) -> str:
+        return f"<Basin with d/W = {self.best.efficiency:.6g} of {len(self.starts)} starts>"
 
 
 def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:

@@ -9,7 +9,7 @@ import numpy as np
 REDUCED = "reduced"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Level:
     """One converged or failed step of the continuation.
 
@@ -59,3 +59,8 @@ class Level:
     evaluation_seconds: float
     scheme: str = ""
     program: str = REDUCED
+
+    def __repr__(self) -> str:
+        verdict = "" if self.optimal else f", {self.status}"
+        size = f"{self.x.size} variables"
+        return f"<Level at delta = {self.delta:.1e}: d/W = {self.efficiency:.6g}, {self.program}, {size}{verdict}>"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,39 +22,19 @@ from colloc.numerics.schemes import scheme
 from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.level import Level
+from colloc.results.motion import SAMPLES, Column, Motion, motion_columns, motion_dataset, motion_frame
 from colloc.results.solution_card import solution_card
 from colloc.system.errors import ProblemError
+from colloc.system.late_binding import bound
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """The body at given instants, ``n_time`` columns each.
-
-    Attributes
-    ----------
-    t : (n_time,)
-        Phase.
-    angles, rates : (n_joint, n_time)
-    z : (3, n_time)
-        Tail velocity (u, v, omega) in the body frame, per period.
-    theta : (n_time,)
-        Lab angle of the tail link.
-    centre, tail : (2, n_time)
-        Lab positions of the centre of mass and of the tail.
-    """
-
-    t: np.ndarray
-    angles: np.ndarray
-    rates: np.ndarray
-    z: np.ndarray
-    theta: np.ndarray
-    centre: np.ndarray
-    tail: np.ndarray
-
-
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Solution:
     """What a solve found.
 
@@ -75,6 +58,17 @@ class Solution:
         How many the gait is the best of.
     others : tuple of Alternative
         Distinct gaits they led to, the one of this solution first; empty for a single start.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> solution = colloc.solve(problem, starts=1)
+    >>> solution.success, solution.message
+    (True, '')
+    >>> motion = solution.sample([0, 0.5])
+    >>> motion.angles.shape, motion.z.shape
+    ((2, 2), (3, 2))
     """
 
     problem: Problem
@@ -103,6 +97,11 @@ class Solution:
         if not reached or not self.certificate.replayed:
             return NOT_CONVERGED
         return SOLVED if self.certificate.passed else CERTIFICATE_FAILED
+
+    @property
+    def success(self) -> bool:
+        """Whether the solve converged and every check of the certificate holds."""
+        return self.status == SOLVED
 
     @property
     def last(self) -> Level:
@@ -236,6 +235,31 @@ class Solution:
         problem = self.problem
         now = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, self.delta_per_period)
         return total_power(now.velocity, now.force)[0]
+
+    def plot(self) -> Any:
+        """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it."""
+        return bound("plot")(self)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""
+        return bound("animate")(self, Path(path), **options)
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the web page of `colloc report`."""
+        return bound("report")(self, Path(path))
+
+    def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
+        """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
+        about = {"name": self.problem.name, "status": self.status, "efficiency": self.measured.efficiency}
+        return motion_dataset(self._columns(t), about)
+
+    def to_dataframe(self, t: np.ndarray | None = None) -> pandas.DataFrame:
+        """The motion at phases `t` (one period by default) as a pandas DataFrame: ``joint_angles_1``, ``centre_x``, ..."""
+        return motion_frame(self._columns(t))
+
+    def _columns(self, t: np.ndarray | None) -> dict[str, Column]:
+        motion = self.sample(np.linspace(0.0, 1.0, SAMPLES) if t is None else t)
+        return motion_columns(motion, self.power(motion))
 
     def _repr_html_(self) -> str:
         """What a notebook shows: verdict, numbers and checks."""

@@ -26,12 +26,24 @@ from colloc.gaits.problem import Problem, statement_hash
 from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.level import Level
+from colloc.results.motion import SAMPLES, motion_columns
 from colloc.results.solution import Solution
 from colloc.system.errors import ChangedFileWarning, StoreError
-from colloc.system.store_file import array, attribute, child, mark, new_file, put, put_attribute, sealed_file, text, was_changed
+from colloc.system.store_file import (
+    BETWEEN_DIMS,
+    array,
+    attribute,
+    child,
+    mark,
+    new_file,
+    put,
+    put_attribute,
+    sealed_file,
+    text,
+    was_changed,
+)
 
 FORMAT, FORMAT_VERSION = "colloc solution", 3
-_MOTION_SAMPLES = 401
 _LAYOUT = "see colloc.collocation.layout"
 _LEVEL_ARRAYS = {
     "edges": ("period", "edge"),
@@ -59,6 +71,17 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
     ------
     StoreError
         If the folder cannot be made or written.
+
+    Examples
+    --------
+    >>> import colloc, os, tempfile
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> solution = colloc.solve(problem, starts=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = colloc.save(solution, os.path.join(folder, "quick.h5"))
+    ...     again = colloc.load(path)
+    >>> again.certificate == solution.certificate
+    True
     """
     path = Path(path)
     with new_file(path) as file:
@@ -76,6 +99,13 @@ def load(path: str | os.PathLike[str]) -> Solution:
     ------
     StoreError
         If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> colloc.load("nothing.h5")
+    Traceback (most recent call last):
+    colloc.system.errors.StoreError: there is no file nothing.h5.
     """
     changed = was_changed(Path(path), FORMAT)
     try:
@@ -125,16 +155,10 @@ def _write_motion(file: h5py.File, solution: Solution) -> None:
             put(gait, name, value, units=units, dims=dims)
         else:
             put_attribute(gait, name, value)
-    motion = solution.sample(np.linspace(0.0, 1.0, _MOTION_SAMPLES))
     group = file.create_group("motion")
-    put(group, "t", motion.t, units="period", dims="t")
-    put(group, "joint_angles", motion.angles, units="rad", dims="joint, t")
-    put(group, "joint_rates", motion.rates, units="rad/period", dims="joint, t")
-    put(group, "tail_velocity", motion.z, units="length/period, length/period, rad/period", dims="velocity, t")
-    put(group, "theta", motion.theta, units="rad", dims="t")
-    put(group, "centre", motion.centre, units="length", dims="axis, t")
-    put(group, "tail", motion.tail, units="length", dims="axis, t")
-    put(group, "power", solution.power(motion), units="weight length/period", dims="t")
+    motion = solution.sample(np.linspace(0.0, 1.0, SAMPLES))
+    for name, column in motion_columns(motion, solution.power(motion)).items():
+        put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
 
 
 def write_certificate(group: h5py.Group, certificate: Certificate) -> None:

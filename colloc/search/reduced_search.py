@@ -60,6 +60,8 @@ class Found:
         Of -d/W that was asked for.
     iterations, evaluations : int
     seconds : float
+    curvature : (n, n), optional
+        What SQP knows of the Lagrangian's second derivatives.
     """
 
     space: SearchSpace
@@ -71,6 +73,7 @@ class Found:
     iterations: int
     evaluations: int
     seconds: float
+    curvature: np.ndarray | None = None
 
     @classmethod
     def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
@@ -93,26 +96,34 @@ class Found:
 Report = Callable[[Found], None]
 
 
-def settled(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float) -> Found:
+def settled(
+    space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float, curvature: np.ndarray | None = None
+) -> Found:
     """Optimise from v at one delta on one mesh until checks, box and gait rest."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
     space.move_checks(v)
     for _ in range(_ROUNDS[accuracy]):
         before = v
-        result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy])
+        fresh = curvature is None
+        result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = space.move_checks(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < STATIONARY[accuracy]
-        if admissible and not result.on_edge and (stationary or np.abs(v - before).max() < _AT_REST):
+        # what was learned across kinks may end the search too early: then it begins anew
+        curvature = result.curvature if stationary else None
+        if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < _AT_REST)):
             break
-    return Found(space, v, delta, result.objective, conditions, accuracy, iterations, evaluations, time.perf_counter() - begin)
+    seconds = time.perf_counter() - begin
+    return Found(space, v, delta, result.objective, conditions, accuracy, iterations, evaluations, seconds, curvature)
 
 
-def settled_apart(space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float) -> Found:
+def settled_apart(
+    space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float, curvature: np.ndarray | None = None
+) -> Found:
     """The same, keeping pairs of links more than two apart from crossing as they turn out to cross."""
-    found = settled(space, v, delta, radius, accuracy)
+    found = settled(space, v, delta, radius, accuracy, curvature)
     while new := tuple(p for p in crossing_pairs(found.space, found.v) if p not in found.space.far):
         begin = last_free(found.space, v, found.v)
         space = found.space.with_far(found.space.far + new)
@@ -132,7 +143,7 @@ def deltas(problem: Problem, first: float) -> list[float]:
 def descended(found: Found, problem: Problem, report: Report) -> Found:
     """From a gait at some delta down to the problem's, on the same mesh."""
     for delta in deltas(problem, found.delta)[1:]:
-        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, ROUGH)
+        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, ROUGH, found.curvature)
         report(found)
     return found
 
@@ -155,7 +166,8 @@ def refined(found: Found, report: Report) -> tuple[Found, str]:
             count, kept, radius = count + 1, np.concatenate([kept, plan.kept]), REMESH_RADIUS
             space = space.remeshed(found.gait, plan.edges, plan.scheme)
             v, accuracy = space.parameters(found.gait), FINE if count > _SAME_AIM else ROUGH
-        found = settled_apart(space, v, found.delta, radius, accuracy)
+        known = found.curvature if found.v.size == v.size else None
+        found = settled_apart(space, v, found.delta, radius, accuracy, known)
         report(found)
 
 

@@ -32,8 +32,13 @@ def run_start(
     return run_guess(problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit)
 
 
-def run_guess(problem: Problem, start_from: Callable[[], AnyGait], start: int, time_limit: float) -> Outcome:
-    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`; raises nothing."""
+def run_guess(
+    problem: Problem, start_from: Callable[[], AnyGait], start: int, time_limit: float, *, literal: bool = False
+) -> Outcome:
+    """Solve and certify a problem from the gait that `start_from` makes, as start number `start`; raises nothing.
+
+    With `literal`, IPOPT searches on the full program (`colloc.search.literal_search`).
+    """
     begin, cpu = time.perf_counter(), time.process_time()
     guess = problem.guess
     reached: list[Level] = []
@@ -47,7 +52,7 @@ def run_guess(problem: Problem, start_from: Callable[[], AnyGait], start: int, t
     try:
         guess = start_from()
         outcome = Outcome(start, ERROR, "", guess, guess)
-        solution = maximise_efficiency(problem.with_(guess=guess), watch)
+        solution = maximise_efficiency(problem.with_(guess=guess), watch, literal=literal)
         outcome = _outcome(start, guess, solution)
     except _TimeLimit:
         deltas = [level.delta for level in reached if level.optimal]

@@ -39,6 +39,12 @@ class Axis:
         For figures.
     travels : bool
         Whether warm starts travel along this axis.
+
+    Examples
+    --------
+    >>> from colloc import Axis
+    >>> Axis("mu_t", (0.5, 1, 2), "mu_t / mu_f").values
+    (0.5, 1.0, 2.0)
     """
 
     name: str
@@ -87,6 +93,15 @@ class Study:
     time_limit : float
         Seconds for one start.
     seed : int
+
+    Examples
+    --------
+    >>> import colloc
+    >>> def problem(mu_b):
+    ...     return colloc.Problem("grid", friction=colloc.Friction(1, 1, mu_b), gait=colloc.Harmonic(1, "bilateral"))
+    >>> study = colloc.Study("grid", (colloc.Axis("mu_b", (1, 2)),), problem)
+    >>> study.shape
+    (2,)
     """
 
     name: str

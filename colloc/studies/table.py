@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from colloc.results.distinct_optima import Outcome, fourier_series, series_class
 from colloc.results.solution import SOLVED
 from colloc.studies.run import StudyRun
 from colloc.studies.study import Index, Study
+
+if TYPE_CHECKING:
+    import xarray
 
 NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
 UNITS = {
@@ -36,7 +39,7 @@ _COUNTS = ("starts", "starts_certified")
 KnownBound = Callable[[Problem], float | None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StudyTable:
     """Labelled arrays: coordinates and variables by name, with the dimensions of each variable."""
 
@@ -46,6 +49,18 @@ class StudyTable:
     labels: Mapping[str, str]
     variables: Mapping[str, np.ndarray]
     dimensions: Mapping[str, tuple[str, ...]]
+
+    def __repr__(self) -> str:
+        status = self.variables["status"]
+        certified = int((status == SOLVED).sum())
+        return f"<StudyTable {self.name}: {certified} of {status.size} cells have a certified gait>"
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The arrays as an xarray Dataset."""
+        import xarray
+
+        found = {k: (self.dimensions[k], v, {"units": UNITS.get(k, "1")}) for k, v in self.variables.items()}
+        return xarray.Dataset(found, dict(self.coordinates), {"name": self.name})
 
 
 def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:

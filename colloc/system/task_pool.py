@@ -73,6 +73,23 @@ def process_pool(workers: int) -> Executor:
     return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_started)
 
 
+class InThisProcess(Executor):
+    """Runs every task at once where it is handed over: for scripts, which need no ``if __name__ == "__main__"`` then."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
+        future: Future = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def pool_for(workers: int) -> Executor:
+    """Fresh processes, or this one if one worker is enough."""
+    return process_pool(workers) if workers > 1 else InThisProcess()
+
+
 def _failure(future: Future) -> BaseException | None:
     try:
         return future.exception()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shared.instants import random_instants
 
 import colloc.collocation.newton_balance
 from colloc import Chain, Friction
@@ -23,15 +24,10 @@ def without_the_kernel():
         yield
 
 
-def instants(n, seed):
-    rng = np.random.default_rng(seed)
-    return rng.uniform(-2, 2, (2, n)), rng.normal(size=(2, n))
-
-
 @pytest.mark.parametrize("law", LAWS)
 def test_the_fixed_point_step_is_that_of_the_numpy_solver(law):
     friction, delta = Friction(*law), 1e-2
-    angles, rates = instants(40, 0)
+    angles, rates = random_instants(40, 0)
     z = np.random.default_rng(1).normal(size=(3, 40))
     now = instant(THIRD, friction, angles, rates, z, delta, TAIL)
     matrix = secant_matrix(THIRD, friction, now.posture, now.velocity, np.full((1, 40), delta))
@@ -46,7 +42,7 @@ def test_the_fixed_point_step_is_that_of_the_numpy_solver(law):
 @pytest.mark.parametrize("law", LAWS)
 def test_near_and_far_starts_end_in_the_balance_of_the_damped_solver(law, delta):
     friction = Friction(*law)
-    angles, rates = instants(200, 2)
+    angles, rates = random_instants(200, 2)
     known = solve_balance(THIRD, friction, angles, rates, delta).require().z
     rng = np.random.default_rng(3)
     for size in (1e-3, 10.0):
@@ -67,7 +63,7 @@ def test_the_damped_solver_is_left_few_instants(monkeypatch):
         return solve_balance(body, friction, angles, *arguments, **named)
 
     monkeypatch.setattr(colloc.collocation.newton_balance, "solve_balance", counted)
-    angles, rates = instants(1000, 4)
+    angles, rates = random_instants(1000, 4)
     for law in LAWS:
         friction = Friction(*law)
         known = solve_balance(THIRD, friction, angles, rates, 1e-4).require().z
@@ -78,7 +74,7 @@ def test_the_damped_solver_is_left_few_instants(monkeypatch):
 
 def test_an_instant_that_no_method_solves_is_reported(monkeypatch):
     friction = Friction(10, 1, 1)
-    angles, rates = instants(50, 6)
+    angles, rates = random_instants(50, 6)
     monkeypatch.setattr(colloc.collocation.newton_balance, "_STEPS", 1)
     monkeypatch.setattr(
         colloc.collocation.newton_balance,

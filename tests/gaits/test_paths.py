@@ -6,6 +6,7 @@ import pytest
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.arcs import advance, direction
 from colloc.gaits.harmonic import shifted
+from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import (
     corners_through,
     fourier_through,
@@ -17,7 +18,6 @@ from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.certificate import _largest_jump, corner_phases
-from colloc.search.class_transfer import delta_at_unit_speed, prolonged
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.replay import replay
 
@@ -192,7 +192,6 @@ def test_delta_keeps_its_meaning_from_class_to_class():
     assert path.delta * path_length(stated.guess) == pytest.approx(1e-3)
     back = prolonged(path, stated.guess, Harmonic(2, "bilateral"))
     assert back.delta == pytest.approx(1e-3)
-    assert delta_at_unit_speed(back) == pytest.approx(path.delta)
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, maximise_efficiency, replay
+from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, replay
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
+from colloc.search.optimise import maximise_efficiency
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")

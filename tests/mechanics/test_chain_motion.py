@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shared.instants import random_instants
 
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import instant, total_power
@@ -12,11 +13,6 @@ BODIES = [Chain((0.4, 0.6)), Chain(), Chain((0.3, 0.2, 0.15, 0.35))]
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Friction(0.5, 1, 5)]
 
 
-def instants(body, count=40, seed=0):
-    rng = np.random.default_rng(seed)
-    return rng.uniform(-2, 2, (body.n_joint, count)), 3 * rng.normal(size=(body.n_joint, count))
-
-
 def rows(motion):
     return np.vstack([motion.z, motion.centre, motion.power])
 
@@ -24,7 +20,7 @@ def rows(motion):
 @pytest.mark.parametrize("law", LAWS, ids=str)
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: b.n_link)
 def test_the_motion_is_that_of_the_tail_and_joints_do_the_work_of_friction(body, law):
-    angles, rates = instants(body)
+    angles, rates = random_instants(40, n_joint=body.n_joint)
     solved = solve_balance(body, law, angles, rates, 1e-4)
     motion = chain_motion(body, law, angles, rates, 1e-4, solved)
     now = instant(body, law, angles, rates, solved.z, 1e-4)
@@ -38,7 +34,7 @@ def test_the_motion_is_that_of_the_tail_and_joints_do_the_work_of_friction(body,
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: b.n_link)
 def test_slopes_are_the_limit_of_differences(body, law):
     delta, step = 0.05, 1e-5
-    angles, rates = instants(body)
+    angles, rates = random_instants(40, n_joint=body.n_joint)
     solved = solve_balance(body, law, angles, rates, delta, tolerance=1e-13)
     _, slopes = chain_slopes(body, law, angles, rates, delta, solved)
     y = np.concatenate([angles, rates])
@@ -62,7 +58,7 @@ def test_slopes_are_the_limit_of_differences(body, law):
 @pytest.mark.parametrize("delta", [1.0, 1e-4, 1e-12])
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: b.n_link)
 def test_compiled_slopes_are_those_of_numpy(body, delta):
-    angles, rates = instants(body, 200)
+    angles, rates = random_instants(200, n_joint=body.n_joint)
     for law in LAWS:
         solved = solve_balance(body, law, angles, rates, delta)
         motion, slopes = chain_slopes(body, law, angles, rates, delta, solved)

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from shared.instants import random_instants
 
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.native_kernel import library, native_kernel
@@ -26,11 +27,6 @@ def fresh(monkeypatch):
     library.cache_clear()
 
 
-def instants(count, seed=1):
-    rng = np.random.default_rng(seed)
-    return rng.uniform(-np.pi, np.pi, (2, count)), rng.normal(size=(2, count))
-
-
 def fields(solution):
     return np.vstack([solution.z, solution.residual, solution.iterations, solution.anchor, solution.anchor_velocity])
 
@@ -38,7 +34,7 @@ def fields(solution):
 @needs_kernel
 @pytest.mark.parametrize("law", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
 def test_an_instant_has_the_same_bits_on_repetition_on_threads_and_in_any_batch(monkeypatch, law):
-    angles, rates = instants(N_TIME)
+    angles, rates = random_instants(N_TIME)
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     once = fields(solve_balance(Chain(), law, angles, rates, 1e-5))
     np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles, rates, 1e-5)), once)
@@ -50,7 +46,7 @@ def test_an_instant_has_the_same_bits_on_repetition_on_threads_and_in_any_batch(
 
 @needs_kernel
 def test_views_with_any_strides_are_read_right():
-    angles, rates = instants(40)
+    angles, rates = random_instants(40)
     whole = solve_balance(Chain(), Friction(), angles, rates, 1e-3)
     backwards = solve_balance(
         Chain(), Friction(), angles[:, ::-1], np.asfortranarray(rates[:, ::-1]), 1e-3, start=whole.z[:, ::-1]
@@ -96,7 +92,7 @@ def test_a_library_that_others_could_have_written_is_not_run(fresh, tmp_path):
 
 @pytest.mark.parametrize("missing", ["compiler", "folder", "working compiler", "permission"])
 def test_without_it_numpy_gives_the_answer(fresh, tmp_path, missing):
-    known = solve_balance(Chain(), Friction(), *instants(5), 1e-3).z
+    known = solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z
     a_file = tmp_path / "file"
     a_file.write_text("")
     fresh.setenv(FOLDER, str(tmp_path / "code"))
@@ -112,7 +108,7 @@ def test_without_it_numpy_gives_the_answer(fresh, tmp_path, missing):
             fresh.setenv(FOLDER, OFF)
     library.cache_clear()
     assert native_kernel() is None
-    np.testing.assert_allclose(solve_balance(Chain(), Friction(), *instants(5), 1e-3).z, known, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z, known, rtol=0, atol=1e-9)
 
 
 def test_solving_a_balance_loads_neither_casadi_nor_matplotlib():

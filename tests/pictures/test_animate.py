@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from colloc.commands.animate import animate, main
+from colloc.commands.animate import main
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.animation import pictures
+from colloc.pictures.movie import write_movie
 from colloc.pictures.publication import save_panels
 from colloc.results.solution import Solution
 from colloc.results.store import save
@@ -64,7 +65,7 @@ def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsy
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_mp4_plays(three_link, tmp_path):
-    path = animate(three_link, tmp_path / "x.mp4", periods=1, seconds=1.0, fps=10.0, width=301)
+    path = write_movie(three_link, tmp_path / "x.mp4", periods=1, seconds=1.0, fps=10.0, width=301)
     probe = ["ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames,width", "-of", "csv=p=0", path]
     assert subprocess.run(probe, capture_output=True, text=True, check=True).stdout.strip() == "300,10"
 

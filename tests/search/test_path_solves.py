@@ -1,19 +1,19 @@
 """Free paths and polygons solved: derivatives, feasibility, certified optima, files, and how classes compare."""
 
-import casadi as ca
 import numpy as np
 import pytest
+from shared.differences import assert_derivatives_are_differences
 
 from colloc import Chain, Corners, Fourier, FreePath, Friction, Polygon, Problem, ellipse, load, save
 from colloc.bounds.infinitesimal import small_gait
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
-from colloc.search.class_transfer import continue_classes
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.optimise import best_gait, maximise_efficiency
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {
@@ -51,23 +51,7 @@ def test_the_start_satisfies_every_equation_but_net_rotation(case, formulation):
 @pytest.mark.parametrize("case", CASES)
 def test_jacobian_and_hessian_against_differences(case, formulation):
     transcription, found, x, p = program(case, formulation=formulation)
-    rng = np.random.default_rng(1)
-    x = x + 1e-3 * rng.normal(size=x.size)
-    direction, h = rng.normal(size=x.size), 1e-6
-    fg = ca.Function("fg", [found.nlp["x"], found.nlp["p"]], [found.nlp["g"]])
-    difference = np.array(fg(x + h * direction, p) - fg(x - h * direction, p)).ravel() / (2 * h)
-    jacobian = found.options["jac_g"](x, p)[1]
-    np.testing.assert_allclose(difference, np.array(jacobian @ direction).ravel(), atol=3e-5 * np.abs(difference).max())
-    lam = rng.normal(size=difference.size)
-    upper = np.array(ca.DM(found.options["hess_lag"](x, p, 1.3, lam)))
-    hessian = upper + np.triu(upper, 1).T
-
-    def gradient(point):
-        own = np.array(found.options["grad_f"](point, p)[1]).ravel()
-        return 1.3 * own + np.array(found.options["jac_g"](point, p)[1].T @ lam).ravel()
-
-    difference = (gradient(x + h * direction) - gradient(x - h * direction)) / (2 * h)
-    np.testing.assert_allclose(difference, hessian @ direction, atol=3e-5 * np.abs(difference).max())
+    assert_derivatives_are_differences(found, x, p, 3e-5)
     assert transcription.velocity.solves > 0 or formulation == FULL
 
 
@@ -98,7 +82,8 @@ def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
 
 def test_more_curvature_allows_more_and_each_bound_is_kept(tmp_path):
     first = Problem("p", ellipse(0, 2.8, 1.3), gait=FreePath(1.0, "bilateral"), intervals=30, mesh_tolerance=1e-4, delta=1e-3)
-    solutions = continue_classes(first, [FreePath(2.0, "bilateral")])
+    one = maximise_efficiency(first)
+    solutions = [one, maximise_efficiency(prolonged(first, one.gait, FreePath(2.0, "bilateral")))]
     assert [s.status for s in solutions] == ["solved"] * 2
     one, two = (s.certificate.efficiency_at_zero_delta for s in solutions)
     assert one == pytest.approx(0.287, abs=2e-3)
@@ -134,18 +119,15 @@ def test_a_free_path_far_beyond_the_paper(solved):
 
 @pytest.mark.slow
 def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
-    """The far pair binds at the first level; refined to 1e-4, the solve wanders (docs/gait_classes.md), so the mesh is given.
-
-    Of 15 such solves, from three ellipses on five meshes, 14 converge.
-    """
+    """The far pair binds at the first level. From this guess alone the search ends at 0.463; the best of 8 starts has 0.551."""
     guess = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
     problem = Problem(
         "four", guess, FOUR["body"], gait=FreePath(2.0, "bilateral"), intervals=50, delta=1e-3, mesh_tolerance=0.0
     )
-    solution = maximise_efficiency(problem)
+    solution = best_gait(problem, 8)
     assert solution.last.optimal
     certificate = solution.certificate
-    assert certificate.efficiency > 0.52
+    assert certificate.efficiency > 0.54
     # at this delta the certificate asks for less; what concerns the motion itself holds
     checks = {check.name: check for check in certificate.checks}
     assert checks["self-contact"].passed

@@ -3,7 +3,6 @@
 import json
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -29,7 +28,6 @@ from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, 
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
 from colloc.search.optimise import is_trivial, maximise_efficiency, optimum
-from colloc.search.parameter_continuation import continue_parameter, with_parameter
 from colloc.studies import campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
@@ -344,32 +342,6 @@ def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
         assert multistart.main([str(path), *options]) == 2
         assert text in capsys.readouterr().err
     assert multistart.main([str(tmp_path / "none.py")]) == 2
-
-
-def test_continuation_in_a_friction_coefficient_meets_the_direct_solution():
-    steps = continue_parameter(problem(delta=0.03), "friction.mu_t", 2.0, first_step=0.5)
-    assert [s.value for s in steps] == [1.0, 1.5, 2.0]
-    assert all(s.optimal for s in steps)
-    direct = optimum(problem(delta=0.03, friction=Friction(2, 1, 1), guess=steps[-1].solution.gait))
-    assert steps[-1].solution.efficiency == pytest.approx(direct.efficiency, rel=1e-6)
-    assert with_parameter(problem(), "intervals", 15.2).intervals == 15
-    for name in ("friction.mu_x", "viscosity", "name"):
-        with pytest.raises(ProblemError, match="is not a number of a problem"):
-            with_parameter(problem(), name, 2.0)
-
-
-def test_a_failed_step_is_halved_and_kept(monkeypatch):
-    from colloc.search import parameter_continuation as homotopy
-
-    def solve(stated):
-        far = abs(stated.joint_limit - solve.last) > 0.3
-        solve.last = solve.last if far else stated.joint_limit
-        return SimpleNamespace(last=SimpleNamespace(optimal=not far, delta=0.1), problem=stated, gait=stated.guess)
-
-    solve.last = 3.0
-    monkeypatch.setattr(homotopy, "optimum", solve)
-    steps = continue_parameter(problem(joint_limit=3.0), "joint_limit", 2.5)
-    assert [(s.value, s.optimal) for s in steps] == [(3.0, True), (2.5, False), (2.75, True), (2.5, True)]
 
 
 def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):

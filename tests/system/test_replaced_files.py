@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
+from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
 
 from colloc.commands import sweep as sweep_study
 from colloc.results.archive import StartName, open_archive

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from store_samples import HDF5_KINDS, Samples
+from shared.store_samples import HDF5_KINDS, Samples
 
 from colloc.system.errors import StoreError
 from colloc.system.sealed_file import SEAL_SIZE, write_sealed

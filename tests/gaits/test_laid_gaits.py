@@ -1,18 +1,14 @@
 """From class to class and from chain to chain: what an optimum keeps on the way."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.laid_gaits import laid_into, over_links
+from colloc.gaits.laid_gaits import laid_into, over_links, prolonged
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
 from colloc.reduced.spaces import nearest_parameters, transcribed
-from colloc.search import class_transfer as prolongation
-from colloc.search.class_transfer import maximise_from, prolonged
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import ProblemError
 from scripts.class_rows import FEWER, equal_links, named_gait, rows
@@ -98,53 +94,22 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
         np.testing.assert_allclose(laid.angles(PHASES), -laid.angles(-PHASES)[::-1], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("results", "tried", "kept"),
-    [
-        ({10: 0.40035, 100: 0.9}, [10], 0.40035),  # keeps the optimum to 1e-4: no other trial
-        ({10: 0.39, 100: 0.38}, [10, 100], 0.39),
-        ({10: 0.39, 100: 0.41}, [10, 100], 0.41),
-        ({10: None, 100: 0.3}, [10, 100], 0.3),
-        ({10: 0.3, 100: None}, [10, 100], 0.3),
-        ({10: None, 100: None}, [10, 100], None),
-    ],
-)
-def test_the_best_certified_search_is_kept_and_none_is_made_in_vain(monkeypatch, results, tried, kept):
-    begun = []
-
-    def solve(stated, on_level):
-        factor = round(stated.delta_start / stated.delta)
-        begun.append(factor)
-        value = results[factor]
-        return SimpleNamespace(status="solved" if value else "not converged", measured=SimpleNamespace(efficiency=value))
-
-    monkeypatch.setattr(prolongation, "maximise_efficiency", solve)
-    problem = Problem("p", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"))
-    solution = maximise_from(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 0.40037)
-    assert begun == tried
-    assert solution.measured.efficiency == kept
-
-
-@pytest.mark.slow
 def test_a_richer_class_keeps_what_its_seed_had():
     """From 100 times the final delta, where friction is regularised most, the search leaves this optimum: 0.3998."""
     problem = Problem("five", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60)
-    from_afar = maximise_efficiency(prolonged(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 100.0))
+    near = prolonged(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"))
+    from_afar = maximise_efficiency(near.with_(delta_start=100 * near.delta))
     assert from_afar.status == "solved"
     assert from_afar.certificate.efficiency < 0.4003
-    solution = maximise_from(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"), 0.40044)
+    solution = maximise_efficiency(near)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4010
 
 
-@pytest.mark.slow
-def test_where_a_near_start_fails_one_from_afar_is_tried():
-    """A hexagon as an octagon has corners on its sides, where its first level at 10 times the final delta loses its way."""
+def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
     hexagon = Corners(np.array([[2.58068, 3.11378, 2.97774, 2.81594], [-2.58068, -2.58089, -2.67289, -2.81594]]), "bilateral")
     problem = Problem("six", hexagon, gait=Polygon(6, "bilateral"), intervals=60)
-    near = maximise_efficiency(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80))
-    assert near.status != "solved"
-    solution = maximise_from(problem, hexagon, Polygon(8, "bilateral"), 0.40154, intervals=80)
+    solution = maximise_efficiency(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80))
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4015
 

@@ -1,0 +1,177 @@
+"""All velocities that balance a chain at an instant: with unequal coefficients there may be several.
+
+Coulomb friction whose coefficients differ is no gradient and not monotone, so nothing forbids several balanced velocities
+(docs/theory.md). Where they exist, a link is at rest in one of them, or nearly; so solving from every link at rest, one after
+the other, finds them. Whether any is missing can be counted: far away the net force opposes the velocity, so the signs of the
+determinant of minus its derivative add up to 1 over all solutions (the degree of the map). A negative one belongs to a motion
+that the slightest inertia leaves.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.balance import balance_jacobian, instant
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import BalanceSolution, solve_balance
+from colloc.mechanics.friction import Friction
+
+DISTINCT = 1e-5
+"""Velocities that differ by less, in units of the largest rate, are one."""
+_TOLERANCE, _ACCEPTED = 1e-12, 1e-11
+"""What the solver is asked for, and what will do where rounding stops it: its own tolerance."""
+_ITERATIONS = 300
+_BESIDE = tuple(side * size for size in (0.8, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005) for side in (-1, 1))
+"""Where more solutions are looked for along the softest direction of one, in units of the largest rate."""
+_BETWEEN = (0.5, 0.2, 0.8, 0.05, 0.95, 0.02, 0.98, 0.005, 0.995)
+"""The same from one solution to another, as parts of the way: the third often lies next to one of them."""
+
+
+class Branches(NamedTuple):
+    """Balanced velocities of instants, from one to `n_root` each.
+
+    Attributes
+    ----------
+    z : (n_root, 3, n_time)
+        Tail velocities (u, v, omega) in the body frame; NaN beyond those that were found.
+    sign : (n_root, n_time)
+        Of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0 beyond those that were found.
+    """
+
+    z: np.ndarray
+    sign: np.ndarray
+
+    @property
+    def number(self) -> np.ndarray:
+        """How many were found, ``(n_time,)``; 0 where the solver failed."""
+        return (self.sign != 0).sum(axis=0)
+
+    @property
+    def complete(self) -> np.ndarray:
+        """Whether the signs add up to 1, as they do over all solutions, ``(n_time,)``."""
+        return self.sign.sum(axis=0) == 1
+
+
+def all_balanced_velocities(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
+    """Every balanced velocity that can be found, the one of `solve_balance` first.
+
+    Parameters
+    ----------
+    body : Chain
+    friction : Friction
+        With equal coefficients there is one, and it is solved for once.
+    angles, rates : (n_joint, n_time)
+        Joint angles [rad] and their rates [rad/time].
+    delta : float
+        Regularisation speed.
+
+    Raises
+    ------
+    ProblemError
+        As `colloc.mechanics.fixed_point.solve_balance`.
+
+    Examples
+    --------
+    Three links with friction (1, 0.01, 100), the first joint turning:
+
+    >>> at = np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
+    >>> found = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), *at, 1e-4)
+    >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
+    (array([3]), array([2.994, 2.96 , 2.987]), array([ 1.,  1., -1.]))
+    """
+    at = (body, friction, angles, rates, delta)
+    if friction.isotropic:
+        return Branches(*_solved(*at, np.zeros((1, 3, angles.shape[1]))))
+    middle = body.n_link // 2
+    order = (middle, *(link for link in range(body.n_link) if link != middle))
+    z, sign = _solved(*at, np.stack([_with_link_at_rest(body, angles, rates, link) for link in order]))
+    found = _distinct(z, sign, _speed(rates))
+    doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
+    if not doubtful.size:
+        return found
+    # where a branch has just ended the solver may hang with a small residual; the solution then lies beside
+    part = (body, friction, angles[:, doubtful], rates[:, doubtful], delta)
+    known = Branches(z[:, :, doubtful], sign[:, doubtful])
+    more = _solved(*part, _between_and_beside(*part, known.z))
+    z, sign = (np.concatenate(pair) for pair in zip(known, more, strict=True))
+    return _merged(found, doubtful, _distinct(z, sign, _speed(part[3])))
+
+
+def _speed(rates: np.ndarray) -> np.ndarray:
+    """Unit of velocities, ``(n_time,)``."""
+    return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
+
+
+def _with_link_at_rest(body: Chain, angles: np.ndarray, rates: np.ndarray, link: int) -> np.ndarray:
+    """Tail velocity ``(3, n_time)`` of the body when one of its links does not move."""
+    return body.tail_velocity(body.posture(angles, link), rates, np.zeros((3, angles.shape[1])), link)
+
+
+def _solved(
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    starts: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where that is no solution."""
+    count = starts.shape[0]
+    angles, rates = np.tile(angles, count), np.tile(rates, count)
+    start = np.concatenate(list(starts), axis=1)
+    at = (body, friction, angles, rates, delta)
+    solved = solve_balance(*at, start=start, tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
+    accepted = solved.residual <= _ACCEPTED
+    sign = np.where(accepted, np.sign(_determinant(*at, solved)), 0.0)
+    return np.stack(np.split(solved.z, count, axis=1)), sign.reshape(count, -1)
+
+
+def _determinant(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+) -> np.ndarray:
+    """Of `balance_jacobian`, ``(n_time,)``; the reference does not matter, but the slowest link loses no digits."""
+    result = np.empty(solved.anchor.size)
+    for link in np.unique(solved.anchor):
+        chosen = solved.anchor == link
+        at = (angles[:, chosen], rates[:, chosen], solved.anchor_velocity[:, chosen], delta, int(link))
+        now = instant(body, friction, *at)
+        everywhere = np.full((1, int(chosen.sum())), delta)
+        result[chosen] = np.linalg.det(balance_jacobian(body, friction, now.posture, now.velocity, everywhere))
+    return result
+
+
+def _between_and_beside(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
+) -> np.ndarray:
+    """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest direction of each."""
+    starts = [z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN]
+    everywhere = np.full((1, angles.shape[1]), delta)
+    for root in z:
+        now = instant(body, friction, angles, rates, root, delta)
+        softest = np.linalg.svd(balance_jacobian(body, friction, now.posture, now.velocity, everywhere))[2][:, 2].T
+        starts += [root + size * _speed(rates) * softest for size in _BESIDE]
+    return np.stack(starts)
+
+
+def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
+    """Solutions less their repetitions, those that remain in their order, and no longer than needed."""
+    z, sign = np.where(sign[:, None] == 0, np.nan, z), sign.copy()
+    for i in range(len(z)):
+        same = (np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0)
+        z[i, :, same], sign[i, same] = np.nan, 0.0
+    order = np.argsort(sign == 0, axis=0, kind="stable")
+    z, sign = np.take_along_axis(z, order[:, None], axis=0), np.take_along_axis(sign, order, axis=0)
+    most = max(1, int((sign != 0).sum(axis=0).max(initial=1)))
+    return Branches(z[:most], sign[:most])
+
+
+def _merged(everywhere: Branches, chosen: np.ndarray, there: Branches) -> Branches:
+    """The branches `everywhere`, with those at the `chosen` instants replaced."""
+    most = max(len(everywhere.z), len(there.z))
+    z, sign = np.full((most, *everywhere.z.shape[1:]), np.nan), np.zeros((most, everywhere.sign.shape[1]))
+    z[: len(everywhere.z)], sign[: len(everywhere.z)] = everywhere
+    z[:, :, chosen], sign[:, chosen] = np.nan, 0.0
+    z[: len(there.z), :, chosen], sign[: len(there.z), chosen] = there.z, there.sign
+    return Branches(z, sign)

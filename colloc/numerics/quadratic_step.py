@@ -1,0 +1,79 @@
+"""The step of sequential quadratic programming: a dense convex quadratic program, by DAQP through CasADi.
+
+    minimise  d.B d / 2 + g.d   with  low <= d <= high,  row_low <= R d <= row_high
+
+DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill, IEEE TAC 67, 2022); its steps are exact to rounding.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+_TOLERANCE = 1e-10
+_UNMET = 1e3
+"""Price of half the squared share of the violations that stays."""
+
+
+class QuadraticStep(NamedTuple):
+    """The step d ``(n,)``, multipliers of the rows, positive at upper limits, and the share of the violations it removes."""
+
+    d: np.ndarray
+    on_rows: np.ndarray
+    share: float
+
+
+def quadratic_step(
+    b: np.ndarray,
+    gradient: np.ndarray,
+    slopes: np.ndarray,
+    row_low: np.ndarray,
+    row_high: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> QuadraticStep | None:
+    """The minimum of the quadratic model; where the rows contradict each other, their violations are removed in part.
+
+    Parameters
+    ----------
+    b : (n, n)
+        Positive definite.
+    gradient : (n,)
+    slopes : (m, n)
+    row_low, row_high : (m,)
+    low, high : (n,)
+
+    Returns
+    -------
+    QuadraticStep or None
+        None if there is no step, or no finite model.
+    """
+    if not (np.isfinite(gradient).all() and np.isfinite(slopes).all() and np.isfinite(b).all()):
+        return None
+    rows = {"lba": row_low, "uba": row_high}
+    found = _minimum(h=b, g=gradient, a=slopes, lbx=low, ubx=high, **rows)
+    if found is not None:
+        return QuadraticStep(*found, 1.0)
+    short = np.where(row_low > 0, row_low, np.where(row_high < 0, row_high, 0.0))
+    wide = np.zeros((gradient.size + 1, gradient.size + 1))
+    wide[:-1, :-1], wide[-1, -1] = b, _UNMET
+    relaxed = {"a": np.column_stack([slopes, short]), "lbx": np.append(low, 0.0), "ubx": np.append(high, 1.0)}
+    found = _minimum(h=wide, g=np.append(gradient, 0.0), **relaxed, **rows)
+    return None if found is None else QuadraticStep(found[0][:-1], found[1], 1.0 - found[0][-1])
+
+
+def _minimum(**program: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    solver = _solver(*program["a"].shape)
+    found = solver(**program)
+    if not solver.stats()["success"]:
+        return None
+    return found["x"].full().ravel(), found["lam_a"].full().ravel()
+
+
+@lru_cache(maxsize=64)
+def _solver(m: int, n: int) -> ca.Function:
+    shapes = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(m, n)}
+    return ca.conic("step", "daqp", shapes, {"error_on_fail": False, "daqp": {"primal_tol": _TOLERANCE}})

@@ -1,0 +1,255 @@
+"""What the commands solve, multistart and sweep do, for scripts and notebooks: functions of the same names."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import read_problem_file
+from colloc.gaits.sampling import LATIN_HYPERCUBE
+from colloc.results.archive import StartName, open_archive, save_archive
+from colloc.results.distinct_optima import Basin, Outcome, basins, counts
+from colloc.results.level import Level
+from colloc.results.solution import SOLVED, Solution
+from colloc.search.global_search import STARTS
+from colloc.search.optimise import best_gait, maximise_efficiency
+from colloc.studies.campaign import run_starts
+from colloc.studies.run import Progress, StudyRun
+from colloc.studies.study import Study, read_study_file
+from colloc.studies.table import StudyTable, cell_text, study_table
+from colloc.system.errors import NotConvergedError
+from colloc.system.task_pool import pool_for
+
+Stated = Problem | str | os.PathLike[str]
+"""A problem, or the path of the file that states it."""
+
+
+def solve(
+    problem: Stated,
+    starts: int | None = None,
+    *,
+    seconds: float = np.inf,
+    verbose: bool = False,
+    progress: Callable[[Level], object] | None = None,
+) -> Solution:
+    """The most efficient gait of a problem, certified: what ``colloc solve`` finds.
+
+    Parameters
+    ----------
+    problem : Problem or path-like
+        A problem, or a problem file.
+    starts : int, optional
+        Starts to find the best gait of; 1 is the guess alone. By default what the problem file says, else 16.
+    seconds : float
+        Wall time after which no other start is begun.
+    verbose : bool
+        Print a line for every level of delta as it ends.
+    progress : callable, optional
+        Called with every `colloc.results.level.Level` as it ends.
+
+    Returns
+    -------
+    Solution
+        Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that does not converge.
+
+    Raises
+    ------
+    ProblemError
+        If the file states no problem that can be solved.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> solution = colloc.solve(problem, starts=4)
+    >>> solution.success, round(solution.efficiency, 2)
+    (True, 0.26)
+    """
+    source = ""
+    if not isinstance(problem, Problem):
+        stated = read_problem_file(problem)
+        problem, starts, source = stated.problem, starts or stated.starts, stated.source
+    solution = best_gait(problem, starts or STARTS, _told(verbose, progress), seconds)
+    solution.source = source
+    return solution
+
+
+def _told(verbose: bool, progress: Callable[..., object] | None) -> Callable[..., None]:
+    def told(news: object) -> None:
+        if verbose:
+            print(news, flush=True)
+        if progress is not None:
+            progress(news)
+
+    return told
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Starts:
+    """What a search over many starts found.
+
+    Attributes
+    ----------
+    problem : Problem
+    outcomes : tuple of Outcome
+        By start number.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> found = colloc.multistart(problem, starts=2)
+    >>> found.solution().success
+    True
+    """
+
+    problem: Problem
+    outcomes: tuple[Outcome, ...]
+
+    @cached_property
+    def optima(self) -> list[Basin]:
+        """The distinct certified optima, best first."""
+        return basins(self.problem, self.outcomes)
+
+    def solution(self, start: int | None = None) -> Solution:
+        """The whole solution of a start (the best one by default), solved again from the gait that is known.
+
+        Raises
+        ------
+        NotConvergedError
+            If no start was certified and none is named.
+        """
+        if start is None:
+            if not self.optima:
+                raise NotConvergedError(f"none of {len(self.outcomes)} starts of {self.problem.name} was certified.")
+            return reopened(self.problem, self.optima[0].best)
+        return reopened(self.problem, next(o for o in self.outcomes if o.start == start))
+
+    def __repr__(self) -> str:
+        tally = ", ".join(f"{n} {status}" for status, n in counts(self.outcomes).items())
+        best = f"; best d/W = {self.optima[0].best.efficiency:.6g}" if self.optima else ""
+        return f"<Starts of {self.problem.name}: {tally}; {len(self.optima)} distinct optima{best}>"
+
+
+def reopened(problem: Problem, outcome: Outcome) -> Solution:
+    """The solution that a start led to: solved at the final delta from its gait, or again from its guess if it failed."""
+    if outcome.status != SOLVED:
+        return maximise_efficiency(problem.with_(guess=outcome.guess))
+    return maximise_efficiency(problem.with_(guess=outcome.gait, delta_start=problem.delta))
+
+
+def multistart(
+    problem: Stated,
+    starts: int = 20,
+    *,
+    seed: int = 0,
+    sampler: str = LATIN_HYPERCUBE,
+    workers: int = 1,
+    time_limit: float = 300.0,
+    archive: str | os.PathLike[str] | None = None,
+    verbose: bool = False,
+    progress: Callable[[Outcome], object] | None = None,
+) -> Starts:
+    """Local optima of a problem from seeded random starts: what ``colloc multistart`` finds.
+
+    Parameters
+    ----------
+    problem : Problem or path-like
+        A problem, or a problem file.
+    starts, seed, sampler, time_limit
+        As for `colloc.studies.campaign.run_starts`; starts 0 to `starts` - 1.
+    workers : int
+        Processes; with one everything runs in this process. A script that asks for more has to be safe to import
+        (``if __name__ == "__main__":``), as the workers import it.
+    archive : path-like, optional
+        HDF5 file in which starts are kept; what it holds already is not solved again.
+    verbose : bool
+        Print every outcome as it comes.
+    progress : callable, optional
+        Called with every `colloc.results.distinct_optima.Outcome` as it comes.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> found = colloc.multistart(problem, starts=3)
+    >>> found.optima[0].best.efficiency > 0.2
+    True
+    """
+    problem = problem if isinstance(problem, Problem) else read_problem_file(problem).problem
+    told = _told(verbose, progress)
+    kept = None if archive is None else open_archive(problem, archive)
+    done = {} if kept is None else kept.of_search(sampler, seed)
+    todo = [k for k in range(starts) if k not in done]
+    try:
+        settings = {"sampler": sampler, "seed": seed, "workers": workers, "time_limit": time_limit}
+        for outcome in run_starts(problem, todo, **settings, executor=pool_for):  # type: ignore[arg-type]
+            done[outcome.start] = outcome
+            if kept is not None:
+                kept.add({StartName(sampler, seed, outcome.start): outcome})
+            told(outcome)
+    finally:
+        if kept is not None:
+            save_archive(kept, "colloc.multistart")
+    return Starts(problem, tuple(done[k] for k in sorted(done) if k < starts))
+
+
+def sweep(
+    study: Study | str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    workers: int = 1,
+    verbose: bool = False,
+    progress: Callable[[Progress], object] | None = None,
+) -> StudyTable:
+    """Solve every problem of a study: what ``colloc sweep`` finds, as labelled arrays.
+
+    Parameters
+    ----------
+    study : Study or path-like
+        A study, or a study file.
+    folder : path-like, optional
+        Of the journal: what it holds already is not solved again. By default nothing is kept.
+    workers : int
+        Processes, as for `multistart`.
+    verbose : bool
+        Print every cell as it is worked on.
+    progress : callable, optional
+        Called with every `colloc.studies.run.Progress`.
+
+    Returns
+    -------
+    StudyTable
+        ``.to_xarray()`` is a Dataset.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> def problem(mu_t):
+    ...     return colloc.Problem(
+    ...         "grid",
+    ...         friction=colloc.Friction(mu_t),
+    ...         gait=colloc.Harmonic(1, "bilateral"),
+    ...         delta=1e-2,
+    ...     )
+    >>> study = colloc.Study("grid", (colloc.Axis("mu_t", (1, 2)),), problem, cold_starts=0)
+    >>> colloc.sweep(study).variables["status"].tolist()
+    ['solved', 'solved']
+    """
+    study = study if isinstance(study, Study) else read_study_file(study)[0]
+    told = _told(False, progress)
+    with tempfile.TemporaryDirectory() as scratch:
+        run = StudyRun(study, Path(folder or scratch))
+        for news in run.run(workers=workers, executor=pool_for):
+            if verbose:
+                best = news.state.best
+                print(f"{cell_text(study, news.cell)}: {best.outcome.efficiency if best else np.nan:.6f}", flush=True)
+            told(news)
+        return study_table(run)

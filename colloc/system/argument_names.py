@@ -1,0 +1,42 @@
+"""Misspelt arguments of the classes that people write by hand: one sentence with the nearest name."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import functools
+from typing import Any, TypeVar
+
+from colloc.system.errors import ProblemError
+
+T = TypeVar("T")
+
+
+def named_arguments(cls: type[T]) -> type[T]:
+    """Make a dataclass refuse arguments it does not have by a `ProblemError` that says which one is meant.
+
+    Examples
+    --------
+    >>> from colloc import Friction
+    >>> Friction(mu_x=1)
+    Traceback (most recent call last):
+    colloc.system.errors.ProblemError: Friction has no argument 'mu_x'; did you mean mu_t, mu_f or mu_b?
+    """
+    made = cls.__init__
+    known = [f.name for f in dataclasses.fields(cls) if f.init]  # type: ignore[arg-type]
+
+    @functools.wraps(made)
+    def checked(self: T, *given: Any, **named: Any) -> None:
+        for name in named:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
+                hint = f"did you mean {_either(near)}?" if near else f"it takes {', '.join(known)}."
+                raise ProblemError(f"{cls.__name__} has no argument {name!r}; {hint}")
+        made(self, *given, **named)
+
+    cls.__init__ = checked  # type: ignore[assignment]
+    return cls
+
+
+def _either(names: list[str]) -> str:
+    return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))

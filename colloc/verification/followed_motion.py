@@ -1,0 +1,102 @@
+"""Which of several balanced motions a gait follows, and how much the others differ from it.
+
+Where the law of friction allows several velocities at an instant, a body with a little inertia keeps to the branch it is on
+until that ends in a fold, and then jumps. Followed forwards and backwards in time, a gait may so run through one shape in two
+ways. Both, and every other choice, differ from each other by no more than the solutions do, instant by instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.balance import instant, total_power
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.solution_branches import Branches, all_balanced_velocities
+
+FORWARDS, BACKWARDS = 1, -1
+
+
+class FollowedMotion(NamedTuple):
+    """One motion through the branches at instants, and the range of all of them.
+
+    Attributes
+    ----------
+    z : (3, n_time)
+        Tail velocities of the branch that is followed; NaN where no solution was found.
+    apart : (3, n_time)
+        How far the velocities of the centre of mass, the rotation rates and the powers of the stable solutions lie apart; 0
+        where there is one.
+    """
+
+    z: np.ndarray
+    apart: np.ndarray
+
+
+def followed_motion(
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    before: np.ndarray | None = None,
+    sense: int = FORWARDS,
+) -> FollowedMotion:
+    """The motion of a gait where its law may allow several.
+
+    Parameters
+    ----------
+    body, friction
+    angles, rates : (n_joint, n_time)
+        Of one period in order of time, or of any instants whose predecessors are known.
+    delta : float
+        Regularisation speed.
+    before : (3, n_time), optional
+        Tail velocities shortly before each instant; by default those of its neighbour in the order of time.
+    sense : {FORWARDS, BACKWARDS}
+        Which neighbour: the branches are followed with or against time.
+    """
+    found = all_balanced_velocities(body, friction, angles, rates, delta)
+    apart = np.zeros((3, angles.shape[1]))
+    several = np.flatnonzero(found.number > 1)
+    if not several.size:
+        return FollowedMotion(found.z[0], apart)
+    chosen = Branches(found.z[:, :, several], found.sign[:, several])
+    apart[:, several] = _ranges(body, friction, angles[:, several], rates[:, several], delta, chosen)
+    z = found.z[0].copy()
+    for now, previous in _order(found.number > 1, sense):
+        z[:, now] = _nearest(found.z[:, :, now], found.sign[:, now], z[:, previous] if before is None else before[:, now])
+    return FollowedMotion(z, apart)
+
+
+def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:
+    """Instants with several motions and those before them, from one on where there is one only."""
+    certain = np.flatnonzero(~several)
+    first = certain[0] if certain.size else 0
+    for previous, now in pairwise((first + sense * np.arange(several.size + 1)) % several.size):
+        if several[now]:
+            yield now, previous
+
+
+def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """The solution, among the stable ones if there are any, that is nearest to a velocity ``(3,)``."""
+    distance = np.abs(z - before[:, None].T).max(axis=1)
+    stable = np.where(sign > 0, distance, np.inf)
+    return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
+
+
+def _ranges(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, found: Branches
+) -> np.ndarray:
+    """`FollowedMotion.apart`."""
+    rows = []
+    for z, sign in zip(found.z, found.sign, strict=True):
+        now = instant(body, friction, angles, rates, z, delta)
+        row = np.concatenate([*body.centre_velocity(now.posture, now.velocity), z[2:], total_power(now.velocity, now.force)])
+        rows.append(np.where(sign > 0, row, np.nan))
+    apart = np.nanmax(rows, axis=0) - np.nanmin(rows, axis=0)
+    return np.stack([np.hypot(apart[0], apart[1]), apart[2], apart[3]])

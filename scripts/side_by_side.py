@@ -1,0 +1,118 @@
+"""Gaits crawling one above the other at the same work: python -m scripts.side_by_side [FILE.py ...]
+
+Every body spends work at the same constant rate, so after the same time the better gait has come farther: how much farther is
+the ratio of the efficiencies. Writes results/curated/side_by_side.gif; by default three links with one harmonic (the paper's
+best gait), with two, and on a free path.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+import colloc
+from colloc.pictures.motion_frames import link_ends
+from colloc.pictures.movie import write_gif
+from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
+from colloc.results.solution import Solution
+
+ROOT = Path(__file__).resolve().parents[1]
+FILES = {
+    "three_link": "one harmonic (the paper's best)",
+    "three_link_two_harmonics": "two harmonics",
+    "three_link_free_path": "any path that bends no more than 8 per rad",
+}
+WORK, PICTURES, FPS, REST = 5.0, 160, 12.5, 12
+"""Work spent in all [weight x body length], pictures of it, pictures a second, and pictures that the end stays."""
+_WIDTH, _LANE, _BEHIND = 640, 0.68, 0.42
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+_GRAIN = 4001
+
+
+@dataclass(frozen=True)
+class Crawl:
+    """A gait in its own lane: the ends of its links ``(2, n_link + 1, n_picture)`` and its centre ``(2, n_picture)``."""
+
+    label: str
+    efficiency: float
+    ends: np.ndarray
+    centre: np.ndarray
+
+
+def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
+    """The phase at which a gait has spent so much work: the inverse of the integral of its power."""
+    t = np.linspace(0.0, 1.0, _GRAIN)
+    power = solution.power(solution.sample(t))
+    spent = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(t))])
+    periods, rest = np.divmod(work, spent[-1])
+    return periods + np.interp(rest, spent, t)
+
+
+def crawl(solution: Solution) -> Crawl:
+    """What a gait does with the work."""
+    problem = solution.problem
+    motion = solution.sample(phases(solution, np.linspace(0.0, WORK, PICTURES)))
+    ends = link_ends(problem.body, motion.angles, motion.theta, motion.tail)
+    return Crawl(FILES.get(problem.name, problem.gait.describe()), solution.measured.efficiency, ends, motion.centre)
+
+
+def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
+    """The frames, best gait last."""
+    farthest = max(float(c.ends[0].max()) for c in crawls) + 0.06
+    span = (-_BEHIND, farthest)
+    height = round(_WIDTH * (_LANE * len(crawls) + 0.3) / (span[1] - span[0]))
+    with styled(font_size=9):
+        figure = Figure(figsize=(_WIDTH / 100, height / 100), dpi=100)
+        figure.set_layout_engine("none")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set(xlim=span, ylim=(-_LANE * len(crawls) - 0.25, 0.05))
+        axes.set_axis_off()
+        axes.plot([0, 0], [-_LANE * len(crawls), 0], color="#dfe4e8", lw=1)
+        for x in np.arange(1, np.floor(farthest) + 1):
+            axes.plot([x, x], [-_LANE * len(crawls), 0], color="#dfe4e8", lw=1)
+            axes.text(x, -_LANE * len(crawls) - 0.03, f"{x:.0f}", ha="center", va="top", color=GREY)
+        axes.text(0, -_LANE * len(crawls) - 0.03, "0 body lengths", ha="center", va="top", color=GREY)
+        drawn = []
+        for row, (one, colour) in enumerate(zip(crawls, _COLOURS, strict=False)):
+            y = -_LANE * (row + 0.58)
+            label = f"{one.label}: efficiency {one.efficiency:.3f}"
+            axes.text(0.03 - _BEHIND, -_LANE * row - 0.02, label, va="top", color=colour, weight="bold")
+            (trail,) = axes.plot([], [], color=colour, lw=1.2, alpha=0.5)
+            (body,) = axes.plot([], [], color=INK, lw=4, solid_capstyle="round", solid_joinstyle="round")
+            (joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
+            (head,) = axes.plot([], [], "o", color=INK, ms=9)
+            (centre,) = axes.plot([], [], "o", color=colour, ms=7)
+            drawn.append((one, np.array([[0.0], [y]]), trail, body, joints, head, centre))
+        for k in [*range(PICTURES), *[PICTURES - 1] * REST]:
+            for one, lift, trail, body, joints, head, centre in drawn:
+                ends = one.ends[:, :, k] + lift
+                trail.set_data(*(one.centre[:, : k + 1] + lift))
+                body.set_data(*ends)
+                joints.set_data(*ends[:, 1:-1])
+                head.set_data(*ends[:, -1:])
+                centre.set_data(*(one.centre[:, [k]] + lift))
+            canvas.draw()
+            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="*", metavar="FILE.py", help="problem files, the best gait last")
+    parser.add_argument("--output", type=Path, default=ROOT / "results/curated/side_by_side.gif")
+    options = parser.parse_args()
+    solutions = [colloc.solve(file) for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]]
+    for solution in solutions:
+        print(solution)
+    write_gif(options.output, pictures([crawl(solution) for solution in solutions]), FPS)
+    print(f"saved {options.output} ({options.output.stat().st_size / 1000:.0f} kB)")
+
+
+if __name__ == "__main__":
+    main()

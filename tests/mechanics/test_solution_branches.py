@@ -1,0 +1,100 @@
+"""All balanced velocities at an instant: one for equal coefficients, several for some instants of others."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from benchmarks.reference import balanced_velocity
+from colloc.mechanics.balance import instant, net_force
+from colloc.mechanics.body import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.native_kernel import numpy_instead
+from colloc.mechanics.solution_branches import DISTINCT, all_balanced_velocities
+
+PRINTED = (np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]]))
+
+
+def random_instants(seed, count, n_joint=2):
+    rng = np.random.default_rng(seed)
+    rates = rng.normal(size=(n_joint, count))
+    return rng.uniform(-np.pi, np.pi, (n_joint, count)), rates / np.abs(rates).max(axis=0)
+
+
+def test_the_printed_instant_has_three_motions_and_the_middle_one_is_unstable():
+    found = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), *PRINTED, 1e-4)
+    assert found.number == [3]
+    spin = found.z[:, 2, 0]
+    order = np.argsort(spin)
+    np.testing.assert_allclose(spin[order], [2.95957, 2.99418, 2.99826], atol=5e-6)
+    assert found.sign[order, 0].tolist() == [1, -1, 1]
+    assert found.complete.all()
+
+
+def test_each_of_them_is_a_root_of_the_reference_in_forty_digits():
+    body, coefficients = Chain(), (1, 0.01, 100)
+    found = all_balanced_velocities(body, Friction(*coefficients), *PRINTED, 1e-4)
+    posture = body.posture(PRINTED[0], 1)
+    for z in found.z[:, :, 0]:
+        # the velocity of the middle link's midpoint, and back
+        link = body.velocity(body.posture(PRINTED[0]), PRINTED[1], z[:, None])
+        vs, vn, w = (float(part[1, 0]) for part in link)
+        c, s = (float(part[1, 0]) for part in posture[:2])
+        start = (vs * c - vn * s, vs * s + vn * c, w)
+        root = balanced_velocity(body.lengths, coefficients, PRINTED[0][:, 0], PRINTED[1][:, 0], 1e-4, 1, start)
+        assert max(abs(mp.mpf(a) - b) for a, b in zip(start, root, strict=True)) < 1e-8
+
+
+@pytest.mark.parametrize("n_joint", [2, 3])
+def test_equal_coefficients_have_one_motion(n_joint):
+    body = Chain((1 / (n_joint + 1),) * (n_joint + 1))
+    angles, rates = random_instants(1, 300, n_joint)
+    found = all_balanced_velocities(body, Friction(2, 2, 2), angles, rates, 1e-4)
+    assert (found.number == 1).all()
+    assert (found.sign == 1).all()
+    z = solve_balance(body, Friction(2, 2, 2), angles, rates, 1e-4).z
+    np.testing.assert_allclose(found.z[0], z, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("law", "lengths", "several"),
+    [
+        ((10, 1, 1), (1 / 3,) * 3, 5),
+        ((100, 1, 1), (1 / 3,) * 3, 23),
+        ((1, 0.01, 100), (1 / 3,) * 3, 5),
+        ((3, 1, 1), (0.1, 0.4, 0.4, 0.1), 1),
+        ((1, 1, 3), (1 / 3,) * 3, 0),
+    ],
+)
+def test_the_signs_of_all_motions_add_up_to_one(law, lengths, several):
+    """As the degree of the map demands; so none is missing, or they are missing in pairs."""
+    body, friction = Chain(lengths), Friction(*law)
+    angles, rates = random_instants(2, 2000, body.n_joint)
+    found = all_balanced_velocities(body, friction, angles, rates, 1e-4)
+    assert found.complete.all()
+    assert (found.number > 1).sum() == several
+    for z, sign in zip(found.z, found.sign, strict=True):
+        at = np.flatnonzero(sign)
+        now = instant(body, friction, angles[:, at], rates[:, at], z[:, at], 1e-4)
+        assert np.abs(net_force(now.posture, now.force)).max(initial=0.0) < 1e-9 * friction.largest
+        assert np.isnan(z[:, sign == 0]).all()
+
+
+def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():
+    body, friction = Chain(), Friction(100, 1, 1)
+    angles, rates = random_instants(3, 60)
+    few = all_balanced_velocities(body, friction, angles, rates, 1e-4)
+    rng = np.random.default_rng(4)
+    for _ in range(100):
+        start = 0.5 * rng.normal(size=(3, 60)) * np.exp(rng.normal(size=60))
+        solved = solve_balance(body, friction, angles, rates, 1e-4, start=start, tolerance=1e-12)
+        apart = np.nanmin(np.abs(few.z - solved.z).max(axis=1), axis=0)
+        assert (apart < DISTINCT)[solved.converged].all()
+
+
+def test_numpy_finds_the_same_as_the_compiled_solver():
+    angles, rates = (np.tile(a, 2) for a in PRINTED)
+    compiled = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), angles, rates, 1e-4)
+    with numpy_instead():
+        found = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), angles, rates, 1e-4)
+    np.testing.assert_allclose(np.sort(found.z, axis=0), np.sort(compiled.z, axis=0), atol=1e-7)

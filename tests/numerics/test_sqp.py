@@ -1,0 +1,89 @@
+"""SQP with quasi-Newton updates: known optima, constraints that contradict each other at first, kinks, boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from colloc.numerics.quadratic_step import quadratic_step
+from colloc.numerics.sqp import minimised, stationarity
+
+
+class Program:
+    """A program from functions and their derivatives."""
+
+    def __init__(self, f, g, c, a, row_lower, row_upper, n, lower=-np.inf, upper=np.inf):
+        self.objective, self.gradient, self.rows, self.row_slopes = f, g, c, a
+        self.row_lower, self.row_upper = np.array(row_lower, dtype=float), np.array(row_upper, dtype=float)
+        self.lower, self.upper = np.full(n, lower), np.full(n, upper)
+
+
+def hock_schittkowski_71():
+    """min x1 x4 (x1 + x2 + x3) + x3 with x1 x2 x3 x4 >= 25, |x|^2 = 40, 1 <= x <= 5; optimum 17.0140173."""
+    return Program(
+        lambda x: x[0] * x[3] * x[:3].sum() + x[2],
+        lambda x: np.array([x[3] * (2 * x[0] + x[1] + x[2]), x[0] * x[3], x[0] * x[3] + 1, x[0] * x[:3].sum()]),
+        lambda x: np.array([np.prod(x), x @ x]),
+        lambda x: np.array([np.prod(x) / x, 2 * x]),
+        [25, 40], [np.inf, 40], 4, 1.0, 5.0,
+    )  # fmt: skip
+
+
+def test_a_textbook_program_with_equation_inequality_and_bounds():
+    program = hock_schittkowski_71()
+    found = minimised(program, np.array([1.0, 5.0, 5.0, 1.0]), np.inf, 1e-12)
+    conditions = stationarity(program, found.v)
+    assert found.objective == pytest.approx(17.0140173, abs=1e-7)
+    assert max(conditions.kkt_error, conditions.violation, conditions.complementarity) < 1e-6
+
+
+def test_known_curvature_saves_iterations_and_changes_no_answer():
+    program, start = hock_schittkowski_71(), np.array([1.0, 5.0, 5.0, 1.0])
+    first = minimised(program, start, np.inf, 1e-12)
+    again = minimised(program, first.v + 0.01, np.inf, 1e-12, curvature=first.curvature)
+    anew = minimised(program, first.v + 0.01, np.inf, 1e-12)
+    assert again.objective == pytest.approx(first.objective, abs=1e-10)
+    assert again.iterations < anew.iterations
+
+
+def test_rows_that_contradict_each_other_where_they_are_linearised_are_approached():
+    # at (0, 0.001) the linearised circle asks for a height of 500, and x1 >= 0.5 leaves the box no way there
+    program = Program(
+        lambda x: x[0],
+        lambda x: np.array([1.0, 0.0]),
+        lambda x: np.array([x[0] ** 2 + x[1] ** 2, x[0]]),
+        lambda x: np.array([[2 * x[0], 2 * x[1]], [1.0, 0.0]]),
+        [1.0, 0.5], [1.0, np.inf], 2,
+    )  # fmt: skip
+    found = minimised(program, np.array([0.0, 1e-3]), 2.0, 1e-12)
+    assert found.v == pytest.approx([0.5, np.sqrt(0.75)], abs=1e-8)
+
+
+def test_a_kink_of_the_objective_is_found():
+    """|x1| + (x2 - 1)^2: the second derivative does not exist where the optimum is."""
+    program = Program(
+        lambda x: abs(x[0]) + (x[1] - 1) ** 2,
+        lambda x: np.array([np.sign(x[0]), 2 * (x[1] - 1)]),
+        lambda x: np.zeros(0), lambda x: np.zeros((0, 2)), [], [], 2,
+    )  # fmt: skip
+    found = minimised(program, np.array([0.7, -0.4]), np.inf, 1e-10)
+    assert found.objective < 1e-3
+
+
+def test_the_box_is_kept_and_its_edge_is_told():
+    program = hock_schittkowski_71()
+    found = minimised(program, np.array([1.0, 4.0, 4.5, 2.0]), 0.1, 1e-12)
+    assert found.on_edge
+    assert np.abs(found.v - [1.0, 4.0, 4.5, 2.0]).max() <= 0.1 + 1e-12
+
+
+def test_a_step_meets_its_limits_exactly():
+    rng = np.random.default_rng(0)
+    n, m = 40, 10
+    factor, slopes, gradient = rng.normal(size=(n, n)), rng.normal(size=(m, n)), rng.normal(size=n)
+    b = np.eye(n) + factor @ factor.T
+    step = quadratic_step(b, gradient, slopes, np.full(m, -np.inf), np.full(m, -0.1), np.full(n, -0.2), np.full(n, 0.2))
+    assert step is not None
+    assert (slopes @ step.d).max() <= -0.1 + 1e-9
+    free = np.abs(step.d) < 0.2 - 1e-9
+    assert np.abs((b @ step.d + gradient + slopes.T @ step.on_rows)[free]).max() < 1e-9

@@ -1,0 +1,9 @@
+"""Random shapes and rates of a chain."""
+
+import numpy as np
+
+
+def random_instants(count, seed=0, n_joint=2):
+    """Angles over all of shape space, rates of order 1, each ``(n_joint, count)``."""
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-np.pi, np.pi, (n_joint, count)), rng.normal(size=(n_joint, count))

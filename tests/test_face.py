@@ -1,0 +1,125 @@
+"""What a person who imports colloc holds: light, complete, documented by examples that run, and clear about mistakes."""
+
+import doctest
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import colloc
+
+ROOT = Path(__file__).resolve().parents[1]
+HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")
+
+
+def test_importing_colloc_loads_nothing_heavy_and_shows_every_public_name():
+    code = f"import sys, colloc; print([m for m in {HEAVY!r} if m in sys.modules], set(colloc.__all__) <= set(dir(colloc)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[] True\n"
+
+
+def test_every_public_name_has_one_home():
+    named = [name for names in colloc._HOME.values() for name in names]
+    assert sorted(named) == sorted(colloc.__all__)
+    assert all(getattr(colloc, name) is not None for name in named)
+
+
+@pytest.mark.parametrize("name", [n for n in colloc.__all__ if not n.endswith("Error")])
+def test_every_public_docstring_has_an_example(name):
+    assert ">>> " in (getattr(colloc, name).__doc__ or "")
+
+
+@pytest.mark.parametrize("module", [*colloc._HOME, "gaits.gait_function", "system.argument_names"])
+def test_the_examples_of_the_docstrings_run(module, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    found = importlib.import_module(f"colloc.{module}")
+    assert doctest.testmod(found).failed == 0
+
+
+def test_the_module_behind_python_m_is_also_the_function():
+    """``import colloc.solve`` binds the module where ``colloc.solve(problem)`` is expected."""
+    module = importlib.import_module("colloc.solve")
+    with pytest.raises(colloc.ProblemError, match=r"there is no problem file nothing\.py"):
+        module("nothing.py")
+    with pytest.raises(colloc.ProblemError, match=r"there is no problem file nothing\.py"):
+        colloc.solve("nothing.py")
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda: colloc.Problem("x", frction=1), "did you mean friction"),
+        (lambda: colloc.Friction(mu=1), "did you mean mu_t, mu_f or mu_b"),
+        (lambda: colloc.Harmonic(harmonic=2), "did you mean harmonics"),
+        (lambda: colloc.Problem("x").with_(intervalls=3), "did you mean intervals"),
+        (lambda: colloc.FreePath(colour=1), "it takes curvature, symmetry, winding"),
+    ],
+)
+def test_a_misspelt_argument_is_named_with_the_right_one(made, said):
+    with pytest.raises(colloc.ProblemError, match=said):
+        made()
+
+
+def test_what_is_printed_of_a_result_is_short(three_link):
+    shown = (three_link, three_link.problem, three_link.certificate, three_link.last, three_link.gait, three_link.sample(0.0))
+    for thing in shown:
+        assert "\n" not in repr(thing)
+        assert len(repr(thing)) < 160
+    assert str(three_link.gait).count("\n") == 1
+
+
+def test_a_gait_stands_where_a_path_is_asked_for(three_link):
+    problem, certificate = three_link.problem, three_link.certificate
+    measured = colloc.replay(problem.body, problem.friction, three_link.gait, problem.delta)
+    assert abs(measured.efficiency - certificate.efficiency) <= certificate.efficiency_error + measured.error
+
+
+def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_path):
+    assert len(three_link.plot().axes) == 5
+    assert three_link.report(tmp_path / "x.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
+    with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):
+        three_link.animate(tmp_path / "x.avi")
+    t = np.array([0.0, 0.3])
+    dataset, frame = three_link.to_xarray(t), three_link.to_dataframe(t)
+    motion = three_link.sample(t)
+    np.testing.assert_array_equal(dataset.joint_angles.sel(joint=2), motion.angles[1])
+    np.testing.assert_array_equal(dataset.centre.sel(axis="x"), motion.centre[0])
+    np.testing.assert_array_equal(frame.tail_velocity_omega, motion.z[2])
+    assert dataset.power.attrs["units"] == "weight length/period"
+    assert dataset.attrs["efficiency"] == three_link.certificate.efficiency
+
+
+def test_progress_is_told_and_printed_only_if_asked(capsys):
+    problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    levels, outcomes = [], []
+    solution = colloc.solve(problem, starts=1, progress=levels.append)
+    assert [level.delta for level in levels] == [level.delta for level in solution.levels]
+    found = colloc.multistart(problem, 2, progress=outcomes.append)
+    assert {o.start for o in outcomes} == {0, 1}
+    assert found.optima[0].best.efficiency == max(o.efficiency for o in outcomes)
+    assert capsys.readouterr().out == ""
+    colloc.solve(problem, starts=1, verbose=True)
+    assert capsys.readouterr().out.count("<Level at delta") == len(levels)
+
+
+def test_an_archive_is_gone_on_with_and_its_starts_are_opened(tmp_path, capsys):
+    from colloc.commands.main import main
+
+    problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    path, again = tmp_path / "quick.starts.h5", []
+    first = colloc.multistart(problem, 2, archive=path)
+    colloc.multistart(problem, 2, archive=path, progress=again.append)
+    assert again == []
+    assert main(["open", str(path)]) == 0
+    assert f"{first.optima[0].best.efficiency:.6f}" in capsys.readouterr().out
+    assert main(["open", str(path), "--start", "1", "--quiet"]) == 0
+    opened = colloc.load(tmp_path / "quick.start-1.h5")
+    assert opened.success
+    assert opened.efficiency == pytest.approx(first.outcomes[1].efficiency, rel=1e-4)
+    assert main(["open", str(path), "--start", "7"]) == 2
+    assert "holds no start 7" in capsys.readouterr().err
+    assert main(["open", str(tmp_path / "other.h5")]) == 2
+    assert "colloc multistart makes one" in capsys.readouterr().err

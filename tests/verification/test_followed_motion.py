@@ -1,0 +1,84 @@
+"""Replay where the law leaves the motion open: branches followed in time, and an error that covers every choice."""
+
+import numpy as np
+import pytest
+
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_motion
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
+from colloc.verification.followed_motion import BACKWARDS, FORWARDS, followed_motion
+from colloc.verification.replay import replay
+
+BODY = Chain()
+
+
+def random_path(seed):
+    rng = np.random.default_rng(seed)
+    gait = Fourier(rng.uniform(-0.8, 0.8, 2), rng.normal(0, 0.8, (2, 2)), rng.normal(0, 0.8, (2, 2)))
+    return lambda t: (gait.angles(t), gait.rates(t))
+
+
+def step_by_step(friction, path, sense, n=2500):
+    """Efficiency of a body that goes through the period in small steps, each solved from the one before."""
+    t = (np.arange(n) + 0.5) / n
+    angles, rates = path(t)
+    z = solve_balance(BODY, friction, angles[:, :1], rates[:, :1], 1e-4).z
+    order = np.arange(n)[::sense]
+    parts = np.empty((n, 4))
+    for i in [*order, *order[:5]]:  # a few more, in case the first was on another branch
+        at = (BODY, friction, angles[:, [i]], rates[:, [i]], 1e-4)
+        solved = solve_balance(*at, start=z)
+        z = solved.z
+        motion = chain_motion(*at, solved)
+        parts[i] = *motion.centre[:, 0], motion.z[2, 0], motion.power[0]
+    heading = (np.cumsum(parts[:, 2]) - 0.5 * parts[:, 2]) / n
+    return abs((np.exp(1j * heading) * (parts[:, 0] + 1j * parts[:, 1])).sum()) / parts[:, 3].sum()
+
+
+def test_equal_coefficients_leave_nothing_open():
+    forwards, backwards = (replay(BODY, Friction(), random_path(1), 1e-4, sense=s) for s in (FORWARDS, BACKWARDS))
+    assert forwards == backwards
+    assert forwards.several == forwards.ambiguity == 0
+
+
+@pytest.mark.parametrize("sense", [FORWARDS, BACKWARDS])
+def test_the_replay_follows_the_branch_in_time(sense):
+    friction, path = Friction(100, 1, 1), random_path(5)
+    followed, other = (replay(BODY, friction, path, 1e-4, sense=s) for s in (sense, -sense))
+    expected = step_by_step(friction, path, sense)
+    assert abs(followed.efficiency / expected - 1) < 5e-4
+    assert abs(other.efficiency / expected - 1) > 5e-3
+
+
+@pytest.mark.parametrize(
+    ("law", "seeds"), [((100, 1, 1), (0, 2, 3, 4)), ((10, 1, 1), (2, 3, 4)), ((1, 0.01, 100), (2, 7, 8, 12))]
+)
+def test_the_stated_error_covers_both_directions(law, seeds):
+    """All of these but seeds 4 and 8 run through shapes with several motions."""
+    for seed in seeds:
+        forwards, backwards = (
+            replay(BODY, Friction(*law), random_path(seed), 1e-4, instants=800, tolerance=1e-4, sense=s)
+            for s in (FORWARDS, BACKWARDS)
+        )
+        for known, other in ((forwards, backwards), (backwards, forwards)):
+            allowed = known.error + other.error + known.ambiguity
+            assert abs(other.efficiency / known.efficiency - 1) <= allowed
+            assert abs(other.distance - known.distance) <= known.distance_error + other.distance_error + known.other_distance
+            assert abs(other.work - known.work) <= known.work_error + other.work_error + known.other_work
+        assert (forwards.several > 0) == (forwards.ambiguity > 0) == (seed not in (4, 8))
+
+
+def test_a_period_that_is_open_at_its_ends_is_followed_around_them():
+    """The phase at which a period begins changes neither its work nor its rotation."""
+    friction, path = Friction(100, 1, 1), random_path(3)
+    t = np.arange(2000) / 2000
+    several = followed_motion(BODY, friction, *path(t), 1e-4).apart.any(axis=0)
+    middle = t[np.flatnonzero(several)[several.sum() // 4]]
+    first = replay(BODY, friction, path, 1e-4, tolerance=1e-4)
+    shifted = replay(BODY, friction, lambda s: path((s + middle) % 1.0), 1e-4, tolerance=1e-4)
+    assert several.sum() > 40
+    assert shifted.several == pytest.approx(first.several, rel=0.02)
+    assert shifted.work == pytest.approx(first.work, rel=1e-4)
+    assert shifted.rotation == pytest.approx(first.rotation, rel=1e-3)
