@@ -63,7 +63,8 @@ class Optimality:
     kkt_error, violation : float
         Of the program in the gait's parameters.
     price : float
-        The smallest slope of -d/W in the time spent in any direction, on any piece: none should be negative.
+        The smallest slope of -d/W in the time spent in any direction, on any piece that has not used all directions that the
+        class allows: none should be negative.
     iterations : int
     """
 

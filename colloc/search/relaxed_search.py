@@ -199,10 +199,11 @@ def best_relaxed_gait(
     best, *others = relaxed_gaits(problem, starts, seconds, report, first)
     report("certifying the relaxed gait")
     conditions = best.conditions
-    optimality = Optimality(
-        -best.objective, conditions.kkt_error, conditions.violation, float(prices(best)[0].min()), best.iterations
-    )
     gait = best.gait
+    # where the class has another direction to give
+    free = (gait.durations <= _IDLE).any(axis=1)
+    price = float(prices(best)[0][free].min(initial=0.0))
+    optimality = Optimality(-best.objective, conditions.kkt_error, conditions.violation, price, best.iterations)
     return RelaxedSolution(
         problem,
         gait,
