@@ -38,8 +38,6 @@ KEPT = {
     "work_precision.png": "python -m benchmarks.work_precision",
     "work_precision_path.md": "python -m benchmarks.work_precision --path",
     "work_precision_path.png": "python -m benchmarks.work_precision --path",
-    "friction_plane.md": "python -m scripts.friction_plane --bounds 5",
-    "friction_plane.png": "python -m scripts.friction_plane --bounds 5",
     "robustness.md": "python -m benchmarks.robustness --starts 100",
     "grid_confirmation.md": "python -m benchmarks.grid_confirmation",
     "robustness.json": "python -m benchmarks.robustness --starts 100",

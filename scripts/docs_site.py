@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ORDER = (
     ("Start", ("index.md", "tutorial.md", "gallery.md", "troubleshooting.md")),
     ("How to", ("howto/report.md", "howto/robot.md", "howto/scripts.md", "howto/starts.md", "howto/check.md")),
-    ("Theory", ("theory.md", "bound.md", "gait_classes.md", "bodies.md")),
+    ("Theory", ("theory.md", "bound.md", "gait_classes.md", "relaxed.md", "bodies.md")),
     ("Reference", ("commands.md", "api.md", "modules.md", "cite.md")),
 )
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)

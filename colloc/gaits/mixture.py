@@ -147,18 +147,16 @@ class Mixture:
         durations = np.repeat(durations / parts[:, None], parts, axis=0)
         return Mixture(durations, np.repeat(directions, parts, axis=0), self.start, self.symmetry)
 
-    def realised(self, repeats: int, sense: int = 1) -> Corners:
-        """The polygon that runs through the directions of every piece `repeats` times.
+    @property
+    def mean(self) -> Mixture:
+        """The gait that follows the mean shapes in one direction a piece: what would be left without loops."""
+        steps = np.diff(self.shapes).T
+        size = np.linalg.norm(steps, axis=1)
+        moves = size > _IDLE * size.sum()
+        return Mixture(size[moves, None], (steps[moves] / size[moves, None])[:, None], self.start, self.symmetry)
 
-        What it loses to the relaxed gait falls like 1/repeats. Directions follow each other by angle, which makes loops; those
-        of more than two joints by angle in the plane in which they differ most.
-
-        Parameters
-        ----------
-        repeats : int
-        sense : {1, -1}
-            Counter-clockwise loops, or clockwise ones; what they lose is not the same.
-        """
+    def unmixed(self, repeats: int = 1, sense: int = 1) -> Mixture:
+        """The directions of every piece one after the other, `repeats` times: pieces of one direction; see `realised`."""
         if isinstance(repeats, bool) or not isinstance(repeats, (int, np.integer)) or repeats < 1:
             raise ProblemError(f"a mixture is realised by a whole number of repeats, at least 1, not {repeats!r}.")
         least = _IDLE * self.durations.sum()
@@ -170,9 +168,23 @@ class Mixture:
                 sides += [repeats * steps]
             elif len(steps):
                 sides += [_turned(steps, sense)] * repeats
-        vertices = np.concatenate(
-            [self.start[:, None], self.start[:, None] + np.cumsum(np.concatenate(sides), axis=0).T], axis=1
-        )
+        steps = np.concatenate(sides)
+        size = np.linalg.norm(steps, axis=1, keepdims=True)
+        return Mixture(size, (steps / size)[:, None], self.start, self.symmetry)
+
+    def realised(self, repeats: int = 1, sense: int = 1) -> Corners:
+        """The polygon that runs through the directions of every piece `repeats` times.
+
+        What it loses to the relaxed gait falls like 1/repeats. Directions follow each other by angle, which makes loops; those
+        of more than two joints by angle in the plane in which they differ most.
+
+        Parameters
+        ----------
+        repeats : int
+        sense : {1, -1}
+            Counter-clockwise loops, or clockwise ones; what they lose is not the same.
+        """
+        vertices = self.unmixed(repeats, sense).shapes
         if self.symmetry == BOTH:
             vertices = np.concatenate([vertices, vertices[::-1, -2::-1]], axis=1)
         symmetry = BILATERAL if self.symmetry == BOTH else self.symmetry

@@ -99,7 +99,7 @@ class RelaxedSolution:
     realised : tuple of Realised
         By number of repeats.
     seconds : float
-    source, message : str
+    source : str
     starts : int
     others : tuple of (efficiency, extent)
         Of the other relaxed gaits that were met; extent is the largest range of a mean joint angle [rad].
@@ -113,7 +113,6 @@ class RelaxedSolution:
     realised: tuple[Realised, ...]
     seconds: float = 0.0
     source: str = ""
-    message: str = ""
     starts: int = 1
     others: tuple[tuple[float, float], ...] = ()
     versions: dict[str, str] = field(default_factory=lambda: versions())
@@ -131,6 +130,12 @@ class RelaxedSolution:
         return max(held, key=lambda r: r.certificate.efficiency)
 
     @property
+    def message(self) -> str:
+        """What is not as it should be with the relaxed gait; empty if it is a local optimum and its replay confirms it."""
+        failed = ", ".join(check.name for check in self.certificate.failures)
+        return f"the relaxed gait is not certified ({failed}): the best may be better." if failed else ""
+
+    @property
     def gait(self) -> Corners:
         return self.best.gait
 
@@ -141,8 +146,8 @@ class RelaxedSolution:
 
     @property
     def status(self) -> str:
-        """One of "solved", "certificate failed"."""
-        return SOLVED if self.certificate.passed and self.measured.passed else CERTIFICATE_FAILED
+        """One of "solved", "certificate failed": of the finite gait, which is the answer whatever its relaxed one is worth."""
+        return SOLVED if self.measured.passed else CERTIFICATE_FAILED
 
     @property
     def delta_per_period(self) -> float:

@@ -107,7 +107,7 @@ def _read(file: h5py.File) -> RelaxedSolution:
         realised.append(Realised(int(attribute(group, "repeats")), int(attribute(group, "sense")), gait, certificate))
     return RelaxedSolution(
         Problem.from_dict(stated), relaxed, optimality, read_certificate(child(file, "certificate")), tuple(realised),
-        float(attribute(file, "seconds")), text(file, "source"), str(attribute(file, "message")),
+        float(attribute(file, "seconds")), text(file, "source"),
         int(attribute(file, "starts")), tuple((float(a), float(b)) for a, b in json.loads(text(file, "others"))),
         json.loads(text(file, "versions")),
     )  # fmt: skip

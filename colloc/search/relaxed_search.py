@@ -24,14 +24,16 @@ from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
 from colloc.system.errors import CollocError, NotConvergedError
 
-_COARSE = 0.4
-"""Pieces on which starts are told apart, as a share of those of the answer."""
+_COARSE, _MOST = 0.4, 0.7
+"""Pieces on which starts are told apart, and are followed, as shares of those of the answer."""
 _FOLLOWED, _PROMISING, _SAME = 3, 0.8, 4e-3
 """Starts followed; the share of the best efficiency that they need, and the relative difference by which they are others."""
 _DIRECTIONS, _SEED = 72, 1
 _IDLE = 1e-7
-_ROUNDS, _GAIN = 6, 1e-6
-"""Of meshes at the final delta, and what one must gain to be followed by another."""
+_MESHES, _GAIN = 3, 2e-5
+"""At the final delta, and what one must gain to be followed by another."""
+_ROUNDS = 2
+"""Of SQP on a mesh. For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value."""
 
 
 def directions_tried(n_joint: int, count: int = _DIRECTIONS) -> np.ndarray:
@@ -89,7 +91,12 @@ def readied(found: Found, pieces: int) -> tuple[MixtureSpace, np.ndarray]:
 
 
 def relaxed_gaits(
-    problem: Problem, starts: int, seconds: float = np.inf, report: Callable[[str], None] = lambda _: None, first: tuple = ()
+    problem: Problem,
+    starts: int,
+    seconds: float = np.inf,
+    report: Callable[[str], None] = lambda _: None,
+    first: tuple = (),
+    least_extent: float = 0.0,
 ) -> list[Found]:
     """Relaxed gaits at the problem's delta, most efficient first; the first is a local optimum, the others are nearly.
 
@@ -105,6 +112,8 @@ def relaxed_gaits(
         Told in words what is under way.
     first : tuple of gaits
         Tried before the others, beyond their number.
+    least_extent : float
+        Gaits whose mean angles range over less [rad] come last: loops at one shape are gaits of another kind.
 
     Raises
     ------
@@ -119,7 +128,11 @@ def relaxed_gaits(
         report(f"trying start {count} of {starts + len(first)}")
         with suppress(CollocError):
             known.append(_tried(problem, gait, coarse))
-    known.sort(key=lambda found: found.objective)
+
+    def rank(found: Found) -> tuple[bool, float]:
+        return found.gait.extent < least_extent, found.objective
+
+    known.sort(key=rank)
     ends: list[Found] = []
     for found in _promising(known):
         if ends and time.perf_counter() - begin > seconds:
@@ -129,7 +142,7 @@ def relaxed_gaits(
             ends.append(descended(found))
     if not ends:
         raise NotConvergedError("no start led to a relaxed gait; give another guess.")
-    best, *others = sorted(ends, key=lambda found: found.objective)
+    best, *others = sorted(ends, key=rank)
     report(f"refining {-best.objective:.4f}")
     return [refined(best), *others]
 
@@ -161,18 +174,20 @@ def _promising(known: list[Found]) -> list[Found]:
 def descended(found: Found) -> Found:
     """From a gait at some delta down to the problem's, on most of its pieces, roughly."""
     problem = found.space.problem
-    for delta in deltas(problem, found.delta)[1:]:
-        pieces = round(0.7 * problem.intervals)
-        found = settled_apart(*readied(found, pieces), delta, NEXT_RADIUS, VERY_ROUGH)
+    for count, delta in enumerate(deltas(problem, found.delta)[1:]):
+        # where friction is smoothest the mixture is found, below it follows
+        accuracy = VERY_ROUGH if count else ROUGH
+        ready = readied(found, round(_MOST * problem.intervals))
+        found = settled_apart(*ready, delta, NEXT_RADIUS, accuracy, rounds=_ROUNDS)
     return found
 
 
 def refined(found: Found) -> Found:
     """The gait on all pieces, until another mesh of as many gains nothing."""
     problem = found.space.problem
-    for _ in range(_ROUNDS):
+    for _ in range(_MESHES):
         before = found.objective
-        found = settled_apart(*readied(found, problem.intervals), found.delta, NEXT_RADIUS, ROUGH)
+        found = settled_apart(*readied(found, problem.intervals), found.delta, NEXT_RADIUS, ROUGH, rounds=_ROUNDS)
         if found.objective > before - _GAIN:
             break
     return found
@@ -185,18 +200,19 @@ def best_relaxed_gait(
     seconds: float = np.inf,
     report: Callable[[str], None] = lambda _: None,
     first: tuple = (),
+    least_extent: float = 0.0,
 ) -> RelaxedSolution:
     """The best relaxed gait that so many starts lead to, and finite gaits near it, all certified.
 
     Parameters
     ----------
-    problem, starts, seconds, report, first
+    problem, starts, seconds, report, first, least_extent
         See `relaxed_gaits`.
     repeats : tuple of int
         Of the directions on every piece, in the finite gaits.
     """
     begin = time.perf_counter()
-    best, *others = relaxed_gaits(problem, starts, seconds, report, first)
+    best, *others = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
     report("certifying the relaxed gait")
     conditions = best.conditions
     gait = best.gait

@@ -78,6 +78,15 @@ def test_a_piece_of_one_direction_is_one_side_however_often_it_is_repeated():
     assert corners_of(gait.realised(5)) == 12
 
 
+def test_a_mixture_taken_apart_is_the_polygon_and_its_mean_follows_the_same_shapes():
+    gait = mixture("both")
+    apart = gait.unmixed(2)
+    assert apart.durations.shape[1] == 1
+    assert np.allclose(apart.shapes[:, -1], gait.shapes[:, -1], atol=1e-12)
+    assert np.allclose(apart.realised().corners, gait.realised(2).corners, atol=1e-12)
+    assert np.allclose(gait.mean.shapes, gait.shapes, atol=1e-12)
+
+
 def test_splitting_pieces_changes_no_motion():
     gait = mixture("bilateral")
     finer = gait.split(17)
