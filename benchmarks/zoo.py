@@ -52,8 +52,9 @@ def zoo_problem(number: int) -> Problem:
 
 def described(problem: Problem) -> str:
     """In one line."""
-    lengths, f = " ".join(f"{x:.2f}" for x in problem.body.lengths), problem.friction
-    return f"({lengths}) mu ({f.mu_t:.2f}, 1, {f.mu_b:.2f}) {problem.gait.describe()}, within {problem.joint_limit:.2f}"
+    f = problem.friction
+    law = f"mu ({f.mu_t:.2f}, 1, {f.mu_b:.2f})"
+    return f"{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}"
 
 
 def main() -> None:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
+    from colloc.smooth.modal_body import ModalBody
     from colloc.studies.calls import Starts, multistart, solve, sweep
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
@@ -48,6 +49,7 @@ _HOME = {
     "gaits.problem": ("Problem", "Reference"),
     "gaits.problem_file": ("load_problem",),
     "mechanics.body": ("Chain",),
+    "smooth.modal_body": ("ModalBody",),
     "mechanics.friction": ("Friction",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
@@ -75,6 +77,7 @@ __all__ = [
     "FreePath",
     "Friction",
     "Harmonic",
+    "ModalBody",
     "NotConvergedError",
     "Polygon",
     "Problem",

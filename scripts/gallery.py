@@ -12,7 +12,6 @@ import json
 import runpy
 import time
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +25,8 @@ from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_s
 from colloc.pictures.style import GREY, snapshot_colours, styled
 from colloc.results.solution import Solution, versions
 from colloc.search.global_search import STARTS
-from colloc.search.modal_optimum import ModalOptimum, optimise_modal
 from colloc.search.optimise import best_gait
 from colloc.smooth.concertina import Concertina
-from colloc.smooth.modal_problem import ModalProblem
 from colloc.smooth.motion import Motion
 from colloc.smooth.period import measured_period
 from scripts.models.smooth_record import snapshots
@@ -69,17 +66,9 @@ def _problem_files() -> list[Path]:
     return sorted((ROOT / "problems").glob("[!_]*.py"))
 
 
-@cache
-def _low_mode_optimum(problem: ModalProblem) -> ModalOptimum:
-    return optimise_modal(problem)
-
-
 def _motion(stated: dict[str, Any]) -> tuple[Motion, Friction, float]:
-    """The motion of a smooth body, friction and delta: prescribed, or the optimum of a few modes."""
+    """The prescribed motion of a smooth body, friction and delta."""
     problem = stated.get("PROBLEM")
-    if isinstance(problem, ModalProblem):
-        gait = _low_mode_optimum(problem).gait
-        return problem.body.motion(gait, problem.gait.symmetry == "antipodal"), problem.friction, problem.delta
     if isinstance(problem, Concertina):
         return problem.motion(), problem.friction, problem.delta
     return stated["MOTION"], stated["FRICTION"], stated["DELTA"]
@@ -87,17 +76,11 @@ def _motion(stated: dict[str, Any]) -> tuple[Motion, Friction, float]:
 
 def prescribed_row(example: Example) -> dict[str, Any]:
     """Numbers of a file about a smooth body."""
-    problem, status = example.stated.get("PROBLEM"), "computed"
+    problem = example.stated.get("PROBLEM")
     motion, friction, delta = _motion(example.stated)
-    if isinstance(problem, ModalProblem):
-        p = _low_mode_optimum(problem).period
-        status = "solved" if _low_mode_optimum(problem).certified else "certificate failed"
-    elif isinstance(problem, Concertina):
-        p = problem.measured_period(intervals=2)
-    else:
-        p = measured_period(motion, friction, delta)
+    p = problem.measured_period(intervals=2) if isinstance(problem, Concertina) else measured_period(motion, friction, delta)
     return {
-        "status": status,
+        "status": "computed",
         "efficiency": p.efficiency,
         "error": p.errors["efficiency"],
         "distance": p.d,
@@ -133,7 +116,7 @@ def _picture(example: Example, solution: Solution | None) -> None:
             if solution.problem.body.n_joint == 2:
                 draw_shape_path(beside, solution.problem, solution.gait.angles(t))
             else:
-                draw_angles(beside, t, solution.gait.angles(t))
+                draw_angles(beside, t, solution.gait.angles(t), solution.problem.body)
         else:
             _draw_snapshots(figure, example.stated)
         path = PICTURES / f"{example.name}.png"

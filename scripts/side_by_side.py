@@ -17,7 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.pictures.motion_frames import link_ends
+from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
@@ -58,7 +58,7 @@ def crawl(solution: Solution) -> Crawl:
     """What a gait does with the work."""
     problem = solution.problem
     motion = solution.sample(phases(solution, np.linspace(0.0, WORK, PICTURES)))
-    ends = link_ends(problem.body, motion.angles, motion.theta, motion.tail)
+    ends = lab_outline(problem.body, motion.angles, motion.theta, motion.tail)
     return Crawl(FILES.get(problem.name, problem.gait.describe()), solution.measured.efficiency, ends, motion.centre)
 
 

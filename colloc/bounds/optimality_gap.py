@@ -7,7 +7,8 @@ from pathlib import Path
 
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
 from colloc.gaits.problem import Problem
-from colloc.system.errors import ChangedFileWarning, StoreError
+from colloc.mechanics.body import Chain
+from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 
 CACHE = "bounds.sqlite"
 """Where bounds are kept, beside the results."""
@@ -16,8 +17,13 @@ CACHE = "bounds.sqlite"
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
-    A cache that cannot be read or written is left as it is, with a `ChangedFileWarning`: no result depends on it.
+    None for bodies that are no chains. A cache that cannot be read or written is left as it is, with a `ChangedFileWarning`:
+    no result depends on it.
     """
+    if not isinstance(problem.body, Chain):
+        if compute:
+            raise ProblemError("upper bounds are computed for chains of links only; for this body there is 1/min(mu).")
+        return None
     domain, cache = (problem.body, problem.friction, problem.joint_limit), folder / CACHE
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
@@ -31,4 +37,5 @@ def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
     if bound is not None:
         return f"  {bound.report(efficiency)}"
     limit = 1.0 / problem.friction.smallest
-    return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}; --bound computes a tighter one"
+    tighter = "; --bound computes a tighter one" if isinstance(problem.body, Chain) else ""
+    return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

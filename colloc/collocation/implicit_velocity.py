@@ -5,11 +5,11 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from colloc.collocation.newton_balance import balanced_near
-from colloc.mechanics.body import Chain
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 
-_TOLERANCE = 1e-12
+_TOLERANCE, ACCEPTED = 1e-12, 1e3
+"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
 
 
 class VelocityMap(ca.Callback):
@@ -19,7 +19,7 @@ class VelocityMap(ca.Callback):
     instant that does not converge gives NaN, which an optimiser takes as a step too far.
     """
 
-    def __init__(self, body: Chain, friction: Friction, n_time: int) -> None:
+    def __init__(self, body: Body, friction: Friction, n_time: int) -> None:
         ca.Callback.__init__(self)
         self._body, self._friction, self._n_time = body, friction, n_time
         self._last: tuple[np.ndarray, np.ndarray, float] | None = None
@@ -51,9 +51,9 @@ class VelocityMap(ca.Callback):
             return [ca.DM(np.full((3, self._n_time), np.nan))]
         if np.isnan(start).any() and self._z is not None:
             start = self._z
-        z, converged = balanced_near(self._body, self._friction, angles, rates, delta, np.nan_to_num(start), _TOLERANCE)
+        solved = self._body.solve(self._friction, angles, rates, delta, start=np.nan_to_num(start), tolerance=_TOLERANCE)
         self.solves += 1
-        z = np.where(converged, z, np.nan)
+        z = np.where(solved.residual < ACCEPTED * _TOLERANCE, solved.z, np.nan)
         self._last = (angles, rates, delta)
         self._z = z
         return [ca.DM(z)]

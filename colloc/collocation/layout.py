@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.path_classes import FreePath
-from colloc.gaits.problem import FULL, Problem
+from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import FULL
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
 
@@ -39,11 +40,11 @@ def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
 
 def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
     """Index arrays of all variables of a problem on a mesh."""
-    n_joint, n_link = problem.body.n_joint, problem.body.n_link
+    n_joint, full = problem.body.n_joint, problem.formulation == FULL
     gait, path = problem.gait, problem.has_path
     size = gait.size(n_joint, mesh.n) if isinstance(gait, FreePath) else gait.size(n_joint)
     # without them angles, rates and velocities along a path follow from its parameters
-    n_point = mesh.n_point if problem.formulation == FULL or not path else 0
+    n_point = mesh.n_point if full or not path else 0
     sizes = {
         "parameters": (size, 1),
         "theta": (1, mesh.n_site),
@@ -52,7 +53,7 @@ def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
         "angles": (n_joint, n_point),
         "rates": (n_joint, n_point),
         "z": (3, n_point),
-        "forces": (3 * n_link if problem.formulation == FULL else 0, n_point),
+        "forces": (problem.body.n_force if full else 0, n_point),
     }
     indices, start = {}, 0
     for name, (rows, columns) in sizes.items():

@@ -14,11 +14,10 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from colloc.collocation.point_equations import advance, full_equations, link_forces
+from colloc.collocation.point_equations import forward
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits import arcs
-from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
 
@@ -68,33 +67,31 @@ def side(n_joint: int) -> Piece:
 
 
 @lru_cache(maxsize=32)
-def path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+def path_point(body: Body, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
     """Rotation rate, velocity of the centre of mass along the lab's x, and power. Locals: theta, then the piece's shape.
 
     `kind` is `arc` or `side`. Differentiating takes most of the time in which a program is built, so it is done once.
     """
     piece = kind(body.n_joint)
     theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("Z", 3)
-    now = instant(body, friction, piece.angles, piece.direction, z, delta)
-    cx, cy = body.centre_velocity(now.posture, now.velocity)
-    out = piece.speed * ca.vertcat(z[2], ca.cos(theta) * cx - ca.sin(theta) * cy, total_power(now.velocity, now.force))
-    balance = net_force(now.posture, now.force)
-    return implicit_function("point", ca.vertcat(theta, piece.shape), piece.given, z, delta, balance, out)
+    now = body.sliding(friction, piece.angles, piece.direction, z, delta)
+    out = piece.speed * ca.vertcat(z[2], forward(theta, now.centre), now.power)
+    return implicit_function("point", ca.vertcat(theta, piece.shape), piece.given, z, delta, now.force, out)
 
 
 @lru_cache(maxsize=32)
-def full_path_point(body: Chain, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+def full_path_point(body: Body, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
     """The same with everything as a variable. Outputs: the place of the point and its direction, then
-    `collocation.point_equations.full_equations`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
+    those of `colloc.mechanics.bodies.Lifted`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
     link forces, shape."""
     piece, n_joint = kind(body.n_joint), body.n_joint
     theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("z", 3)
-    angles, rates, force = ca.SX.sym("q", n_joint), ca.SX.sym("r", n_joint), link_forces(body)
-    equations, power = full_equations(body, friction, angles, rates, z, force, delta)
-    forward = advance(body, theta, angles, rates, z)
+    angles, rates, forces = ca.SX.sym("q", n_joint), ca.SX.sym("r", n_joint), ca.SX.sym("forces", body.n_force)
+    lifted = body.with_forces(friction, angles, rates, z, forces, delta)
     place = ca.vertcat(angles - piece.angles, rates - piece.direction)
-    out = ca.vertcat(place, equations, piece.speed * ca.vertcat(z[2], forward, power))
-    local = ca.vertcat(theta, angles, rates, z, *force, piece.shape)
+    gained = piece.speed * ca.vertcat(z[2], forward(theta, lifted.centre), lifted.power)
+    out = ca.vertcat(place, lifted.laws, lifted.balance, gained)
+    local = ca.vertcat(theta, angles, rates, z, forces, piece.shape)
     return local_function("point", local, piece.given, delta, out)
 
 

@@ -13,7 +13,7 @@ from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
-from colloc.mechanics.contact import Pairs
+from colloc.mechanics.bodies import Pairs
 from colloc.numerics.blocks import Block, LocalFunction
 from colloc.numerics.constraint_rows import Group, equalities, selector, stacked
 from colloc.numerics.mesh import Mesh
@@ -80,12 +80,10 @@ def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
     n_cell = geometry.start.size
     for check in geometry.checks:
         name = check.name
-        joint = name.startswith("joint")
-        limit = problem.joint_limit if joint else 0.0
         function = placed_check(check, geometry.piece)
         given = np.vstack([geometry.given(np.full(n_cell, 0.5)), np.full(n_cell, -1.0)])
         geometry.blocks[name] = (function, geometry.shape, given)
-        lower, upper = np.full(n_cell, -limit if joint else -np.inf), np.full(n_cell, limit)
+        lower, upper = (np.full(n_cell, bound) for bound in check.bounds(problem.joint_limit))
         rows = sparse.csr_matrix((n_cell, n))
         geometry.groups.append(Group(name, lower, upper, rows, {name: sparse.eye(n_cell, format="csr")}))
 

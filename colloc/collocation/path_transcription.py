@@ -21,13 +21,12 @@ from colloc.collocation.path_equations import ADVANCE, OMEGA, POWER, arc, full_p
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
 from colloc.collocation.point_equations import minus_efficiency
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.collocation.transcription import largest_forces
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
-from colloc.mechanics.contact import Pairs
+from colloc.mechanics.bodies import Pairs
 from colloc.numerics.blocks import Assembly, Block
 from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
 from colloc.numerics.mesh import Mesh
@@ -160,7 +159,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     own = np.concatenate([layout.angles, layout.rates, layout.z, layout.forces]) if full else np.empty((0, tau.size), dtype=int)
     geometry.blocks["point"] = (point, np.concatenate([theta, own, geometry.shape[:, interval]]), given)
     if full:
-        limit = largest_forces(problem)
+        limit = problem.body.largest_forces(problem.friction)
         geometry.lower[layout.forces], geometry.upper[layout.forces] = -limit, limit
 
     n_point, n_out = tau.size, point.n_out
@@ -193,7 +192,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
 
 def _full_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
     """The equations of every point where nothing is eliminated."""
-    n_joint, n_law = problem.body.n_joint, 3 * problem.body.n_link
+    n_joint, n_law = problem.body.n_joint, problem.body.n_force
     ends = np.cumsum([0, n_joint, n_joint, n_law, 3])
     names = ("angles", "rates", "force law", "balance")
     return [output_group(name, range(a, b), n_out, n_point, n) for name, a, b in zip(names, ends, ends[1:], strict=False)]

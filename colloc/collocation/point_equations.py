@@ -1,6 +1,6 @@
 """CasADi expressions of one mesh point: what collocation evaluates, each stated for a single instant.
 
-The physics is that of `mechanics.balance` and `mechanics.link_friction`; here it is only arranged into outputs. The balance
+The physics is the body's (`colloc.mechanics.bodies`); here it is only arranged into outputs. The balance
 itself is a step function of the tail velocity as delta goes to 0 and does not converge as a constraint. Two cures, the
 *formulations* of a point:
 
@@ -19,11 +19,8 @@ from functools import lru_cache
 import casadi as ca
 
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.problem import FULL
-from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import LinkForce, link_moments
 from colloc.numerics.blocks import LocalFunction, local_function, total_function
 
 N_RATE = 2
@@ -31,7 +28,7 @@ N_RATE = 2
 
 
 @lru_cache(maxsize=32)
-def point_function(formulation: str, body: Chain, friction: Friction) -> LocalFunction:
+def point_function(formulation: str, body: Body, friction: Friction) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
 
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links.
@@ -39,51 +36,26 @@ def point_function(formulation: str, body: Chain, friction: Friction) -> LocalFu
     return _full_point(body, friction) if formulation == FULL else _map_point(body, friction)
 
 
-def _symbols(body: Chain) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+def _symbols(body: Body) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
     names = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1))
     theta, angles, rates, z, delta = (ca.SX.sym(name, size) for name, size in names)
     return theta, angles, rates, z, delta
 
 
-def advance(body: Chain, theta: ca.SX, angles: ca.SX, rates: ca.SX, z: ca.SX) -> ca.SX:
-    """Velocity of the centre of mass along the lab's x."""
-    posture = body.posture(angles)
-    cx, cy = body.centre_velocity(posture, body.velocity(posture, rates, z))
-    return ca.cos(theta) * cx - ca.sin(theta) * cy
+def forward(theta: ca.SX, centre: ca.SX) -> ca.SX:
+    """Velocity of the centre of mass along the lab's x, from that in the body's axes."""
+    return ca.cos(theta) * centre[0] - ca.sin(theta) * centre[1]
 
 
-def full_equations(
-    body: Chain, friction: Friction, angles: ca.SX, rates: ca.SX, z: ca.SX, force: LinkForce, delta: ca.SX
-) -> tuple[ca.SX, ca.SX]:
-    """What vanishes where link forces obey the law of friction and balance: scaled laws, then the balance; and the power."""
-    posture = body.posture(angles)
-    velocity = body.velocity(posture, rates, z)
-    vs, vn, w = velocity
-    length = ca.DM(body.length_column())
-    I0, I1, I2 = link_moments(vs, vn, w, length, delta)
-    mu_s, mu_t = friction.tangential(vs), friction.mu_t
-    laws = [
-        force.tangential / I0 + mu_s * vs,
-        force.normal / I0 + mu_t * (vn + w * I1 / I0),
-        (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * 6 / length,
-    ]
-    return ca.vertcat(*laws, net_force(posture, force)), total_power(velocity, force)
-
-
-def link_forces(body: Chain) -> LinkForce:
-    """Symbols of the forces on the links."""
-    return LinkForce(*(ca.SX.sym(s, body.n_link) for s in ("f_s", "f_n", "couple")))
-
-
-def _full_point(body: Chain, friction: Friction) -> LocalFunction:
+def _full_point(body: Body, friction: Friction) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
-    force = link_forces(body)
-    equations, power = full_equations(body, friction, angles, rates, z, force, delta)
-    out = ca.vertcat(equations, advance(body, theta, angles, rates, z), power)
-    return local_function("point", ca.vertcat(theta, angles, rates, z, *force), ca.SX(0, 1), delta, out)
+    forces = ca.SX.sym("forces", body.n_force)
+    lifted = body.with_forces(friction, angles, rates, z, forces, delta)
+    out = ca.vertcat(lifted.laws, lifted.balance, forward(theta, lifted.centre), lifted.power)
+    return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
 
 
-def _map_point(body: Chain, friction: Friction) -> LocalFunction:
+def _map_point(body: Body, friction: Friction) -> LocalFunction:
     """Outputs z - Z, rate of distance at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter).
 
     Derivatives of Z follow from balance(Z, y) = 0: dZ/dy = -R_z^-1 R_y. The Hessian of w.Z + w_P P(Z, y) is that of
@@ -92,11 +64,10 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     solved = ca.SX.sym("Z", 3)
     y = ca.vertcat(angles, rates)
-    now = instant(body, friction, angles, rates, solved, delta)
-    balance, power = net_force(now.posture, now.force), total_power(now.velocity, now.force)
+    balance, _, power = body.sliding(friction, angles, rates, solved, delta)
     local = ca.vertcat(theta, y, z)
-    forward = advance(body, theta, angles, rates, z)
-    out = ca.vertcat(z - solved, forward, power)
+    ahead = forward(theta, body.sliding(friction, angles, rates, z, delta).centre)
+    out = ca.vertcat(z - solved, ahead, power)
 
     R_z, R_y = ca.jacobian(balance, solved), ca.jacobian(balance, y)
     P_z, P_y = ca.jacobian(power, solved), ca.jacobian(power, y)
@@ -105,7 +76,7 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     zeros = ca.SX(3, 1)
     jacobian = ca.vertcat(
         ca.horzcat(zeros, -slope, ca.SX.eye(3)),
-        ca.jacobian(forward, local),
+        ca.jacobian(ahead, local),
         ca.horzcat(ca.SX(1, 1), P_y + P_z @ slope, ca.SX(1, 3)),
     )
     weight = ca.SX.sym("weight", 5)
@@ -115,34 +86,9 @@ def _map_point(body: Chain, friction: Friction) -> LocalFunction:
     nu_value = ca.solve(R_z.T, weight[0:3] - weight[4] * P_z.T)
     inner = ca.substitute(inner, nu, nu_value)
     frame = ca.vertcat(ca.SX.eye(n_y), slope)
-    hessian = ca.hessian(weight[3] * forward, local)[0]
+    hessian = ca.hessian(weight[3] * ahead, local)[0]
     hessian[1 : 1 + n_y, 1 : 1 + n_y] += frame.T @ inner @ frame
     return total_function("point", local, solved, delta, out, jacobian, hessian, weight)
-
-
-@lru_cache(maxsize=32)
-def balance_steps(body: Chain, friction: Friction) -> ca.Function:
-    """Steps on the balance, (angles, rates, z, delta) to (z by Newton, z by the paper's fixed point, residual before the step).
-
-    Undamped, and in the tail's velocity: to finish what starts close by. `mechanics.fixed_point` converges from anywhere.
-    """
-    _, angles, rates, z, delta = _symbols(body)
-    now = instant(body, friction, angles, rates, z, delta)
-    balance = net_force(now.posture, now.force) / friction.largest
-    newton = z - ca.solve(ca.jacobian(balance, z), balance)
-
-    # link speeds frozen (paper, eqs. ftbtilde to deltatilde): forces linear in the velocities, with these moments
-    frozen = [ca.SX.sym(name, body.n_link) for name in ("I0", "I1", "I2")]
-    I0, I1, I2 = frozen
-    vs, vn, w = now.velocity
-    mu_s, mu_t = friction.tangential(vs), friction.mu_t
-    linear = LinkForce(-mu_s * vs * I0, -mu_t * (vn * I0 + w * I1), -mu_t * (vn * I1 + w * I2))
-    slope = ca.jacobian(net_force(now.posture, linear), z) / friction.largest
-    moments = link_moments(vs, vn, w, ca.DM(body.length_column()), delta)
-    secant = ca.substitute([slope], frozen, list(moments))[0]
-    fixed_point = z - ca.solve(secant, balance)
-    outputs = [newton, fixed_point, ca.norm_inf(balance)]
-    return ca.Function("balance_steps", [angles, rates, z, delta], outputs, {"cse": True})
 
 
 def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:

@@ -8,24 +8,16 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from colloc.mechanics.body import Chain
-from colloc.mechanics.contact import (
-    CLEARANCE_SMOOTHING,
-    SMOOTHING,
-    crossing_sums,
-    intrusions,
-    share_of_first,
-    smooth_minimum,
-    tangent_of_minimum,
-)
+from colloc.mechanics.bodies import Body, Contact
+from colloc.mechanics.contact import share_of_first, smooth_minimum, tangent_of_minimum
 
 
 class ShapeCheck(NamedTuple):
-    """A scalar function of the joint angles that admissibility bounds from above (joint angles also from below).
+    """A scalar function of the shape that admissibility bounds from above (angles also from below).
 
-    value: of the angles. share: of the angles, the weight of the first of two sums of which the function is the minimum,
-    or -1. cut: of the angles and a share, the tangent plane of that weight, or the function itself where it is negative.
-    slope: its derivative with respect to the angles. joint: which joint's angle it is itself; -1 if none's.
+    value: of the shape. share: of the shape, the weight of the first of two functions of which this is the minimum,
+    or -1. cut: of the shape and a share, the tangent plane of that weight, or the function itself where it is negative.
+    slope: its derivative with respect to the shape. row: the angle that it is, per shape coordinate; None if it is none.
     """
 
     name: str
@@ -33,37 +25,37 @@ class ShapeCheck(NamedTuple):
     share: ca.Function
     cut: ca.Function
     slope: ca.Function
-    joint: int = -1
+    row: np.ndarray | None = None
 
-    @property
-    def on_joint(self) -> bool:
-        """Whether it is a joint angle itself, bounded from below too."""
-        return self.joint >= 0
+    def along(self, angles: np.ndarray) -> np.ndarray:
+        """Values ``(n_time,)`` at shapes ``(n_joint, n_time)``."""
+        return self.value(angles).full().ravel() if self.row is None else self.row @ angles
+
+    def bounds(self, limit: float) -> tuple[float, float]:
+        """The least and the largest value allowed, for a limit on the body's angles."""
+        return (-np.inf, 0.0) if self.row is None else (-limit, limit)
+
+    def excess(self, values: np.ndarray, limit: float) -> np.ndarray:
+        """How far values are beyond their bounds; negative where they are not."""
+        lower, upper = self.bounds(limit)
+        return np.maximum(values - upper, lower - values)
 
 
-def shape_checks(body: Chain, far: Sequence[tuple[int, int]] = ()) -> list[ShapeCheck]:
-    """Functions of the joint angles that admissibility bounds.
+def shape_checks(body: Body, far: Sequence[tuple[int, int]] = ()) -> list[ShapeCheck]:
+    """Functions of the shape that admissibility bounds.
 
-    Each joint angle, to be kept within its limits; then functions that must not be positive: for all links two apart, and
-    for the pairs `far` of links farther apart.
+    Angles to be kept within the limit of the problem; then functions that must not be positive: for parts that might cross,
+    and for the pairs `far` of parts farther apart.
     """
     angles = ca.SX.sym("q", body.n_joint)
-    checks = [_joint_check(f"joint {j + 1}", angles, j) for j in range(body.n_joint)]
-    for i, (first, second) in enumerate(crossing_sums(body, angles)):
-        name = f"links {i + 1} and {i + 3}"
-        checks.append(_minimum_check(f"{name} (left)", angles, first - np.pi, second - np.pi))
-        checks.append(_minimum_check(f"{name} (right)", angles, -first - np.pi, -second - np.pi))
-    for i, j in far:
-        checks.append(
-            _minimum_check(f"links {i + 1} and {j + 1}", angles, *intrusions(body, angles, i, j), CLEARANCE_SMOOTHING)
-        )
-    return checks
+    checks = [_angle_check(name, angles, row) for name, row in zip(body.limit_names, body.limited, strict=True)]
+    return checks + [_minimum_check(contact, angles) for contact in body.contacts(angles, far)]
 
 
-def _joint_check(name: str, angles: ca.SX, joint: int) -> ShapeCheck:
-    share, value = ca.SX.sym("share"), angles[joint]
+def _angle_check(name: str, angles: ca.SX, row: np.ndarray) -> ShapeCheck:
+    share, value = ca.SX.sym("share"), ca.mtimes(ca.DM(row[None]), angles)
     none = ca.Function("share", [angles], [ca.SX(-1)])
-    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, *_cut(angles, share, value), joint)
+    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, *_cut(angles, share, value), row)
 
 
 def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:
@@ -71,7 +63,8 @@ def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Funct
     return ca.Function("cut", [angles, share], [cut]), ca.Function("slope", [angles, share], [slope])
 
 
-def _minimum_check(name: str, angles: ca.SX, first: ca.SX, second: ca.SX, width: float = SMOOTHING) -> ShapeCheck:
+def _minimum_check(contact: Contact, angles: ca.SX) -> ShapeCheck:
+    name, first, second, width = contact
     value, share = smooth_minimum(first, second, width), ca.SX.sym("share")
     cut = ca.if_else(share < 0, value, tangent_of_minimum(first, second, ca.fmax(share, 0), width))
     return ShapeCheck(

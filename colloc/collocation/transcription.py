@@ -25,8 +25,8 @@ from colloc.collocation.point_equations import N_RATE, gait_check, mean_square, 
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.problem import FULL, Problem
-from colloc.mechanics.contact import Pairs
+from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import FULL, Pairs
 from colloc.numerics.blocks import Assembly, Block
 from colloc.numerics.constraint_rows import (
     Group,
@@ -161,7 +161,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         *_orientation_groups(problem, mesh, layout),
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
         quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
-        *(_check_group(check.name, problem, mesh.n, layout.n) for check in checks),
+        *(_check_group(check, problem, mesh.n, layout.n) for check in checks),
         Group(
             "shape speed",
             np.array([problem.smallest_shape_speed**2]),
@@ -216,18 +216,11 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
     # a function bounded by L has Fourier coefficients of at most 4 L / pi
     lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * problem.joint_limit / np.pi
     if layout.forces.size:
-        limit = largest_forces(problem)
+        limit = problem.body.largest_forces(problem.friction)
         lower[layout.forces], upper[layout.forces] = -limit, limit
     for state in (layout.distance, layout.work):
         lower[state[0, 0]] = upper[state[0, 0]] = 0.0
     return lower, upper
-
-
-def largest_forces(problem: Problem) -> np.ndarray:
-    """Largest tangential and normal forces and couples of friction on the links, ``(3 n_link, 1)``."""
-    friction, length = problem.friction, problem.body.length_column()
-    tangential = max(friction.mu_f, friction.mu_b) * length
-    return np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
 
 
 def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
@@ -246,9 +239,6 @@ def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Gr
     return [equalities("orientation", linear), *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n)]
 
 
-def _check_group(name: str, problem: Problem, n_cell: int, n: int) -> Group:
-    is_joint = name.startswith("joint")
-    limit = problem.joint_limit if is_joint else 0.0
-    lower = np.full(n_cell, -limit if is_joint else -np.inf)
-    linear = sparse.csr_matrix((n_cell, n))
-    return Group(name, lower, np.full(n_cell, limit), linear, {name: sparse.eye(n_cell, format="csr")})
+def _check_group(check: ShapeCheck, problem: Problem, n_cell: int, n: int) -> Group:
+    lower, upper = (np.full(n_cell, bound) for bound in check.bounds(problem.joint_limit))
+    return Group(check.name, lower, upper, sparse.csr_matrix((n_cell, n)), {check.name: sparse.eye(n_cell, format="csr")})

@@ -6,11 +6,9 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from colloc.collocation.layout import Layout
-from colloc.collocation.newton_balance import balanced_near
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.mechanics.balance import instant, total_power
 from colloc.numerics.mesh import Mesh
 
 _TOLERANCE = 1e-11
@@ -55,8 +53,9 @@ def balanced_variables(
     unit = gait.speed_unit
     slow = delta * gait.delta_unit / unit
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
-    z, _ = balanced_near(problem.body, problem.friction, angles, rates, slow, start, _TOLERANCE)
-    now = instant(problem.body, problem.friction, angles, rates, z, slow)
+    body, friction = problem.body, problem.friction
+    solved = body.solve(friction, angles, rates, slow, start=start, tolerance=_TOLERANCE)
+    now, z = body.motion(friction, angles, rates, slow, solved), solved.z
 
     state, rate = mesh.integration()
     # theta_0 = 0 closes the system; the matrix is block bidiagonal
@@ -64,25 +63,25 @@ def balanced_variables(
     theta[1:] = spsolve(state[:, 1:].tocsc(), unit * (rate @ z[2]))
     site_of_point = np.empty(mesh.n_point, dtype=int)
     site_of_point[mesh.points] = mesh.sites
-    cx, cy = problem.body.centre_velocity(now.posture, now.velocity)
+    cx, cy = now.centre
 
     if problem.gait.symmetry == "antipodal":
         theta -= 0.5 * theta[-1]
     else:  # turn the motion into +x
         c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
         _, quadrature = mesh.quadrature()
-        dx, dy = quadrature @ (c * cx[0] - s * cy[0]), quadrature @ (s * cx[0] + c * cy[0])
+        dx, dy = quadrature @ (c * cx - s * cy), quadrature @ (s * cx + c * cy)
         theta -= np.arctan2(dy.sum(), dx.sum())
     c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
     _, quadrature = mesh.quadrature()
-    distance = np.cumsum(unit * (quadrature @ (c * cx[0] - s * cy[0])))
+    distance = np.cumsum(unit * (quadrature @ (c * cx - s * cy)))
     if distance[-1] < 0:  # an antipodal gait that travels the other way along its axis
         theta, distance = theta + np.pi, -distance
     x[layout.distance[0, 1:]] = distance
-    x[layout.work[0, 1:]] = np.cumsum(unit * (quadrature @ total_power(now.velocity, now.force)[0]))
+    x[layout.work[0, 1:]] = np.cumsum(unit * (quadrature @ now.power))
     x[layout.theta[0]] = theta
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     if layout.forces.size:
-        x[layout.forces] = np.concatenate(now.force)
+        x[layout.forces] = body.forces(friction, angles, rates, z, slow)
     return x

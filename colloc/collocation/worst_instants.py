@@ -35,13 +35,13 @@ def worst_instants(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck]) -> list
 def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: float) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each check, the mesh cells in which it might bind soon, and its worst instants there, ``(n,)`` each.
 
-    Those are the cells in which it is near its bound (`limit` for joints, else 0), and those in which it has a peak.
+    Those are the cells in which it is near its bound (`limit` for angles, else 0), and those in which it has a peak.
     """
     fine = np.linspace(0.0, 1.0, _SAMPLES + 1)
     angles = gait.angles((mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel())
     found = []
     for check in checks:
-        highest = _magnitudes(check, angles).reshape(mesh.n, -1).max(axis=1) - (limit if check.on_joint else 0.0)
+        highest = _magnitudes(check, angles).reshape(mesh.n, -1).max(axis=1) - check.bounds(limit)[1]
         around = np.pad(highest, 1, constant_values=-np.inf)
         peak = (highest >= around[:-2]) & (highest >= around[2:])
         cells = np.flatnonzero((highest > -_NEAR) | (peak & (highest > -_FAR)))
@@ -50,10 +50,9 @@ def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: float) ->
 
 
 def _magnitudes(check: ShapeCheck, angles: np.ndarray) -> np.ndarray:
-    """What a bound from above is laid on, ``(n_time,)``: joint angles are bounded both ways."""
-    if check.on_joint:
-        return np.abs(angles[check.joint])
-    return check.value(angles).full().ravel()
+    """What a bound from above is laid on, ``(n_time,)``: angles are bounded both ways."""
+    values = check.along(angles)
+    return values if check.row is None else np.abs(values)
 
 
 def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray) -> np.ndarray:
@@ -77,13 +76,12 @@ def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray) -> np.n
 
 def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
     """A check along a gait, ``(n_time,)``."""
-    angles = gait.angles(times)
-    return angles[check.joint] if check.on_joint else check.value(angles).full().ravel()
+    return check.along(gait.angles(times))
 
 
 def held_shares(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
     """The share of the first sum to hold in the cut at each of the instants, or -1 for the check itself, ``(n_time,)``."""
-    if check.on_joint:
+    if check.row is not None:
         return np.full(times.size, -1.0)
     shares = check.share(gait.angles(times)).full().ravel()
     both = (shares > _HELD_SHARE) & (shares < 1 - _HELD_SHARE)

@@ -59,7 +59,7 @@ def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Seque
         "samples_per_period": trajectory.time.size,
         "max_speed_rad_per_s": None if limits is None else list(limits),
         "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
-        "link_lengths": list(solution.problem.body.lengths),
+        "body": solution.problem.body.describe(),
         "friction": {key: getattr(solution.problem.friction, key) for key in ("mu_t", "mu_f", "mu_b")},
         "efficiency": measured.efficiency,
         "distance_per_period_body_lengths": measured.distance,
@@ -74,11 +74,11 @@ def repeated(trajectory: Trajectory, periods: int) -> tuple[np.ndarray, np.ndarr
     return time, np.tile(trajectory.angles, periods), np.tile(trajectory.speeds, periods)
 
 
-def csv_text(facts: dict, trajectory: Trajectory, periods: int = 1) -> str:
+def csv_text(facts: dict, trajectory: Trajectory, periods: int = 1, coordinate: str = "joint") -> str:
     """The samples as comma-separated values, with the facts in '#' lines."""
     time, angles, speeds = repeated(trajectory, periods)
     n = len(angles)
-    names = [f"joint_{j}_rad" for j in range(1, n + 1)] + [f"joint_{j}_rad_per_s" for j in range(1, n + 1)]
+    names = [f"{coordinate}_{j}_{unit}" for unit in ("rad", "rad_per_s") for j in range(1, n + 1)]
     text = io.StringIO()
     for key, value in facts.items():
         text.write(f"# {key}: {json.dumps(value)}\n")
@@ -109,14 +109,18 @@ def _export(options: argparse.Namespace) -> int:
     limits = options.max_speed
     trajectory = timed(solution.gait, options.rate, options.period, None if limits is None else np.array(limits))
     facts = about(solution, trajectory, options.rate, limits)
-    text = (json_text if kind == "json" else csv_text)(facts, trajectory, options.periods)
+    coordinate = solution.problem.body.coordinate
+    if kind == "json":
+        text = json_text(facts, trajectory, options.periods)
+    else:
+        text = csv_text(facts, trajectory, options.periods, coordinate)
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
     samples = trajectory.time.size * options.periods
     fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])
     lines = [
         f"saved {path}: {samples} samples, period {trajectory.period:g} s",
-        f"  joint speeds up to {fastest} rad/s; {facts['distance_per_period_body_lengths']:.4g} body lengths a period",
+        f"  {coordinate} speeds up to {fastest} rad/s; {facts['distance_per_period_body_lengths']:.4g} body lengths a period",
     ]
     if not solution.success:
         lines.append(f"  note: the result is not certified ({solution.status})")

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from colloc.gaits.problem import FORMULATIONS, Problem
+from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import FORMULATIONS
 from colloc.system.errors import ProblemError
 
 _LONGEST_NAME = 220

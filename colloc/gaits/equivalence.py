@@ -22,7 +22,7 @@ from itertools import product
 import numpy as np
 
 from colloc.gaits.harmonic import Fourier
-from colloc.mechanics.body import Chain
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 
 Image = Callable[[Fourier], Fourier]
@@ -40,12 +40,12 @@ def reversed_in_time(gait: Fourier) -> Fourier:
     return Fourier(gait.mean, gait.cos, -gait.sin)
 
 
-def swapped(gait: Fourier) -> Fourier:
-    """The same shapes with tail and head exchanged, -q_(n+1-j)(t)."""
-    return Fourier(-gait.mean[::-1], -gait.cos[::-1], -gait.sin[::-1])
+def swapped(gait: Fourier, body: Body) -> Fourier:
+    """The same shapes with tail and head exchanged: of chains -q_(n+1-j)(t)."""
+    return Fourier(*(body.swapped(rows) for rows in (gait.mean, gait.cos, gait.sin)))
 
 
-def images(gait: Fourier, body: Chain, friction: Friction) -> list[Fourier]:
+def images(gait: Fourier, body: Body, friction: Friction) -> list[Fourier]:
     """The gait and all gaits that differ from it by a symmetry of body and friction, but for the start phase."""
     result = []
     for mirror, reversal, swap in product((False, True), repeat=3):
@@ -55,7 +55,7 @@ def images(gait: Fourier, body: Chain, friction: Friction) -> list[Fourier]:
             continue
         image = mirrored(gait) if mirror else gait
         image = reversed_in_time(image) if reversal else image
-        result.append(swapped(image) if swap else image)
+        result.append(swapped(image, body) if swap else image)
     return result
 
 
@@ -79,7 +79,7 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
     return float(np.sqrt(np.sum((a.mean - b.mean) ** 2) + 0.5 * np.sum(np.abs(difference) ** 2)))
 
 
-def distance(a: Fourier, b: Fourier, body: Chain, friction: Friction) -> float:
+def distance(a: Fourier, b: Fourier, body: Body, friction: Friction) -> float:
     """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body and friction."""
     return min(phase_distance(a, image) for image in images(b, body, friction))
 

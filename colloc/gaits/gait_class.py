@@ -13,8 +13,7 @@ import numpy as np
 
 from colloc.gaits.equivalence import phase_distance, reversed_in_time, swapped
 from colloc.gaits.harmonic import Fourier
-from colloc.mechanics.body import Chain
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
@@ -94,34 +93,31 @@ def wave_direction(gait: Fourier) -> float:
     return float(travel / size) if size > 0 else 0.0
 
 
-def headed_displacement(gait: Fourier, body: Chain, friction: Friction) -> float:
+def headed_displacement(gait: Fourier, body: Body, friction: Friction) -> float:
     """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity; 1 is head first.
 
     From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is enough for a sign.
     """
     t = (np.arange(_INSTANTS) + 0.5) / _INSTANTS
     angles, rates = gait.angles(t), gait.rates(t)
-    z = solve_balance(body, friction, angles, rates, _DELTA, tolerance=1e-8).z
-    posture = body.posture(angles)
-    velocity = body.velocity(posture, rates, z)
-    x, y = body.centre_velocity(posture, velocity)
-    theta = np.concatenate([[0.0], np.cumsum(0.5 * (z[2, 1:] + z[2, :-1])) / _INSTANTS])
-    c, s = np.cos(theta), np.sin(theta)
-    moved = np.array([np.mean(c * x[0] - s * y[0]), np.mean(s * x[0] + c * y[0])])
-    lengths = np.asarray(body.lengths)[:, None]
-    bent = np.vstack([np.zeros_like(theta), np.cumsum(angles, axis=0)]) + theta
-    axis = np.array([np.mean(np.sum(lengths * np.cos(bent), axis=0)), np.mean(np.sum(lengths * np.sin(bent), axis=0))])
-    size = np.linalg.norm(moved) * np.linalg.norm(axis)
-    return float(moved @ axis / size) if size > 0 else 0.0
+    z = body.solve(friction, angles, rates, _DELTA, tolerance=1e-8).z
+    x, y = body.sliding(friction, angles, rates, z, np.full((1, _INSTANTS), _DELTA)).centre
+    turn = np.exp(1j * np.concatenate([[0.0], np.cumsum(0.5 * (z[2, 1:] + z[2, :-1])) / _INSTANTS]))
+    head_x, head_y = (points[-1] for points in body.outline(angles))
+    moved, axis = np.mean(turn * (x + 1j * y)), np.mean(turn * (head_x + 1j * head_y))
+    size = abs(moved) * abs(axis)
+    return float((moved * np.conj(axis)).real / size) if size > 0 else 0.0
 
 
-def gait_class(gait: Fourier, body: Chain, friction: Friction) -> GaitClass:
-    """The kind of a gait of a body with at least two joints."""
+def gait_class(gait: Fourier, body: Body, friction: Friction) -> GaitClass:
+    """The kind of a gait of a body with at least two joints or modes."""
     close = _SAME * max(_amplitude(gait), 1e-12)
-    bilateral = body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait))) < close
+    bilateral = body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait, body))) < close
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
     antipodal = np.linalg.norm(even) < close
     retraced = phase_distance(gait, reversed_in_time(gait)) < close
     turns = 0 if retraced else winding(gait)
+    bending = body.bending
+    bent = Fourier(bending @ gait.mean, bending @ gait.cos, bending @ gait.sin)
     ahead = headed_displacement(gait, body, friction)
-    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(gait), ahead)
+    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(bent), ahead)

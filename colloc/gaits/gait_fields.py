@@ -1,8 +1,9 @@
-"""Gaits and classes of gaits as plain dictionaries (JSON), and back. Which kind it is shows in the names of the fields."""
+"""Gaits, classes of gaits and bodies as plain dictionaries (JSON), and back. The name of the first field tells the kind."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +13,9 @@ from colloc.gaits.mixture import Mixture
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.relaxed import Relaxed
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.body import Chain
+from colloc.smooth.modal_body import ModalBody
 
 AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
@@ -19,15 +23,17 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture)
 CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed)
+BODIES: list[type] = [Chain, ModalBody]
+"""Bodies that files can hold; a body of your own is added to the list."""
 
 
-def fields(value: AnyGait | AnyClass) -> dict[str, Any]:
-    """The fields of a gait or a class of gaits as numbers, strings and lists."""
+def fields(value: Any) -> dict[str, Any]:
+    """The fields of a gait, a class of gaits or a body as numbers, strings and lists."""
     found = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
     return {k: v.tolist() if isinstance(v, (np.ndarray, np.generic)) else v for k, v in found.items()}
 
 
-def _from(kinds: tuple[type, ...], given: dict[str, Any]) -> Any:
+def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
     for kind in kinds:
         # the first field tells the kind
         if dataclasses.fields(kind)[0].name in given:
@@ -43,3 +49,8 @@ def gait_from(given: dict[str, Any]) -> AnyGait:
 def class_from(given: dict[str, Any]) -> AnyClass:
     """The class of gaits that `fields` described; as `gait_from`."""
     return _from(CLASSES, given)
+
+
+def body_from(given: dict[str, Any]) -> Body:
+    """The body that `fields` described; as `gait_from`."""
+    return _from(BODIES, given)

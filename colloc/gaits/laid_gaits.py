@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyClass, AnyGait
+from colloc.gaits.guesses import largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through, path_length
 from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
-from colloc.mechanics.contact import largest_factor
 
 _SHORT = 1.002
 """An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
@@ -22,16 +23,13 @@ _NEAR = 10.0
 gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 times the final delta 0.3998)."""
 
 
-def over_links(gait: AnyGait, body: Chain, other: Chain, joint_limit: float = float(np.pi)) -> AnyGait:
-    """A gait of a chain laid into another chain: every link gets the mean tangent angle of the part of the body it covers.
+def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: float = float(np.pi)) -> AnyGait:
+    """A gait of a chain laid into another body: every link gets the mean tangent angle of the part of the body it covers.
 
     That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of arcs becomes a polygon of
     many corners. Where links would cross, or a joint pass its limit, all angles shrink.
     """
-    ends, others = (np.concatenate([[0.0], np.cumsum(b.lengths)]) for b in (body, other))
-    overlap = np.minimum(others[1:, None], ends[1:]) - np.maximum(others[:-1, None], ends[:-1])
-    means = np.maximum(overlap, 0.0) / other.length_column()
-    matrix = np.diff(means @ np.tril(np.ones((body.n_link, body.n_joint)), -1), axis=0)
+    matrix = other.laid(np.array(body.lengths))
     angles = matrix @ gait.angles(_PHASES)
     matrix = matrix * min(1.0, largest_factor(other, joint_limit, angles))
     if isinstance(gait, Fourier):
@@ -44,7 +42,7 @@ def over_links(gait: AnyGait, body: Chain, other: Chain, joint_limit: float = fl
 
 
 def laid_into(
-    gait_class: AnyClass, gait: AnyGait, body: Chain, joint_limit: float = float(np.pi), smallest_shape_speed: float = 0.1
+    gait_class: AnyClass, gait: AnyGait, body: Body, joint_limit: float = float(np.pi), smallest_shape_speed: float = 0.1
 ) -> AnyGait:
     """The gait that starts a search in a class: its Fourier series for harmonics, else itself, made admissible.
 

@@ -5,27 +5,26 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait_fields import CLASSES, GAITS, AnyClass, AnyGait, class_from, fields, gait_from
+from colloc.gaits.gait_fields import BODIES, CLASSES, GAITS, AnyClass, AnyGait, body_from, class_from, fields, gait_from
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.gaits.relaxed import Relaxed
-from colloc.gaits.symmetry import BILATERAL, BOTH
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH
+from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
-from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.numerics.schemes import scheme
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
-DELTA_START, PATH_DELTA_START = 0.1, 0.01
-FULL, IMPLICIT = "full", "implicit velocity"
-FORMULATIONS = (FULL, IMPLICIT)
+PATH_DELTA_START = 0.01
 _PATH_CLASSES = (FreePath, Polygon, Relaxed)
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
@@ -33,7 +32,7 @@ LONGEST_NAME = 200
 """File systems allow 255 bytes, and results of a problem add endings to its name."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
-"""Excess of a joint limit, or depth of a crossing, at which a guess still counts as admissible: what a certificate allows."""
+"""Depth of a crossing at which a guess still counts as admissible: what a certificate allows."""
 _AT_THE_BOUND = 1e-2
 """An optimum that lies on the lower bound of the shape speed is a good guess for a richer class, although sampling cuts its
 corners and makes it a little shorter."""
@@ -75,17 +74,21 @@ class Problem:
     guess : Fourier, ArcPath or Corners, optional
         An admissible gait to start from, of any class; it is projected onto the class `gait`. By default a travelling wave
         (`colloc.gaits.guesses`).
-    body : Chain
+    body : Chain or ModalBody
+        Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
     gait : Harmonic, FreePath, Polygon or Relaxed
         The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md).
     delta : float
         Regularisation speed of friction at which the problem is finally solved, in body lengths per period; for free paths
-        and polygons at unit shape speed, in body lengths per radian of path.
+        and polygons at unit shape speed, in body lengths per radian of path. By default 1e-4 for chains; 1e-2 for smooth
+        bodies, whose panels have to resolve it.
     delta_start : float
-        Where the continuation in delta begins; by default 0.1, and 0.01 where delta is measured at unit shape speed.
+        Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), and 0.01 where delta is measured at unit
+        shape speed.
     joint_limit : float
-        Largest |joint angle| [rad], at most pi.
+        Largest |joint angle| [rad], at most pi; of a smooth body, largest |tangent angle| from its mean direction, at most
+        pi/2.
     smallest_shape_speed : float
         Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
         2 pi. It keeps the search away from gaits
@@ -96,7 +99,8 @@ class Problem:
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
         The nonlinear program whose solution is the answer, see `collocation.point_equations`: with tail velocities and link
-        forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver.
+        forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver. The
+        first is usual for chains; of smooth bodies there is only the second.
     mesh_tolerance : float
         Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
 
@@ -110,44 +114,57 @@ class Problem:
     ...     gait=Harmonic(harmonics=2, symmetry="bilateral"),
     ... )
     >>> problem
-    <Problem mine: 4 links, friction (1.7, 1, 1.3), 2 harmonics, symmetry bilateral, delta 1e-04>
+    <Problem mine: 3 joints, friction (1.7, 1, 1.3), 2 harmonics, symmetry bilateral, delta 1e-04>
     >>> problem.with_(delta=1e-6).delta
     1e-06
     """
 
     name: str
     guess: AnyGait = None
-    body: Chain = Chain()
+    body: Body = Chain()
     friction: Friction = Friction()
     gait: AnyClass = Harmonic()
-    delta: float = 1e-4
+    delta: float = None  # type: ignore[assignment]
     delta_start: float = None  # type: ignore[assignment]
-    joint_limit: float = float(np.pi)
+    joint_limit: float = None  # type: ignore[assignment]
     smallest_shape_speed: float = 0.1
     intervals: int = None  # type: ignore[assignment]
     scheme: str = "gauss-3"
-    formulation: str = FULL
+    formulation: str = None  # type: ignore[assignment]
     mesh_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
-        if self.guess is None and isinstance(self.body, Chain):
-            object.__setattr__(self, "guess", travelling_wave(self.body, self.joint_limit))
-        self._check_types()
+        self._check_parts()
+        usual = self.body.usual
+        start = PATH_DELTA_START if self.has_path else usual.delta_start
+        self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
+        self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
+        if self.guess is None:
+            self._fill(guess=travelling_wave(self.body, self.joint_limit))
+        if not isinstance(self.guess, GAITS):
+            raise ProblemError(f"guess must be a {_names(GAITS)}, not {type(self.guess).__name__}.")
         self._check_symmetry()
         self._check_guess()
 
-    def _check_types(self) -> None:
+    def _fill(self, **usual: object) -> None:
+        """Put values where none are given."""
+        for name, value in usual.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+
+    def _check_parts(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
         if len(self.name) > LONGEST_NAME:
             raise ProblemError(
                 f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
             )
-        for field, kinds in (("guess", GAITS), ("body", (Chain,)), ("friction", (Friction,)), ("gait", CLASSES)):
+        for field, kinds in (("friction", (Friction,)), ("gait", CLASSES)):
             if not isinstance(getattr(self, field), kinds):
-                names = " or ".join(kind.__name__ for kind in kinds)
-                raise ProblemError(f"{field} must be a {names}, not {type(getattr(self, field)).__name__}.")
+                raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(getattr(self, field)).__name__}.")
+        if isinstance(self.body, type) or not isinstance(self.body, Body):
+            raise ProblemError(f"body must be a {_names(BODIES)}, not {type(self.body).__name__}.")
 
     @property
     def has_path(self) -> bool:
@@ -155,10 +172,6 @@ class Problem:
         return isinstance(self.gait, _PATH_CLASSES)
 
     def _check_numbers(self) -> None:
-        if self.delta_start is None:
-            object.__setattr__(self, "delta_start", PATH_DELTA_START if self.has_path else DELTA_START)
-        if self.intervals is None:
-            object.__setattr__(self, "intervals", self.gait.intervals(self.body.n_joint))
         for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
@@ -172,14 +185,17 @@ class Problem:
             )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
-        if not 0 < self.joint_limit <= np.pi + 1e-12:
-            raise ProblemError(f"joint_limit must lie in (0, pi], not {self.joint_limit:g}.")
+        largest = self.body.usual.largest_limit
+        if not 0 < self.joint_limit <= largest + 1e-12:
+            most = f"pi/{np.pi / largest:g}".removesuffix("/1")
+            raise ProblemError(f"joint_limit must lie in (0, {most}], not {self.joint_limit:g}.")
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
-        if self.formulation not in FORMULATIONS:
-            raise ProblemError(f"formulation must be one of {', '.join(FORMULATIONS)}, not {self.formulation!r}.")
+        if self.formulation not in self.body.formulations:
+            known = ", ".join(self.body.formulations)
+            raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
         if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
         self._check_resolution()
@@ -202,15 +218,16 @@ class Problem:
             )
 
     def _check_symmetry(self) -> None:
-        if self.gait.symmetry in (BILATERAL, BOTH) and not self.body.symmetric:
+        needed = {BILATERAL, ANTIPODAL} if self.gait.symmetry == BOTH else {self.gait.symmetry}
+        if not needed <= set(self.body.symmetries):
             raise ProblemError(
-                f"a gait of symmetry {self.gait.symmetry!r} needs a body whose lengths read the same from both ends."
+                f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
+                f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."
             )
         if self.has_path and self.body.n_joint < 2:
-            raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links.")
+            raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
             raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
-
         if self.body.n_joint == 1 and self.friction.mu_f == self.friction.mu_b:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
@@ -219,9 +236,7 @@ class Problem:
 
     def _check_guess(self) -> None:
         if self.guess.n_joint != self.body.n_joint:
-            raise ProblemError(
-                f"guess has {self.guess.n_joint} joints but a body of {self.body.n_link} links has {self.body.n_joint}."
-            )
+            raise ProblemError(f"guess has {self.guess.n_joint} {self.body.coordinate}s but the body has {self.body.n_joint}.")
         if isinstance(self.gait, Harmonic):
             near = fourier_through(self.guess, self.gait)
             guess: AnyGait = self.gait.fourier(self.gait.parameters(near), self.body.n_joint)
@@ -236,22 +251,22 @@ class Problem:
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
             )
         angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
-        largest = np.abs(angles).max(axis=1)
-        if (largest > self.joint_limit + _SLACK).any():
-            joint = int(np.argmax(largest))
+        largest = np.abs(self.body.limited @ angles).max(axis=1)
+        if (largest > self.joint_limit + self.body.usual.excess).any():
+            which = int(np.argmax(largest))
             raise ProblemError(
-                f"guess is inadmissible: joint {joint + 1} reaches {largest[joint]:.4g} rad, "
+                f"guess is inadmissible: {self.body.limit_names[which]} reaches {largest[which]:.4g} rad, "
                 f"beyond the limit {self.joint_limit:.4g}; make its amplitude smaller."
             )
-        depth = crossing_depth(self.body, angles)
+        depth = self.body.crossing_depth(angles)
         if depth.max() > _SLACK:
             when = np.argmax(depth) / _CHECKED_PHASES
             raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def __repr__(self) -> str:
-        mu = self.friction
+        mu, coordinates = self.friction, f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         return (
-            f"<Problem {self.name}: {self.body.n_link} links, friction ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}), "
+            f"<Problem {self.name}: {coordinates}, friction ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}), "
             f"{self.gait.describe()}, delta {self.delta:.0e}>"
         )
 
@@ -262,10 +277,8 @@ class Problem:
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON)."""
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        for name in ("guess", "gait"):
+        for name in ("guess", "gait", "body", "friction"):
             stated[name] = fields(stated[name])
-        for name in ("body", "friction"):
-            stated[name] = dataclasses.asdict(stated[name])
         return stated
 
     @classmethod
@@ -280,7 +293,7 @@ class Problem:
         try:
             stated = dict(stated)
             stated["guess"] = gait_from(stated["guess"])
-            stated["body"] = Chain(tuple(stated["body"]["lengths"]))
+            stated["body"] = body_from(stated["body"])
             stated["friction"] = Friction(**stated["friction"])
             stated["gait"] = class_from(stated["gait"])
             stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
@@ -301,6 +314,10 @@ _EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FU
 def statement_hash(stated: dict) -> str:
     """SHA-256 of what `Problem.to_dict` gave."""
     return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
+
+
+def _names(kinds: Sequence[type]) -> str:
+    return " or ".join(kind.__name__ for kind in kinds)
 
 
 _NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.guesses import SAFE, largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, BOTH
-from colloc.mechanics.contact import SAFE, crossing_depth, largest_factor
 from colloc.system.errors import ProblemError
 
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
@@ -34,7 +34,8 @@ _ON_FLOOR = 1e-4
 def is_admissible(problem: Problem, gait: Fourier) -> bool:
     """Whether a gait keeps clear of its joint limits and its links apart, at phases spread over the period."""
     angles = gait.angles(np.arange(_PHASES) / _PHASES)
-    return bool(np.abs(angles).max() <= problem.joint_limit * SAFE) and not crossing_depth(problem.body, angles / SAFE).any()
+    largest = problem.body.largest_angles(angles).max()
+    return bool(largest <= problem.joint_limit * SAFE) and not problem.body.crossing_depth(angles / SAFE).any()
 
 
 def largest_amplitude(problem: Problem, gait: Fourier) -> float:

@@ -1,6 +1,6 @@
 """The force and torque balance of a body in quasi-static sliding, and the power it dissipates.
 
-Everything is in body-frame axes; the torque is taken about the body's chosen reference (see `colloc.mechanics.body`). The same
+Everything is in body-frame axes; the torque is taken about the body's chosen reference (see `colloc.mechanics.links`). The same
 functions run on NumPy arrays and on CasADi matrices.
 """
 
@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.link_friction import LinkForce, link_force, link_force_jacobian, link_moments, power
+from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
 
 
@@ -25,7 +25,7 @@ class Instant(NamedTuple):
 
 
 def instant(
-    body: Chain,
+    body: Links,
     friction: Friction,
     angles: Array,
     rates: Array,
@@ -53,6 +53,18 @@ def total_power(velocity: LinkVelocity, force: LinkForce) -> Array:
     return namespace(velocity.vs, force.normal).sum_rows(power(*velocity, force))
 
 
+def scaled_laws(velocity: LinkVelocity, force: LinkForce, length: np.ndarray, delta: Array, friction: Friction) -> list[Array]:
+    """What vanishes where link forces obey the law of friction, scaled like velocities: ``F / I0 + mu v = 0`` and so on."""
+    vs, vn, w = velocity
+    I0, I1, I2 = link_moments(vs, vn, w, length, delta)
+    mu_s, mu_t = friction.tangential(vs), friction.mu_t
+    return [
+        force.tangential / I0 + mu_s * vs,
+        force.normal / I0 + mu_t * (vn + w * I1 / I0),
+        (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * (6 / length),
+    ]
+
+
 def _pulled_back(posture: Posture, blocks: tuple[tuple[Array, Array, Array], ...]) -> np.ndarray:
     """``sum over links of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn, w)/dz and K the given 3 x 3 of link arrays."""
     c, s, x, y = posture
@@ -67,7 +79,7 @@ def _pulled_back(posture: Posture, blocks: tuple[tuple[Array, Array, Array], ...
     return result
 
 
-def balance_jacobian(body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
+def balance_jacobian(body: Links, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """Minus the derivative of `net_force` with respect to z, ``(n_time, 3, 3)``.
 
     Symmetric positive definite for isotropic friction: the Hessian of the dissipation potential.
@@ -75,7 +87,7 @@ def balance_jacobian(body: Chain, friction: Friction, posture: Posture, velocity
     return _pulled_back(posture, link_force_jacobian(*velocity, body.length_column(), delta, friction))
 
 
-def secant_matrix(body: Chain, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
+def secant_matrix(body: Links, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """Matrix A(z) with ``net_force(z') ~ net_force(z) - A(z) (z' - z)`` when link speeds are frozen, ``(n_time, 3, 3)``.
 
     One step of the paper's fixed point (eqs. ftbtilde to deltatilde) is ``z + A(z)^-1 net_force(z)``.

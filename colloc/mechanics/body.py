@@ -1,47 +1,47 @@
-"""Chains of straight links: where the links are and how fast they move, given shape, rates and one velocity.
-
-Frame: the body frame of the paper, tail link along +x. Link tangent angles are ``phi_i = sum of the first i joint angles``
-(the paper's Theta); joint angles are its Delta-theta, positive counter-clockwise, counted from the tail.
-The rigid velocity ``z = (u, v, omega)`` is that of a *reference*: the tail point, or the midpoint of a link. The second
-choice keeps the relative precision of a link at rest, which the first loses by cancellation.
-"""
+"""The chain of straight links as a `colloc.mechanics.bodies.Body`: which module answers which question."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
+from colloc.mechanics.balance import instant, net_force, scaled_laws, total_power
+from colloc.mechanics.bodies import (
+    ARROWS,
+    FULL,
+    IMPLICIT,
+    BalancedMotion,
+    BalanceSolution,
+    Branches,
+    Contact,
+    Lifted,
+    Pairs,
+    Sliding,
+    Usual,
+)
+from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.contact import (
+    CLEARANCE_SMOOTHING,
+    SMOOTHING,
+    crossing_depth,
+    crossing_sums,
+    far_pairs,
+    intrusions,
+    passing_depth,
+)
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.link_friction import LinkForce
+from colloc.mechanics.links import Links
+from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.argument_names import named_arguments
-from colloc.system.errors import ProblemError
-
-TAIL = None
-"""The reference of `Chain.posture`: the free end of link 0; an integer means the midpoint of that link."""
-
-
-class Posture(NamedTuple):
-    """Links in the body frame, each ``(n_link, n_time)``: direction cosines, and midpoints seen from the reference."""
-
-    cos: Array
-    sin: Array
-    x: Array
-    y: Array
-
-
-class LinkVelocity(NamedTuple):
-    """Velocity of each link, ``(n_link, n_time)``: tangential and normal at its midpoint, and rotation rate."""
-
-    vs: Array
-    vn: Array
-    w: Array
 
 
 @named_arguments
-@dataclass(frozen=True)
-class Chain:
-    """A chain of straight links joined end to end.
+class Chain(Links):
+    """A chain of straight links joined end to end; its shape coordinates are the joint angles.
 
     Parameters
     ----------
@@ -55,108 +55,164 @@ class Chain:
     2
     """
 
-    lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)
-
-    def __post_init__(self) -> None:
-        try:
-            lengths = tuple(float(value) for value in self.lengths)
-        except (TypeError, ValueError):
-            raise ProblemError(f"body.lengths must be a sequence of numbers, not {self.lengths!r}.") from None
-        object.__setattr__(self, "lengths", lengths)
-        if len(lengths) < 2:
-            raise ProblemError("body.lengths needs at least two links.")
-        if not all(np.isfinite(lengths)) or min(lengths) <= 0:
-            raise ProblemError(f"body.lengths must be positive and finite, not {lengths}.")
-        if abs(sum(lengths) - 1.0) > 1e-12:
-            raise ProblemError(f"body.lengths must add up to the body length 1, not {sum(lengths):.12g}.")
+    formulations = (FULL, IMPLICIT)
+    coordinate, quantity = "joint", "joint angle"
+    looks_for_all_velocities = True
+    usual = Usual(
+        delta=1e-4, delta_start=0.1, limit=float(np.pi), largest_limit=float(np.pi), limit_name="joint limits", excess=1e-6,
+        delta_influence=1e-2,
+    )  # fmt: skip
+    """The influence of delta that is allowed is the paper's own claim: less than 1 % below delta = 1e-4."""
 
     @property
-    def in_series(self) -> bool:
-        """Every link hangs on the one before it, as the compiled kernel takes for granted; a tree of links says no."""
-        return True
+    def n_force(self) -> int:
+        """Tangential and normal force and couple of every link."""
+        return 3 * self.n_link
 
     @property
-    def n_link(self) -> int:
-        return len(self.lengths)
+    def symmetries(self) -> tuple[str, ...]:
+        return ("none", "bilateral", "antipodal") if self.symmetric else ("none", "antipodal")
 
-    @property
-    def n_joint(self) -> int:
-        return len(self.lengths) - 1
+    def swapped(self, shape: np.ndarray) -> np.ndarray:
+        return -shape[::-1]
 
-    @property
-    def symmetric(self) -> bool:
-        """The lengths read the same from both ends."""
-        return bool(np.allclose(self.lengths, self.lengths[::-1], rtol=0, atol=1e-14))
+    def describe(self) -> str:
+        return f"links of lengths {', '.join(f'{length:.4g}' for length in self.lengths)} from the tail [body lengths]"
 
-    def length_column(self) -> np.ndarray:
-        """Lengths as an ``(n_link, 1)`` column."""
-        return np.array(self.lengths)[:, None]
+    def sliding(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+        now = instant(self, friction, angles, rates, z, delta)
+        centre = namespace(angles, z).stack(list(self.centre_velocity(now.posture, now.velocity)))
+        return Sliding(net_force(now.posture, now.force), centre, total_power(now.velocity, now.force))
 
-    def _joint_sum(self, reference: int | None) -> np.ndarray:
-        """``(n_link, n_joint)``: joint quantities to link angles, relative to the reference link (the tail link: 0)."""
-        full = np.tril(np.ones((self.n_link, self.n_joint)), -1)
-        return full if reference is TAIL else full - full[reference]
+    def with_forces(self, friction: Friction, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
+        """Laws F / I0 + mu v = 0 of the links, stretched by the moments of 1 / speed (see `colloc.mechanics.link_friction`)."""
+        n, posture, length = self.n_link, self.posture(angles), self.length_column()
+        velocity = self.velocity(posture, rates, z)
+        force = LinkForce(forces[:n, :], forces[n : 2 * n, :], forces[2 * n :, :])
+        laws = scaled_laws(velocity, force, length, delta, friction)
+        stack = namespace(angles, z, forces).stack
+        centre = stack(list(self.centre_velocity(posture, velocity)))
+        return Lifted(stack(laws), net_force(posture, force), centre, total_power(velocity, force))
 
-    def _path(self, reference: int | None) -> np.ndarray:
-        """``(n_link, n_link)``: link vectors to midpoints, relative to the reference point."""
-        full = np.tril(np.ones((self.n_link, self.n_link)), -1) + 0.5 * np.eye(self.n_link)
-        return full if reference is TAIL else full - full[reference]
+    def forces(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
+        return np.concatenate(instant(self, friction, angles, rates, z, delta).force)
 
-    def weighted_path(self, reference: int | None) -> np.ndarray:
-        """``(n_link, n_link)``: directions of links to midpoints, relative to the reference point."""
-        return self._path(reference) * self.lengths
-
-    def tangent_angles(self, angles: Array) -> Array:
-        """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles ``(n_joint, n_time)``."""
-        return namespace(angles).matmul(self._joint_sum(TAIL), angles)
-
-    def posture(self, angles: Array, reference: int | None = TAIL) -> Posture:
-        """Directions and midpoints of the links in the body frame, from joint angles ``(n_joint, n_time)``."""
-        xp = namespace(angles)
-        phi = self.tangent_angles(angles)
-        cos, sin = xp.cos(phi), xp.sin(phi)
-        path = self.weighted_path(reference)
-        return Posture(cos, sin, xp.matmul(path, cos), xp.matmul(path, sin))
-
-    def velocity(self, posture: Posture, rates: Array, z: Array, reference: int | None = TAIL) -> LinkVelocity:
-        """Link velocities (paper, eq. dtz0) for joint rates ``(n_joint, n_time)`` and rigid velocity z ``(3, n_time)``."""
-        xp = namespace(rates, z, posture.cos)
-        path = self.weighted_path(reference)
-        w = xp.matmul(self._joint_sum(reference), rates) + z[2:3, :]
-        vx = z[0:1, :] - xp.matmul(path, w * posture.sin)
-        vy = z[1:2, :] + xp.matmul(path, w * posture.cos)
-        return LinkVelocity(vx * posture.cos + vy * posture.sin, vy * posture.cos - vx * posture.sin, w)
-
-    def tail_velocity(self, posture: Posture, rates: np.ndarray, z: np.ndarray, reference: int | None) -> np.ndarray:
-        """Velocity of the tail, ``(3, n_time)``, when `z` is that of `reference` (whose posture is given)."""
-        if reference is TAIL:
-            return z
-        link = self.velocity(posture, rates, z, reference)
-        half = 0.5 * self.lengths[0]
-        # the tail link has direction (1, 0) in the body frame
-        return np.stack([link.vs[0], link.vn[0] - half * link.w[0], link.w[0]])
-
-    def centre(self, posture: Posture) -> tuple[Array, Array]:
-        """Centre of mass relative to the reference, two ``(1, n_time)`` rows."""
-        xp = namespace(posture.x)
+    def largest_forces(self, friction: Friction) -> np.ndarray:
         length = self.length_column()
-        return xp.sum_rows(length * posture.x), xp.sum_rows(length * posture.y)
+        tangential = max(friction.mu_f, friction.mu_b) * length
+        return np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
 
-    def centre_velocity(self, posture: Posture, link: LinkVelocity) -> tuple[Array, Array]:
-        """Velocity of the centre of mass in body-frame axes, two ``(1, n_time)`` rows."""
-        xp = namespace(link.vs)
-        length = self.length_column()
-        return (
-            xp.sum_rows(length * (link.vs * posture.cos - link.vn * posture.sin)),
-            xp.sum_rows(length * (link.vs * posture.sin + link.vn * posture.cos)),
-        )
+    def solve(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
+        tolerance: float = 1e-11,
+    ) -> BalanceSolution:  # fmt: skip
+        return solve_balance(self, friction, angles, rates, delta, start=start, tolerance=tolerance)
 
-    def joints(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Link end points in the body frame, x and y, each ``(n_link + 1, n_time)``, tail first."""
-        phi = self.tangent_angles(angles)
-        length = self.length_column()
-        start = np.zeros((1, phi.shape[1]))
-        return (
-            np.concatenate([start, np.cumsum(length * np.cos(phi), axis=0)]),
-            np.concatenate([start, np.cumsum(length * np.sin(phi), axis=0)]),
-        )
+    def motion(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    ) -> BalancedMotion:
+        return chain_motion(self, friction, angles, rates, delta, solved)
+
+    def slopes(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    ) -> np.ndarray:
+        return chain_slopes(self, friction, angles, rates, delta, solved)[1]
+
+    def replayed(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
+    ) -> tuple[BalancedMotion, np.ndarray]:
+        """By the solver itself: forces on links are integrals in closed form."""
+        solved = solve_balance(self, friction, angles, rates, delta, start=start).require()
+        return chain_motion(self, friction, angles, rates, delta, solved), solved.residual
+
+    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
+        return all_balanced_velocities(self, friction, angles, rates, delta)
+
+    def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
+        """The speed of the slowest point of each link, or where mu_f and mu_b differ the tangential speed."""
+        velocity = self.velocity(self.posture(angles), rates, z)
+        if friction.mu_f != friction.mu_b:
+            return np.abs(velocity.vs)
+        beyond = np.maximum(np.abs(velocity.vn) - 0.5 * self.length_column() * np.abs(velocity.w), 0.0)
+        return np.hypot(velocity.vs, beyond)
+
+    @property
+    def limited(self) -> np.ndarray:
+        return np.eye(self.n_joint)
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        return tuple(f"joint {j + 1}" for j in range(self.n_joint))
+
+    def largest_angles(self, angles: np.ndarray) -> np.ndarray:
+        return np.abs(angles).max(axis=0)
+
+    def contacts(self, angles: Array, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
+        """All links two apart, bending to either side, and the pairs `far` of links farther apart."""
+        found = []
+        for i, (first, second) in enumerate(crossing_sums(self, angles)):
+            name = f"links {i + 1} and {i + 3}"
+            found.append(Contact(f"{name} (left)", first - np.pi, second - np.pi, SMOOTHING))
+            found.append(Contact(f"{name} (right)", -first - np.pi, -second - np.pi, SMOOTHING))
+        for i, j in far:
+            found.append(Contact(f"links {i + 1} and {j + 1}", *intrusions(self, angles, i, j), CLEARANCE_SMOOTHING))
+        return found
+
+    @property
+    def far_pairs(self) -> Pairs:
+        return tuple(far_pairs(self))
+
+    def crossing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
+        return crossing_depth(self, angles, pairs)
+
+    def passing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
+        return passing_depth(self, angles, pairs)
+
+    def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.joints(angles)
+
+    @property
+    def hinges(self) -> slice:
+        return slice(1, -1)
+
+    def centre(self, angles: np.ndarray) -> np.ndarray:
+        return np.concatenate(self.centre_of_mass(self.posture(angles)))
+
+    def rubbing(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
+    ) -> tuple[np.ndarray, np.ndarray]:
+        posture = self.posture(angles)
+        velocity, many = self.velocity(posture, rates, z), max(2, count // self.n_link)
+        places, forces = [], []
+        for share in (np.arange(many) + 0.5) / many - 0.5:
+            along = share * self.length_column()
+            fs, fn = force_density(velocity.vs, velocity.vn + along * velocity.w, delta, friction)
+            places.append([posture.x + along * posture.cos, posture.y + along * posture.sin])
+            forces.append([fs * posture.cos - fn * posture.sin, fs * posture.sin + fn * posture.cos])
+        return np.concatenate(places, axis=1), np.concatenate(forces, axis=1)
+
+    def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
+        """Of the midpoints of the links."""
+        velocity = self.velocity(self.posture(angles), rates, z)
+        return "link", np.hypot(velocity.vs, velocity.vn)
+
+    def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        link = self.velocity(self.posture(angles), rates, z)
+        half = 0.5 * self.lengths[-1]
+        return np.stack([link.vs[-1], link.vn[-1] + half * link.w[-1], -link.w[-1]]), angles.sum(axis=0)
+
+    def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
+        """With joint j at s_j along the body: ``q_j = sin(2 pi t - 2 pi waves (s_j - 1/2))``."""
+        phase = 2 * np.pi * waves * (np.cumsum(self.lengths)[:-1] - 0.5)
+        return -np.sin(phase), np.cos(phase)
+
+    @property
+    def bending(self) -> np.ndarray:
+        return np.eye(self.n_joint)
+
+    def laid(self, lengths: np.ndarray) -> np.ndarray:
+        """Every link gets the mean tangent angle of the part of the other chain it covers."""
+        ends, own = (np.concatenate([[0.0], np.cumsum(b)]) for b in (lengths, self.lengths))
+        overlap = np.minimum(own[1:, None], ends[1:]) - np.maximum(own[:-1, None], ends[:-1])
+        means = np.maximum(overlap, 0.0) / self.length_column()
+        return np.diff(means @ np.tril(np.ones((lengths.size, lengths.size - 1)), -1), axis=0)

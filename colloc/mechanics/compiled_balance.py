@@ -6,20 +6,20 @@ import ctypes
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
 from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import address, each_piece
 
 
-def body_arguments(body: Chain, friction: Friction) -> tuple[np.ndarray, np.ndarray]:
+def body_arguments(body: Links, friction: Friction) -> tuple[np.ndarray, np.ndarray]:
     """Lengths and coefficients as the kernel takes them."""
     return np.array(body.lengths), np.array([friction.mu_t, friction.mu_f, friction.mu_b], dtype=float)
 
 
 def balance(
     library: ctypes.CDLL,
-    body: Chain,
+    body: Links,
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -55,7 +55,7 @@ _ROWS, _DIFFERENTIATED_ROWS = 7, 6
 
 def motion(
     library: ctypes.CDLL,
-    body: Chain,
+    body: Links,
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -80,7 +80,7 @@ def motion(
 
 def loaded(
     library: ctypes.CDLL,
-    body: Chain,
+    body: Links,
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,

@@ -15,11 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.links import Links
 from colloc.numerics.arrays import Array, namespace
-
-Pairs = tuple[tuple[int, int], ...]
-"""Pairs of links."""
 
 SMOOTHING = 1e-3
 """Width [rad] of the smoothed minimum; it errs to the safe side, by at most half of this."""
@@ -34,7 +31,7 @@ def _subtended(angle: Array, link: float, middle: float) -> Array:
     return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
 
 
-def crossing_sums(body: Chain, angles: Array) -> list[tuple[Array, Array]]:
+def crossing_sums(body: Links, angles: Array) -> list[tuple[Array, Array]]:
     """For links i and i + 2, the two sums that both exceed pi, or both fall below -pi, where they cross; ``(1, n_time)`` each.
 
     Joint angles ``(n_joint, n_time)``.
@@ -72,7 +69,7 @@ def tangent_of_minimum(first: Array, second: Array, share: Array, width: float =
     return share * first + share_of_second * second + width * bulge
 
 
-def crossing_bounds(body: Chain, angles: Array) -> Array | None:
+def crossing_bounds(body: Links, angles: Array) -> Array | None:
     """Smooth functions that are <= pi only at shapes where no links i and i + 2 cross, ``(2 (n_link - 2), n_time)``.
 
     None for a body of two links. Joint angles ``(n_joint, n_time)``.
@@ -85,12 +82,12 @@ def crossing_bounds(body: Chain, angles: Array) -> Array | None:
     return namespace(angles).stack(rows)
 
 
-def far_pairs(body: Chain) -> list[tuple[int, int]]:
+def far_pairs(body: Links) -> list[tuple[int, int]]:
     """All pairs of links that are more than two apart; `crossing_bounds` has those that are two apart."""
     return [(i, j) for i in range(body.n_link) for j in range(i + 3, body.n_link)]
 
 
-def intrusions(body: Chain, angles: Array, first: int, second: int) -> tuple[Array, Array]:
+def intrusions(body: Links, angles: Array, first: int, second: int) -> tuple[Array, Array]:
     """Two smooth functions that are both > 0 where links `first` < `second` cross [body lengths]; ``(1, n_time)`` each.
 
     With m and d the mean and half the difference of the distances of one link's ends from the other's line, that link
@@ -99,7 +96,7 @@ def intrusions(body: Chain, angles: Array, first: int, second: int) -> tuple[Arr
     return -_side(body, angles, first, second), -_side(body, angles, second, first)
 
 
-def clearance(body: Chain, angles: Array, first: int, second: int) -> Array:
+def clearance(body: Links, angles: Array, first: int, second: int) -> Array:
     """A smooth function that is >= 0 only where links `first` < `second` do not cross [body lengths], ``(1, n_time)``.
 
     Two segments cross iff neither lies on one side of the other: the smaller of the two `intrusions` decides. Smoothing also
@@ -114,7 +111,7 @@ def _smooth_abs(xp, value: Array) -> Array:
     return square / xp.sqrt(square + CLEARANCE_SMOOTHING**2)
 
 
-def _side(body: Chain, angles: Array, line: int, link: int) -> Array:
+def _side(body: Links, angles: Array, line: int, link: int) -> Array:
     """How far `link` stays on one side of the line through the link `line`; negative if its ends are on both sides."""
     xp = namespace(angles)
     step = 1 if link > line else -1
@@ -129,12 +126,12 @@ def _side(body: Chain, angles: Array, line: int, link: int) -> Array:
     return _smooth_abs(xp, mean) - xp.sqrt(spread * spread + CLEARANCE_SMOOTHING**2)
 
 
-def separate_pairs(body: Chain) -> list[tuple[int, int]]:
+def separate_pairs(body: Links) -> list[tuple[int, int]]:
     """All pairs of links that are not neighbours."""
     return [(i, j) for i in range(body.n_link) for j in range(i + 2, body.n_link)]
 
 
-def crossing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
+def crossing_depth(body: Links, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
     """How far links penetrate each other, ``(n_time,)``; 0 where no two of them cross.
 
     Plain segment intersection of the given pairs, by default of all that are not neighbours, independent of
@@ -151,7 +148,7 @@ def crossing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, i
     return depth
 
 
-def passing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
+def passing_depth(body: Links, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
     """How far links pass through each other between successive instants of a path [body lengths]; 0 if none does.
 
     A link cannot cross another without an end of one passing through the other. That shows even where no sample holds a
@@ -169,7 +166,7 @@ def passing_depth(body: Chain, angles: np.ndarray, pairs: Sequence[tuple[int, in
     return deepest
 
 
-def gap(body: Chain, angles: np.ndarray) -> np.ndarray:
+def gap(body: Links, angles: np.ndarray) -> np.ndarray:
     """The smallest distance between any two links [body lengths], ``(n_time,)``; 0 where links lie on or cross each other.
 
     Of neighbours, which always meet at their joint, it is the distance from the free end of one to the other. Joint angles
@@ -206,23 +203,3 @@ def _end_distances(ends: np.ndarray, i: int, j: int) -> tuple[list[np.ndarray], 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[1] - a[1] * b[0]
-
-
-SAFE = 1 - 1e-3
-"""Shapes as large as may be are scaled by this, to be clearly admissible."""
-_BISECTIONS = 40
-
-
-def largest_factor(body: Chain, joint_limit: float, angles: np.ndarray) -> float:
-    """The largest factor by which shapes ``(n_joint, n)`` can be multiplied and stay admissible; inf for straight ones."""
-    peak = np.abs(angles).max()
-    if peak == 0:
-        return np.inf
-    low, high = 0.0, joint_limit / peak
-    if not crossing_depth(body, high * angles).any():
-        return high * SAFE
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        crossing = bool(crossing_depth(body, middle * angles).any())
-        low, high = (low, middle) if crossing else (middle, high)
-    return low * SAFE

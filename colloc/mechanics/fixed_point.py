@@ -14,63 +14,23 @@ The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
-from colloc.mechanics.body import TAIL, Chain, LinkVelocity, Posture
+from colloc.mechanics.bodies import BalanceSolution
 from colloc.mechanics.compiled_balance import balance
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.link_friction import link_dissipation
+from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.system.errors import NotConvergedError, ProblemError
-
-
-@dataclass(frozen=True)
-class BalanceSolution:
-    """Tail velocities that balance the body, instant by instant.
-
-    Attributes
-    ----------
-    z : (3, n_time)
-        Tail velocity (u, v, omega) in the body frame.
-    residual : (n_time,)
-        Largest of |net force| and |torque about the anchor| / body length, in units of the friction on a body that moves at
-        the largest rate: the largest coefficient, or less where delta exceeds that rate.
-    iterations : (n_time,)
-        Newton and fixed-point steps taken.
-    converged : (n_time,)
-        Whether the residual reached the tolerance.
-    anchor : (n_time,)
-        The slowest link, in whose velocity the instant was solved.
-    anchor_velocity : (3, n_time)
-        Velocity of the midpoint of the anchor, and its rotation rate, in body-frame axes.
-    """
-
-    z: np.ndarray
-    residual: np.ndarray
-    iterations: np.ndarray
-    converged: np.ndarray
-    anchor: np.ndarray
-    anchor_velocity: np.ndarray
-
-    def require(self) -> BalanceSolution:
-        """This solution, or a `NotConvergedError` naming the instants that failed."""
-        if not self.converged.all():
-            bad = np.flatnonzero(~self.converged)
-            raise NotConvergedError(
-                f"the balance did not converge at {bad.size} of {self.converged.size} instants "
-                f"(first: {bad[:5].tolist()}, worst residual {self.residual[bad].max():.1e})."
-            )
-        return self
+from colloc.system.errors import ProblemError
 
 
 class _Batch:
     """Instants that share a reference link: what an iteration evaluates on subsets of them."""
 
-    def __init__(self, body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, reference: int | None) -> None:
+    def __init__(self, body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, reference: int | None) -> None:
         self.body, self.friction, self.reference = body, friction, reference
         self.angles, self.rates = angles, rates
 
@@ -128,7 +88,7 @@ def _real(name: str, values: np.ndarray) -> np.ndarray:
 
 
 def solve_balance(
-    body: Chain,
+    body: Links,
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -143,7 +103,7 @@ def solve_balance(
 
     Parameters
     ----------
-    body : Chain
+    body : Links
     friction : Friction
     angles, rates : (n_joint, n_time)
         Joint angles [rad] and their rates [rad/time].
@@ -203,7 +163,7 @@ def solve_balance(
 
 
 def _numpy_balance(
-    body: Chain,
+    body: Links,
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,

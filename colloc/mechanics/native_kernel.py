@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.links import Links
 from colloc.numerics.c_compiler import c_compiler, cache_folder, compile_library
 from colloc.system.errors import StoreError
 from colloc.system.private_folder import is_private, make_private
@@ -48,11 +48,11 @@ _SIGNATURES = {
 }
 
 
-_ANY = Chain()
+_ANY = Links()
 _switched_off = False
 
 
-def native_kernel(body: Chain = _ANY) -> ctypes.CDLL | None:
+def native_kernel(body: Links = _ANY) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
     return library() if body.in_series and not _switched_off else None
 

@@ -9,14 +9,13 @@ that the slightest inertia leaves.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant
-from colloc.mechanics.body import Chain
-from colloc.mechanics.fixed_point import BalanceSolution, solve_balance
+from colloc.mechanics.bodies import BalanceSolution, Branches
+from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.links import Links
 
 DISTINCT = 1e-5
 """Velocities that differ by less, in units of the largest rate, are one."""
@@ -29,37 +28,12 @@ _BETWEEN = (0.5, 0.2, 0.8, 0.05, 0.95, 0.02, 0.98, 0.005, 0.995)
 """The same from one solution to another, as parts of the way: the third often lies next to one of them."""
 
 
-class Branches(NamedTuple):
-    """Balanced velocities of instants, from one to `n_root` each.
-
-    Attributes
-    ----------
-    z : (n_root, 3, n_time)
-        Tail velocities (u, v, omega) in the body frame; NaN beyond those that were found.
-    sign : (n_root, n_time)
-        Of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0 beyond those that were found.
-    """
-
-    z: np.ndarray
-    sign: np.ndarray
-
-    @property
-    def number(self) -> np.ndarray:
-        """How many were found, ``(n_time,)``; 0 where the solver failed."""
-        return (self.sign != 0).sum(axis=0)
-
-    @property
-    def complete(self) -> np.ndarray:
-        """Whether the signs add up to 1, as they do over all solutions, ``(n_time,)``."""
-        return self.sign.sum(axis=0) == 1
-
-
-def all_balanced_velocities(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
+def all_balanced_velocities(body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
     """Every balanced velocity that can be found, the one of `solve_balance` first.
 
     Parameters
     ----------
-    body : Chain
+    body : Links
     friction : Friction
         With equal coefficients there is one, and it is solved for once.
     angles, rates : (n_joint, n_time)
@@ -77,7 +51,7 @@ def all_balanced_velocities(body: Chain, friction: Friction, angles: np.ndarray,
     Three links with friction (1, 0.01, 100), the first joint turning:
 
     >>> at = np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
-    >>> found = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), *at, 1e-4)
+    >>> found = all_balanced_velocities(Links(), Friction(1, 0.01, 100), *at, 1e-4)
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
     (array([3]), array([2.994, 2.96 , 2.987]), array([ 1.,  1., -1.]))
     """
@@ -104,13 +78,13 @@ def _speed(rates: np.ndarray) -> np.ndarray:
     return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
 
 
-def _with_link_at_rest(body: Chain, angles: np.ndarray, rates: np.ndarray, link: int) -> np.ndarray:
+def _with_link_at_rest(body: Links, angles: np.ndarray, rates: np.ndarray, link: int) -> np.ndarray:
     """Tail velocity ``(3, n_time)`` of the body when one of its links does not move."""
     return body.tail_velocity(body.posture(angles, link), rates, np.zeros((3, angles.shape[1])), link)
 
 
 def _solved(
-    body: Chain,
+    body: Links,
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,
@@ -129,7 +103,7 @@ def _solved(
 
 
 def _determinant(
-    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> np.ndarray:
     """Of `balance_jacobian`, ``(n_time,)``; the reference does not matter, but the slowest link loses no digits."""
     result = np.empty(solved.anchor.size)
@@ -143,7 +117,7 @@ def _determinant(
 
 
 def _between_and_beside(
-    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
+    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
 ) -> np.ndarray:
     """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest direction of each."""
     starts = [z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN]

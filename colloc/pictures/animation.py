@@ -48,7 +48,7 @@ class _Scene:
     """A figure whose artists move."""
 
     def __init__(self, solution: Solution | RelaxedSolution, shown: Frames, arrows: bool, width: int) -> None:
-        self.shown = shown
+        self.shown, self.hinges = shown, solution.problem.body.hinges
         low, high = _window(shown)
         planar = solution.problem.body.n_joint >= 2
         share = 0.68 if planar else 0.97
@@ -106,7 +106,7 @@ class _Scene:
         shown, shift = self.shown, period * self.shown.step
         ends = shown.ends[:, :, k] + shift[:, None]
         self.body.set_data(*ends)
-        self.joints.set_data(*ends[:, 1:-1])
+        self.joints.set_data(*ends[:, self.hinges])
         self.head.set_data(*ends[:, -1:])
         self.centre.set_data(*(shown.centre[:, [k]] + shift[:, None]))
         for line, path in zip(self.trails, (shown.ends[:, 0], shown.ends[:, -1], shown.centre), strict=True):

@@ -12,10 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from colloc.gaits.problem import Problem
-from colloc.mechanics.balance import instant
-from colloc.mechanics.body import Chain
-from colloc.mechanics.contact import crossing_depth
-from colloc.pictures.motion_frames import link_ends
+from colloc.mechanics.bodies import Body
+from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours, styled
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import SOLVED, Solution
@@ -32,14 +30,14 @@ def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int 
     """The body at equal steps of a period, side by side and apart; below, the phase and how far its centre has come."""
     t = np.linspace(0.0, 1.0, count)
     motion = solution.sample(t)
-    x, y = link_ends(solution.problem.body, motion.angles, motion.theta, motion.tail)
+    x, y = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
     width = np.ptp(x, axis=0)
     room = np.maximum(width, _NARROWEST) + _GAP
     middle = np.cumsum(room) - 0.5 * room
     shift = middle - 0.5 * (x.min(axis=0) + x.max(axis=0))
     low = float(y.min()) - 0.04
     for k, colour in enumerate(snapshot_colours(count)):
-        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour)
+        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body.hinges)
         axes.plot(motion.centre[0, k] + shift[k], motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
         axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, 0), color=GREY, **below)
@@ -48,10 +46,10 @@ def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int 
     axes.set_axis_off()
 
 
-def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray) -> None:
-    """One body from the ends of its links, ``(2, n_link + 1)``: its joints hollow, its head a disc."""
+def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, hinges: slice) -> None:
+    """One body from its outline, ``(2, n_point)``: its joints hollow, its head a disc."""
     axes.plot(*ends, "-", color=colour, lw=2.4, solid_capstyle="round", solid_joinstyle="round")
-    axes.plot(*ends[:, 1:-1], "o", color="white", mec=colour, ms=3.5)
+    axes.plot(*ends[:, hinges], "o", color="white", mec=colour, ms=3.5)
     axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
 
 
@@ -61,25 +59,25 @@ def draw_lab(axes: Axes, solution: Solution | RelaxedSolution) -> None:
     As many periods as it takes for the body to leave the place where it began, and one body if that takes too many.
     """
     start = solution.sample(0.0)
-    begin = link_ends(solution.problem.body, start.angles, start.theta, start.tail)[:, :, 0]
+    begin = lab_outline(solution.problem.body, start.angles, start.theta, start.tail)[:, :, 0]
     step = solution.sample(1.0).centre[:, 0] - start.centre[:, 0]
     distance = float(np.hypot(*step))
     needed = 1.05 * float(np.ptp(step @ begin)) / max(distance**2, 1e-300)
     apart = needed <= _MOST_PERIODS
     periods = max(1, int(np.ceil(needed))) if apart else 1
     fine = solution.sample(np.linspace(0.0, periods, 600 * periods + 1))
-    ends = link_ends(solution.problem.body, fine.angles, fine.theta, fine.tail)
+    ends = lab_outline(solution.problem.body, fine.angles, fine.theta, fine.tail)
     for path, colour, name in ((ends[:, 0], BLUE, "tail"), (ends[:, -1], ORANGE, "head"), (fine.centre, VERMILION, "centre")):
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
-        draw_body(axes, ends[:, :, k], shade)
+        draw_body(axes, ends[:, :, k], shade, solution.problem.body.hinges)
         axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
     axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]")
     _key(axes)
 
 
-def forbidden(body: Chain, joint_limit: float, cells: int = 180) -> tuple[np.ndarray, np.ndarray]:
+def forbidden(body: Body, joint_limit: float, cells: int = 180) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of joint angles that joint limits or, for two joints, crossing links forbid.
 
     Returns
@@ -91,25 +89,27 @@ def forbidden(body: Chain, joint_limit: float, cells: int = 180) -> tuple[np.nda
     """
     grid = np.linspace(-np.pi, np.pi, cells + 1)
     a, b = np.meshgrid(grid, grid)
-    excess = np.maximum(np.maximum(abs(a), abs(b)) - joint_limit, 0.0)
+    shapes = np.zeros((body.n_joint, a.size))
+    shapes[:2] = a.ravel(), b.ravel()
+    excess = np.maximum(body.largest_angles(shapes) - joint_limit, 0.0)
     if body.n_joint == 2:
-        excess = np.maximum(excess, crossing_depth(body, np.stack([a.ravel(), b.ravel()])).reshape(a.shape))
-    return grid, excess
+        excess = np.maximum(excess, body.crossing_depth(shapes))
+    return grid, excess.reshape(a.shape)
 
 
-def draw_allowed(axes: Axes, body: Chain, joint_limit: float) -> None:
+def draw_allowed(axes: Axes, body: Body, joint_limit: float) -> None:
     """Grey over the pairs of joint angles that are forbidden."""
     grid, excess = forbidden(body, joint_limit)
     if excess.max() > 1e-9:
         axes.contourf(grid, grid, excess, levels=[1e-9, 10.0], colors=[GREY], alpha=0.4)
 
 
-def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray) -> None:
-    """All joint angles over a period."""
+def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> None:
+    """All joint angles, or amplitudes of modes, over a period."""
     for j, joint in enumerate(angles):
         axes.plot(t, joint, lw=1.4, color=SERIES[j % len(SERIES)], label=f"{j + 1}")
-    axes.set(xlim=(0, 1), xlabel="phase t", ylabel="joint angle  [rad]")
-    _key(axes, "joint")
+    axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{body.quantity}  [rad]")
+    _key(axes, body.coordinate)
 
 
 def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
@@ -136,21 +136,22 @@ def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int
         axes.set_yticks(ticks, labels)
     (x, y) = middle
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
-    axes.set(xlabel=f"joint angle {first + 1}  [rad]", ylabel=f"joint angle {second + 1}  [rad]")
+    what = problem.body.quantity
+    axes.set(xlabel=f"{what} {first + 1}  [rad]", ylabel=f"{what} {second + 1}  [rad]")
 
 
 def draw_speeds(axes: Axes, solution: Solution, t: np.ndarray) -> None:
-    """Speeds of the link midpoints over a period, on a logarithmic scale that shows stick, and delta."""
+    """Speeds of links, or of other parts, over a period, on a logarithmic scale that shows stick, and delta."""
     problem, motion, delta = solution.problem, solution.sample(t), solution.delta_per_period
-    link = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, delta).velocity
-    speed = np.maximum(np.hypot(link.vs, link.vn), 0.1 * delta)
+    part, speed = problem.body.speeds(motion.angles, motion.rates, motion.z)
+    speed = np.maximum(speed, 0.1 * delta)
     for i, along in enumerate(speed):
         axes.plot(t, along, color=SERIES[i % len(SERIES)], lw=1.4, label=f"{i + 1}")
     axes.axhline(delta, color=GREY, lw=1, ls=":")
     axes.annotate("δ", (1.0, delta), (3, 0), textcoords="offset points", color=GREY, va="center")
-    axes.set(xlim=(0, 1), ylabel="midpoint speed  [1/period]", xlabel="phase t")
+    axes.set(xlim=(0, 1), ylabel=f"{part} speed  [1/period]", xlabel="phase t")
     set_log(axes, "y", (0.5 * float(min(speed.min(), delta)), 2 * float(speed.max())))
-    _key(axes, "link")
+    _key(axes, part)
 
 
 def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
@@ -218,13 +219,13 @@ def solution_figure(solution: Solution) -> Figure:
         if len(angles) == 2:
             draw_shape_path(plane, solution.problem, angles)
         else:  # no one plane shows them all
-            draw_angles(plane, t, angles)
+            draw_angles(plane, t, angles, solution.problem.body)
         draw_speeds(speeds, solution, t)
         draw_power(power, solution, t)
         titles = (
             "in the lab (black: at the end)",
-            "shape space (disc: t = 0)" if len(angles) == 2 else "joint angles",
-            "speeds of the links; near δ they stick",
+            "shape space (disc: t = 0)" if len(angles) == 2 else f"{solution.problem.body.quantity}s",
+            "speeds along the body; what is near δ sticks",
             f"W = {solution.measured.work:.4f} a period (ticks: mesh)",
         )
         for axes, title in zip((lab, plane, speeds, power), titles, strict=True):

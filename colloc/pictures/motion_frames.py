@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.balance import instant
-from colloc.mechanics.body import Chain
-from colloc.mechanics.friction import force_density
+from colloc.mechanics.bodies import ARROWS, Body
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
 
@@ -24,12 +22,12 @@ class Frames:
     ----------
     t : (n_time,)
     angles : (n_joint, n_time)
-    ends : (2, n_link + 1, n_time)
-        Lab positions of the link ends, tail first.
+    ends : (2, n_point, n_time)
+        Lab positions of the body's outline (the ends of links), tail first.
     centre : (2, n_time)
         Of mass.
     arrow_base, arrow : (2, n_arrow, n_time)
-        Where friction is shown, `per_link` points a link, and the force per length there, in lab axes.
+        Where friction is shown, and the force per length there, in lab axes.
     step : (2,)
         What a period adds to every position.
     periods : int
@@ -46,14 +44,18 @@ class Frames:
     periods: int
 
 
-def link_ends(body: Chain, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
-    """Lab positions of the ends of all links, ``(2, n_link + 1, n_time)``."""
-    x, y = body.joints(angles)
-    c, s = np.cos(theta), np.sin(theta)
-    return np.stack([tail[0] + c * x - s * y, tail[1] + s * x + c * y])
+def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
+    """Lab positions of the outline of a body, ``(2, n_point, n_time)``."""
+    return tail[:, None] + turned(np.stack(body.outline(angles)), theta)
 
 
-def frames(solution: Solution | RelaxedSolution, count: int = 241, per_link: int | None = None, periods: int = 3) -> Frames:
+def turned(vectors: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Vectors ``(2, ..., n_time)`` of the body's axes in those of the lab."""
+    (x, y), c, s = vectors, np.cos(theta), np.sin(theta)
+    return np.stack([c * x - s * y, s * x + c * y])
+
+
+def frames(solution: Solution | RelaxedSolution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
     """Sample a solution's motion and the friction that acts on it.
 
     Parameters
@@ -62,34 +64,24 @@ def frames(solution: Solution | RelaxedSolution, count: int = 241, per_link: int
         With at least one level.
     count : int
         Instants, both ends of the period included.
-    per_link : int, optional
-        Arrows a link; by default fewer on bodies of many links.
+    arrows : int
+        Along the body, about.
     periods : int
         How many periods to show where the body does not turn.
     """
     problem = solution.problem
     body, delta = problem.body, solution.delta_per_period
     motion = solution.sample(np.linspace(0.0, 1.0, count))
-    ends = link_ends(body, motion.angles, motion.theta, motion.tail)
-    velocity = instant(body, problem.friction, motion.angles, motion.rates, motion.z, delta).velocity
-    many = per_link or max(2, 12 // body.n_link)
-    share = (np.arange(many) + 0.5) / many
-    heading = body.tangent_angles(motion.angles) + motion.theta
-    bases, arrows = [], []
-    for at in share:
-        normal = velocity.vn + (at - 0.5) * body.length_column() * velocity.w
-        along, across = force_density(velocity.vs, normal, delta, problem.friction)
-        cos, sin = np.cos(heading), np.sin(heading)
-        arrows.append(np.stack([along * cos - across * sin, along * sin + across * cos]))
-        bases.append((1 - at) * ends[:, :-1] + at * ends[:, 1:])
+    ends = lab_outline(body, motion.angles, motion.theta, motion.tail)
+    places, forces = body.rubbing(problem.friction, motion.angles, motion.rates, delta, motion.z, arrows)
     straight = abs(float(motion.theta[-1] - motion.theta[0])) < _STRAIGHT
     return Frames(
         motion.t,
         motion.angles,
         ends,
         motion.centre,
-        np.concatenate(bases, axis=1),
-        np.concatenate(arrows, axis=1),
+        motion.tail[:, None] + turned(places, motion.theta),
+        turned(forces, motion.theta),
         motion.centre[:, -1] - motion.centre[:, 0],
         periods if straight else 1,
     )

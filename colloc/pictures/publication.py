@@ -83,7 +83,7 @@ def panels(solution: Solution) -> dict[str, Panel]:
     found = {
         "filmstrip": Panel(PAGE, 1.9, lambda axes: draw_filmstrip(axes, solution, count=6)),
         "lab": Panel(PAGE, 3.0, lambda axes: draw_lab(axes, solution)),
-        "angles": Panel(COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles)),
+        "angles": Panel(COLUMN, 2.2, lambda axes: draw_angles(axes, t, angles, solution.problem.body)),
         "speeds": Panel(COLUMN, 2.4, lambda axes: draw_speeds(axes, solution, t)),
         "power": Panel(COLUMN, 2.4, lambda axes: draw_power(axes, solution, t)),
         "convergence": Panel(COLUMN, 2.2, lambda axes: draw_convergence(axes, solution)),

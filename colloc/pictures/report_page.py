@@ -31,12 +31,14 @@ PLAIN = {
     "closure": "The body ends a cycle in the shape in which it began.",
     "net rotation": "It ends the cycle pointing the same way, so that it crawls straight on.",
     "joint limits": "No joint bends further than it may, at any instant.",
-    "self-contact": "No link passes through another, at any instant.",
+    "tangent angle": "The body bends no further from its own direction than it may, so that it cannot cross itself.",
+    "self-contact": "No part of the body passes through another, at any instant.",
     "replay gap": "An independent replay of the motion finds the same efficiency.",
     "replay error": "The replay itself is as exact as was asked for.",
-    "work = dissipation": "All work of the joints goes into friction: energy is conserved.",
+    "work = dissipation": "All work of what bends the body goes into friction: energy is conserved.",
     "mesh error": "More time steps would hardly change the efficiency.",
     "delta influence": "Friction is smoothed a little at rest; that hardly changes the efficiency.",
+    "one motion": "Friction leaves the body no choice of another motion, or none that changes the efficiency.",
     "joins": "The pieces of the path meet without a jump.",
     "curvature": "The path bends no more sharply than it may.",
 }
@@ -82,15 +84,16 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
         drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
         drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
         planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
-        captions = {"angles": "joint angles", "speeds": "speeds of the links; near δ they stick"}
+        body = solution.problem.body
+        captions = {"angles": f"{body.quantity}s", "speeds": "speeds along the body; what is near δ sticks"}
         captions["power"] = "power against friction; ticks: mesh"
-        found["gait_pictures"] = [_plane(drawn[name], j) for j, name in enumerate(planes)]
+        found["gait_pictures"] = [_plane(drawn[name], body.coordinate, j) for j, name in enumerate(planes)]
         found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
         found["convergence_pictures"] = [
             _picture(drawn["convergence"], "efficiency at each level"),
             _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
         ]
-        found |= {"motion": motion_data(frames(solution)), "errors": float(errors.sum())}
+        found |= {"motion": motion_data(frames(solution), body.hinges), "errors": float(errors.sum())}
     return (
         environment()
         .get_template("report.html")
@@ -147,8 +150,8 @@ def _commands(solution: Solution) -> str:
     )
 
 
-def _plane(panel: Panel, j: int) -> Picture:
-    return _picture(panel, f"joints {j + 1} and {j + 2}", joints=(j, j + 1))
+def _plane(panel: Panel, coordinate: str, j: int) -> Picture:
+    return _picture(panel, f"{coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1))
 
 
 def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False) -> Picture:
@@ -171,7 +174,7 @@ def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, 
     return Picture(caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase)
 
 
-def motion_data(shown: Frames) -> dict[str, Any]:
+def motion_data(shown: Frames, hinges: slice) -> dict[str, Any]:
     """What report.js draws: rows over time, the window that holds all of it, the length of the arrows."""
     last = (shown.periods - 1) * shown.step
     reach = np.concatenate([shown.ends.reshape(2, -1), shown.ends.reshape(2, -1) + last[:, None]], axis=1)
@@ -185,6 +188,8 @@ def motion_data(shown: Frames) -> dict[str, Any]:
     data: dict[str, Any] = {name: np.round(row, 4).tolist() for name, row in rows.items()}
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
-        "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": 0.12 / strongest, "grid": grid,
+        "hinges": hinges.indices(len(shown.ends[0]))[:2],
+        "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": 0.12 / strongest,
+        "grid": grid,
         "shape": float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 1.2, 4.0)),
     }  # fmt: skip

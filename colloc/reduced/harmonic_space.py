@@ -11,7 +11,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.mechanics.contact import Pairs
+from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 
 
@@ -90,11 +90,11 @@ class HarmonicSpace:
                 continue
             values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
             self._placed.append((check, held_shares(check, gait, times), matrix))
-            excess = max(excess, float((np.abs(values) - limit if check.on_joint else values).max()))
-            # of the two bounds on a joint the nearer one
-            below = check.on_joint & (values < 0)
-            low.append(np.where(below, -limit, -np.inf))
-            high.append(np.where(below, np.inf, limit if check.on_joint else 0.0))
+            excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.bounds(limit)
+            # of the two bounds on an angle the nearer one
+            below = values - lower < upper - values
+            low.append(np.where(below, lower, -np.inf))
+            high.append(np.where(below, np.inf, upper))
         self.watched["shape speed"] = np.zeros(1, dtype=int)
         self.row_lower = np.concatenate([*low, [self.problem.smallest_shape_speed**2]])
         self.row_upper = np.concatenate([*high, [np.inf]])
@@ -107,14 +107,14 @@ class HarmonicSpace:
 
     @staticmethod
     def _value(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        if check.on_joint:
-            return matrix[:, check.joint] @ v
+        if check.row is not None:
+            return (check.row @ matrix) @ v
         return check.cut((matrix @ v).T, shares[None]).full().ravel()
 
     @staticmethod
     def _slope(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        if check.on_joint:
-            return matrix[:, check.joint]
+        if check.row is not None:
+            return check.row @ matrix
         return np.einsum("jt,tjp->tp", check.slope((matrix @ v).T, shares[None]).full(), matrix)
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:

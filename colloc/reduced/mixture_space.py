@@ -12,7 +12,7 @@ from colloc.gaits.mixture import Mixture
 from colloc.gaits.path_samples import Gait, symmetric_samples
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import end_conditions
-from colloc.mechanics.contact import Pairs
+from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
@@ -172,14 +172,16 @@ class MixtureSpace:
         self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
         closing = np.zeros(len(self._first))
         for check in self._checks:
-            values = check.value(angles).full().ravel()
-            beyond = np.abs(values) - limit if check.on_joint else values
+            values = check.along(angles)
+            beyond = check.excess(values, limit)
             at = np.flatnonzero(beyond > -_NEAR)
-            below = check.on_joint & (values[at] < 0)
+            lower, upper = check.bounds(limit)
+            # of the two bounds on an angle the nearer one
+            below = values[at] - lower < upper - values[at]
             self._placed.append(at)
             self.watched[check.name] = at
-            low.append(np.where(below, -limit, -np.inf))
-            high.append(np.where(below, np.inf, limit if check.on_joint else 0.0))
+            low.append(np.where(below, lower, -np.inf))
+            high.append(np.where(below, np.inf, upper))
             excess = max(excess, float(beyond.max()))
         self.row_lower = np.concatenate([closing, *low, [self._least]])
         self.row_upper = np.concatenate([closing, *high, [np.inf]])
@@ -189,9 +191,7 @@ class MixtureSpace:
         """Values of the rows."""
         shapes = self.member(v).shapes
         values = [
-            check.value(shapes @ self._watch[at].T).full().ravel()
-            for check, at in zip(self._checks, self._placed, strict=True)
-            if at.size
+            check.along(shapes @ self._watch[at].T) for check, at in zip(self._checks, self._placed, strict=True) if at.size
         ]
         return np.concatenate([self._first @ shapes[:, 0] + self._last @ shapes[:, -1], *values, [v[self.time].sum()]])
 

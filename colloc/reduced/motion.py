@@ -18,9 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from colloc.gaits.symmetry import ANTIPODAL, BOTH
-from colloc.mechanics.body import Chain
-from colloc.mechanics.chain_motion import chain_motion, chain_slopes
-from colloc.mechanics.fixed_point import BalanceSolution, solve_balance
+from colloc.mechanics.bodies import BalanceSolution, Body
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
 
@@ -28,7 +26,7 @@ _TOLERANCE = 1e-12
 _ACCEPTED = 1e3
 """Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
 _OMEGA, _OUTPUTS = 2, slice(2, 6)
-"""Among the rows of `colloc.mechanics.chain_motion.chain_slopes`: rotation rate; the same, velocity of the centre, power."""
+"""Among the rows of `colloc.mechanics.bodies.Body.slopes`: rotation rate; the same, velocity of the centre, power."""
 
 
 class Shapes(Protocol):
@@ -79,7 +77,7 @@ class ReducedMotion:
     shapes : Shapes
     """
 
-    def __init__(self, body: Chain, friction: Friction, symmetry: str, mesh: Mesh, shapes: Shapes) -> None:
+    def __init__(self, body: Body, friction: Friction, symmetry: str, mesh: Mesh, shapes: Shapes) -> None:
         self.body, self.friction, self.shapes, self.mesh = body, friction, shapes, mesh
         # share of the rotation, and of the sum of all bends, by which the direction of travel is turned
         self._turned_by = {ANTIPODAL: (0.5, 0.0), BOTH: (1.0, 0.5)}.get(symmetry)
@@ -94,10 +92,10 @@ class ReducedMotion:
         if last is not None and last.delta == delta and np.array_equal(last.v, v):
             return last
         angles, rates, pace = self.shapes.at(v)
-        at = (self.body, self.friction, angles, rates, delta)
-        solved = solve_balance(*at, start=self._start(angles, rates), tolerance=_TOLERANCE)
+        at = (self.friction, angles, rates, delta)
+        solved = self.body.solve(*at, start=self._start(angles, rates), tolerance=_TOLERANCE)
         self.solves += 1
-        now = chain_motion(*at, solved)
+        now = self.body.motion(*at, solved)
         out = np.vstack([now.z[_OMEGA], now.centre, now.power])
         out[:, ~(solved.residual < _ACCEPTED * _TOLERANCE)] = np.nan
         mesh, points = self.mesh, self.mesh.points
@@ -147,7 +145,7 @@ class ReducedMotion:
     def gradients(self, v: np.ndarray, delta: float) -> np.ndarray:
         """Derivatives of `values`, ``(2, n)``."""
         s, mesh, rule, h = self.at(v, delta), self.mesh, self.mesh.scheme, self.mesh.h[:, None]
-        slopes = chain_slopes(self.body, self.friction, s.angles, s.rates, delta, s.solved)[1]
+        slopes = self.body.slopes(self.friction, s.angles, s.rates, delta, s.solved)
         self._near = (s, slopes)
         back = np.conj(self._direction(s))
         distance = (s.displacement * back).real

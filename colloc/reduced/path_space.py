@@ -19,7 +19,7 @@ from colloc.gaits.path_classes import FreePath
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
-from colloc.mechanics.contact import Pairs
+from colloc.mechanics.bodies import Pairs
 from colloc.numerics.blocks import as_sparse, oracles
 from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
@@ -211,7 +211,7 @@ class PathSpace:
             tau[cells] = np.clip((times - mesh.edges[cells]) / mesh.h[cells], 0.0, 1.0)
             given[check.name][:-1] = self._geometry.given(tau)
             given[check.name][-1, cells] = held_shares(check, gait, times)
-            excess = max(excess, float((np.abs(values) - limit if check.on_joint else values).max()))
+            excess = max(excess, float(check.excess(values, limit).max()))
         self._kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
         self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
         objective = fit.assembly.objective.parameters

@@ -9,7 +9,7 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
-from colloc.mechanics.contact import Pairs
+from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.motion import ReducedMotion, Shapes
 

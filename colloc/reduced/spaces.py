@@ -11,7 +11,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.symmetry import ANTIPODAL
-from colloc.mechanics.contact import Pairs
+from colloc.mechanics.bodies import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace

@@ -15,9 +15,6 @@ import numpy as np
 from colloc.gaits.mixture import Mixture, corners_of
 from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
-from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.chain_motion import chain_motion
-from colloc.mechanics.fixed_point import solve_balance
 from colloc.results.certificate import VIOLATION, corner_phases, gait_certificate
 from colloc.results.checks import Certificate, Check
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED, Motion, versions
@@ -161,8 +158,8 @@ class RelaxedSolution:
         edges = np.union1d(np.linspace(0.0, 1.0, _GRID + 1), corner_phases(gait))
         edges = edges[np.append(True, np.diff(edges) > 1e-12)]
         middle, h = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
-        at = body, problem.friction, gait.angles(middle), gait.rates(middle), self.delta_per_period
-        motion = chain_motion(*at, solve_balance(*at).require())
+        at = problem.friction, gait.angles(middle), gait.rates(middle), self.delta_per_period
+        motion, _ = body.replayed(*at, None)
         theta = np.concatenate([[0.0], np.cumsum(h * motion.z[2])])
         steps = h * np.exp(0.5j * (theta[1:] + theta[:-1])) * (motion.centre[0] + 1j * motion.centre[1])
         centre = np.concatenate([[0.0], np.cumsum(steps)])
@@ -178,7 +175,7 @@ class RelaxedSolution:
         place = np.interp(phase, edges, centre.real) + 1j * np.interp(phase, edges, centre.imag) + period * centre[-1]
         theta_at = np.interp(phase, edges, theta) + period * (theta[-1] - theta[0])
         angles, body = self.gait.angles(phase), self.problem.body
-        cx, cy = body.centre(body.posture(angles))
+        cx, cy = body.centre(angles)
         tail = place - np.exp(1j * theta_at) * (cx + 1j * cy)
         lab = np.stack([place.real, place.imag])
         return Motion(t, angles, self.gait.rates(phase), z, theta_at, lab, np.stack([tail.real, tail.imag]))
@@ -186,8 +183,8 @@ class RelaxedSolution:
     def power(self, motion: Motion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         problem = self.problem
-        now = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, self.delta_per_period)
-        return total_power(now.velocity, now.force)[0]
+        delta = np.full((1, motion.t.size), self.delta_per_period)
+        return problem.body.sliding(problem.friction, motion.angles, motion.rates, motion.z, delta).power[0]
 
     def recertified(self, instants: int, tolerance: float = 1e-6) -> RelaxedSolution:
         """The same with all certificates made anew, on so many instants to begin with."""

@@ -15,8 +15,7 @@ import numpy as np
 from colloc.collocation.layout import Layout, problem_layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.mechanics.balance import Instant, instant, total_power
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.bodies import Sliding
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.alternative import Alternative
@@ -154,10 +153,12 @@ class Solution:
         """Regularisation speed of the last level in body lengths per period, whatever the class measures it in."""
         return self.last.delta * self.gait.delta_unit
 
-    def at_points(self) -> tuple[np.ndarray, Instant]:
+    def at_points(self) -> tuple[np.ndarray, Sliding]:
         """Phases of the collocation points and the body there, from the variables of the last level (per period)."""
         problem = self.problem
-        return self.mesh.times, instant(problem.body, problem.friction, *self._point_motion(), self.delta_per_period)
+        angles, rates, z = self._point_motion()
+        delta = np.full((1, z.shape[1]), self.delta_per_period)
+        return self.mesh.times, problem.body.sliding(problem.friction, angles, rates, z, delta)
 
     def _point_motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates and tail velocities per period at the collocation points."""
@@ -167,7 +168,7 @@ class Solution:
             return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
         gait, times = self.gait, self.mesh.times
         angles, rates = gait.angles(times), gait.rates(times)
-        return angles, rates, solve_balance(problem.body, problem.friction, angles, rates, self.delta_per_period).z
+        return angles, rates, problem.body.solve(problem.friction, angles, rates, self.delta_per_period).z
 
     def sample(self, t: np.ndarray | float) -> Motion:
         """The motion at phases t, any real numbers; whole periods add up.
@@ -188,12 +189,9 @@ class Solution:
         angles, rates = self.gait.angles(phase), self.gait.rates(phase)
         if symmetry == "bilateral":
             # seen from the head the body repeats itself with reversed rates
-            here = instant(
-                body, self.problem.friction, self.gait.angles(reduced), self.gait.rates(reduced), z, self.delta_per_period
-            ).velocity
-            head = np.stack([here.vs[-1], here.vn[-1] + 0.5 * body.lengths[-1] * here.w[-1], -here.w[-1]])
+            head, heading = body.seen_from_head(self.gait.angles(reduced), self.gait.rates(reduced), z)
             z = np.where(second, head, z)
-            theta = np.where(second, theta + self.gait.angles(reduced).sum(axis=0), theta)
+            theta = np.where(second, theta + heading, theta)
             centre = np.where(second, 2 * end[:, None] - centre, centre)
             end = 2 * end
         elif symmetry == "antipodal":
@@ -204,9 +202,9 @@ class Solution:
             centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
             end = np.array([2 * end[0], 0.0])
         centre = centre + period * end[:, None]
-        cx, cy = body.centre(body.posture(angles))
+        cx, cy = body.centre(angles)
         c, s = np.cos(theta), np.sin(theta)
-        tail = centre - np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
+        tail = centre - np.stack([c * cx - s * cy, s * cx + c * cy])
         return Motion(t, angles, rates, z, theta, centre, tail)
 
     def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -219,9 +217,9 @@ class Solution:
         _, now = self.at_points()
         site_theta = np.empty(mesh.n_point)
         site_theta[mesh.points] = x[layout.theta[0]][mesh.sites]
-        cx, cy = self.problem.body.centre_velocity(now.posture, now.velocity)
+        cx, cy = now.centre
         c, s = np.cos(site_theta), np.sin(site_theta)
-        lab = np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
+        lab = np.stack([c * cx - s * cy, s * cx + c * cy])
         steps = np.einsum("ks,cks,k->ck", np.broadcast_to(scheme.b, (mesh.n, scheme.s)), lab[:, mesh.points], mesh.h)
         edges = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
         points = mesh.points[k]
@@ -233,8 +231,8 @@ class Solution:
     def power(self, motion: Motion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         problem = self.problem
-        now = instant(problem.body, problem.friction, motion.angles, motion.rates, motion.z, self.delta_per_period)
-        return total_power(now.velocity, now.force)[0]
+        delta = np.full((1, motion.t.size), self.delta_per_period)
+        return problem.body.sliding(problem.friction, motion.angles, motion.rates, motion.z, delta).power[0]
 
     def plot(self) -> Any:
         """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it."""

@@ -49,13 +49,13 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
     index, body, mesh = row - rows.start, transcription.problem.body, transcription.mesh
     if name in ("angles", "rates"):
         point, joint = divmod(index, body.n_joint)
-        return f"the {name[:-1]} of joint {joint + 1} against its gait", float(mesh.times[point])
+        return f"the {name[:-1]} of {body.coordinate} {joint + 1} against its gait", float(mesh.times[point])
     if name == "balance":
         point, component = divmod(index, 3)
         return f"the balance of {_COMPONENTS[component]}", float(mesh.times[point])
     if name == "force law":
-        point, which = divmod(index, 3 * body.n_link)
-        kind, link = divmod(which, body.n_link)
+        point, which = divmod(index, body.n_force)
+        kind, link = divmod(which, body.n_force // 3)
         return f"the friction law of the {_LAWS[kind]} on link {link + 1}", float(mesh.times[point])
     if name == "orientation":
         return "the rotation between nodes", float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
@@ -66,8 +66,10 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
     if name == "shape speed":
         return "the lower bound on the shape speed", 0.0
     phase = float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
-    if name.startswith(("joint", "links")):
-        return ("the limit of " if name.startswith("joint") else "contact of ") + name, phase
+    if name in body.limit_names:
+        return f"the limit of {name}", phase
+    if name.startswith("links"):
+        return f"contact of {name}", phase
     return _PATH.get(name, f"the {name}"), phase
 
 
@@ -105,7 +107,7 @@ def _advice(group: str) -> str:
         return "start the continuation at a larger delta_start, use more intervals, or another formulation"
     if group == "rotation":
         return "start from a guess with less net rotation, or impose a symmetry that closes it"
-    if group.startswith(("joint", "links")):
+    if group.startswith(("joint", "links", "tangent")):
         return "start from a guess of smaller amplitude"
     return "use more intervals or another guess"
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.mechanics.contact import Pairs, crossing_depth, far_pairs, passing_depth
+from colloc.mechanics.bodies import Pairs
 
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs are checked; the certificate checks 20000 a period."""
@@ -44,8 +44,8 @@ def crossing_pairs(program: Members, parameters: np.ndarray) -> Pairs:
     angles = program.member(parameters).angles(t)
     return tuple(
         pair
-        for pair in far_pairs(body)
-        if max(crossing_depth(body, angles, [pair]).max(), passing_depth(body, angles, [pair])) > TOUCHING
+        for pair in body.far_pairs
+        if max(body.crossing_depth(angles, [pair]).max(), body.passing_depth(angles, [pair])) > TOUCHING
     )
 
 

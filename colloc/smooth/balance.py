@@ -15,7 +15,7 @@ import numpy as np
 from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
 from colloc.mechanics.friction import Friction, force_density
 from colloc.smooth.batch import PanelBatch, PanelFields
-from colloc.smooth.curve import Curve, Panels, node_velocity
+from colloc.smooth.curve import Curve, Panels, bending_power, mean_velocity, node_velocity
 from colloc.smooth.motion import Motion
 from colloc.system.errors import NotConvergedError, ProblemError
 
@@ -33,6 +33,9 @@ class SmoothSolution:
     z : (3, n_time)
         Velocity of the tail in the axes of the frame in which Theta is measured, and the rotation rate of that frame.
     power : rate of work against friction
+    centre : (2, n_time)
+        Velocity of the centre of mass, in the same axes.
+    bending_power : power of what bends the body; equals `power` in balance
     power_inside : the part of it done on the arcs `regions`
     slowest : smallest speed of a whole panel: how fast the part at stick creeps
     residual : largest net force or torque, in units as in `colloc.mechanics.damped_newton.State`
@@ -44,6 +47,8 @@ class SmoothSolution:
     t: np.ndarray
     z: np.ndarray
     power: np.ndarray
+    centre: np.ndarray
+    bending_power: np.ndarray
     power_inside: np.ndarray
     slowest: np.ndarray
     residual: np.ndarray
@@ -85,10 +90,9 @@ def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     return fine[:keep]
 
 
-def _panel_integrals(body: Curve, z: np.ndarray, delta: np.ndarray, friction: Friction, panels: Panels) -> np.ndarray:
-    """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``."""
-    vs, vn = node_velocity(body, z)
-    fs, fn = force_density(vs, vn, delta, friction)
+def _panel_integrals(body: Curve, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray, panels: Panels) -> np.ndarray:
+    """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``, from its nodes' velocities and
+    forces per length."""
     densities = (
         fs * body.cos - fn * body.sin,
         fs * body.sin + fn * body.cos,
@@ -145,7 +149,8 @@ def solve_smooth(
         raise ProblemError(f"delta must be a positive finite number, not {delta!r}.")
     t = np.atleast_1d(np.asarray(t, dtype=float))
     n = t.size
-    out = {name: np.zeros(n) for name in ("power", "power_inside", "slowest", "residual", "quadrature_error")}
+    out = {name: np.zeros(n) for name in ("power", "bending_power", "power_inside", "slowest", "residual", "quadrature_error")}
+    out["centre"] = np.zeros((2, n))
     z_tail, n_panel, iterations = np.zeros((3, n)), np.zeros(n, dtype=int), np.zeros(n, dtype=int)
 
     active, edges = np.arange(n), motion.first_edges(t, panels)
@@ -175,8 +180,12 @@ def solve_smooth(
         split = np.zeros((grid.n, active.size), dtype=bool)
         for members, batch in _groups(state.anchor, make):
             chosen, z = active[members], state.velocity[:, members]
-            own = Panels(edges[:, members], order)
-            whole = _panel_integrals(Curve(*batch.curve), z, d[:, members], friction, own)
+            own, body = Panels(edges[:, members], order), Curve(*batch.curve)
+            vs, vn = node_velocity(body, z)
+            fs, fn = force_density(vs, vn, d[:, members], friction)
+            whole = _panel_integrals(body, vs, vn, fs, fn, own)
+            out["centre"][:, chosen] = mean_velocity(body, vs, vn) * speed[members]
+            out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * speed[members]
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
             inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
             out["power"][chosen] = whole[3].sum(axis=0) * speed[members]
@@ -228,7 +237,9 @@ def _panel_error(
     for cuts in ([left, right], [left, 0.5 * (left + right), right]):
         fields, _ = _motion_fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
         one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
-        integrals = _panel_integrals(Curve(*one.curve), start, delta_many, friction, fields.panels).sum(axis=1)
+        velocity = node_velocity(Curve(*one.curve), start)
+        force = force_density(*velocity, delta_many, friction)
+        integrals = _panel_integrals(Curve(*one.curve), *velocity, *force, fields.panels).sum(axis=1)
         end = one.edge_velocity(start)[:2, -1] / slow_many
         results.append(np.concatenate([integrals / friction.largest, end]))
     return np.abs(results[1] - results[0]).max(axis=0).reshape(n_panel, t.size)

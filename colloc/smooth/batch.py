@@ -21,10 +21,10 @@ class PanelBatch:
 
     def __init__(self, fields: PanelFields, friction: Friction, members: np.ndarray, reference: int) -> None:
         self.fields, self.friction, self.members, self.reference = fields, friction, members, reference
-        panels = Panels(fields.panels.edges[:, members], fields.panels.order)
+        self.panels = Panels(fields.panels.edges[:, members], fields.panels.order)
         self.edge_rate = fields.edge_rate[:, members]
         anchor_rate = self.edge_rate[reference : reference + 1]
-        self.curve = np.stack(curve(panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))
+        self.curve = np.stack(curve(self.panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))
 
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         body = Curve(*self.curve[:, :, select])

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, net_force, secant_matrix, total_power
-from colloc.mechanics.body import LinkVelocity, Posture
 from colloc.mechanics.damped_newton import State, solve, solve3, starting_state
 from colloc.mechanics.friction import Friction, density_jacobian, regularised_speed, secant_density
 from colloc.mechanics.link_friction import LinkForce, link_dissipation, link_force
+from colloc.mechanics.links import LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.bump_body import BumpBody
 from colloc.smooth.curve import Curve, node_velocity, pulled_back

@@ -15,8 +15,8 @@ from functools import cache
 
 import numpy as np
 
-from colloc.mechanics.body import LinkVelocity
 from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.links import LinkVelocity
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.curve import Curve, Panels, curve, node_velocity, resultant
 from colloc.smooth.motion import Motion

@@ -163,3 +163,25 @@ def pulled_back(body: Curve, blocks: tuple[tuple[Array, Array], ...]) -> Array:
     row_s, row_n = (body.cos, body.sin, body.arm_s), (-body.sin, body.cos, body.arm_n)
     right = [[body.weight * (blocks[i][0] * row_s[j] + blocks[i][1] * row_n[j]) for j in range(3)] for i in range(2)]
     return tuple(tuple(xp.sum_rows(row_s[i] * right[0][j] + row_n[i] * right[1][j]) for j in range(3)) for i in range(3))
+
+
+def mean_velocity(body: Curve, vs: Array, vn: Array) -> Array:
+    """Velocity of the centre of mass, ``(2, n_time)``, from that of the nodes."""
+    xp = namespace(body.cos, vs)
+    return xp.stack(
+        [
+            xp.sum_rows(body.weight * (vs * body.cos - vn * body.sin)),
+            xp.sum_rows(body.weight * (vs * body.sin + vn * body.cos)),
+        ]
+    )
+
+
+def bending_power(panels: Panels, body: Curve, tangential: np.ndarray, normal: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Power of what bends the body against a force per length, ``(n_time,)``; `rate` is that of Theta at the nodes.
+
+    The moment of all force ahead of s has the derivative ``-t x F(s)``, with F the force ahead; its work on the curvature is,
+    by parts, ``-int (n . F) dTheta/dt ds``. In balance that is the power dissipated.
+    """
+    fx, fy = tangential * body.cos - normal * body.sin, tangential * body.sin + normal * body.cos
+    ahead_x, ahead_y = (-panels.integrate(panels.widths * f, panels.n) for f in (fx, fy))
+    return -(body.weight * rate * (body.cos * ahead_y - body.sin * ahead_x)).sum(axis=0)

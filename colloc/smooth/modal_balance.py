@@ -1,7 +1,7 @@
-"""The balance of a smooth body of few modes: one statement for NumPy and CasADi, and the NumPy solver of it.
+"""The balance of a smooth body of few modes, on its panels: the velocities that keep it, and what follows from them.
 
 The velocity ``z = (u, v, omega)`` is that of the tail, in the axes in which Theta is measured, and the rotation rate of those
-axes; ``(3, n_time)``.
+axes; ``(3, n_time)``. A batch's omega, and that of an anchor, is the rotation rate of the tangent there.
 """
 
 from __future__ import annotations
@@ -10,73 +10,159 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.damped_newton import State, solve, starting_state
-from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding
+from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
+from colloc.mechanics.friction import Friction, density_jacobian, force_density
+from colloc.mechanics.implicit_slopes import implicit_changes
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.batch import PanelBatch, PanelFields
-from colloc.smooth.curve import Curve, Panels, curve, node_velocity, resultant
-from colloc.smooth.modal_body import ModalBody
+from colloc.smooth.curve import Curve, Panels, bending_power, curve, mean_velocity, node_velocity, pulled_back, resultant
+from colloc.smooth.modes import Modes
 
 TAIL = 0
 _ANCHOR_MOVES = 5
+_STEPS = 1000
 
 
-class ModalBalance(NamedTuple):
-    """Net force and torque about the tail ``(3, n_time)``, zero in balance, and the power ``(1, n_time)``."""
-
-    force: Array
-    power: Array
-
-
-def modal_balance(body: ModalBody, friction: Friction, q: Array, rates: Array, z: Array, delta: Array) -> ModalBalance:
-    """Balance and power for amplitudes and their rates ``(modes, n_time)`` (paper, eqs. ftb and W)."""
+def modal_sliding(body: Modes, friction: Friction, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+    """The balance for amplitudes and their rates ``(modes, n_time)`` (paper, eqs. ftb and W); NumPy and CasADi."""
     xp, grid = namespace(q, rates, z), body.grid
     modes = body.modes_at(grid.nodes[:, 0])
     now: Curve = curve(grid, xp.matmul(modes, q), xp.matmul(modes, rates), TAIL, np.zeros((1, 1)))
     vs, vn = node_velocity(now, z)
     fs, fn = force_density(vs, vn, delta, friction)
-    return ModalBalance(resultant(now, fs, fn), -xp.sum_rows(now.weight * (fs * vs + fn * vn)))
+    power = -xp.sum_rows(now.weight * (fs * vs + fn * vn))
+    return Sliding(resultant(now, fs, fn), mean_velocity(now, vs, vn), power)
+
+
+def _fields(body: Modes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
+    grid = Panels(np.broadcast_to(body.grid.edges, (body.panels + 1, q.shape[1])), body.order)
+    modes, at_edges = body.modes_at(body.grid.nodes[:, 0]), body.modes_at(body.grid.edges[:, 0])
+    return PanelFields(grid, modes @ q, modes @ rates, at_edges @ rates)
 
 
 def solve_modal(
-    body: ModalBody,
+    body: Modes,
     friction: Friction,
     q: np.ndarray,
     rates: np.ndarray,
     delta: float,
     start: np.ndarray | None = None,
     tolerance: float = 1e-11,
-) -> State:
-    """Velocities z that balance the body at amplitudes and rates ``(modes, n_time)``, with residuals.
+) -> BalanceSolution:
+    """Velocities z that balance the body at amplitudes and rates ``(modes, n_time)``.
 
     Parameters
     ----------
-    body : ModalBody
+    body : Modes
     friction : Friction
     q, rates : (modes, n_time)
     delta : float
         Regularisation speed in body lengths per unit of time of the rates.
     start : (3, n_time), optional
-        NaN where nothing is known.
     tolerance : float
-        Largest net force or torque over the largest coefficient.
+        Largest residual that counts as converged.
     """
     n = q.shape[1]
-    grid = Panels(np.broadcast_to(body.grid.edges, (body.panels + 1, n)), body.order)
-    modes, at_edges = body.modes_at(body.grid.nodes[:, 0]), body.modes_at(body.grid.edges[:, 0])
-    fields = PanelFields(grid, modes @ q, modes @ rates, at_edges @ rates)
+    # work in units of the largest rate: the law is homogeneous once delta scales along
+    speed = np.abs(body.modes_at(body.grid.nodes[:, 0]) @ rates).max(axis=0)
+    speed[speed == 0] = 1.0
+    fields = _fields(body, q, rates / speed)
 
     def make(members: np.ndarray, reference: int) -> PanelBatch:
         return PanelBatch(fields, friction, members, reference)
 
-    velocity = np.zeros((3, n)) if start is None else np.nan_to_num(start)
-    velocity = velocity + np.array([[0.0], [0.0], [1.0]]) * fields.edge_rate[TAIL]  # a batch's omega is that of the tangent
+    velocity = np.zeros((3, n))
+    if start is not None:
+        velocity = start / speed
+        velocity[2] += fields.edge_rate[TAIL]
     state = starting_state(np.full(n, TAIL), velocity)
-    solve(state, make, _ANCHOR_MOVES, np.full((1, n), delta), tolerance, 1000, "auto")
+    solve(state, make, _ANCHOR_MOVES, relative_delta(delta, speed), tolerance, _STEPS, "auto")
+    z = np.empty((3, n))
     for reference in np.unique(state.anchor):
         members = np.flatnonzero(state.anchor == reference)
-        tail = make(members, int(reference)).edge_velocity(state.velocity[:, members])[:, TAIL]
-        tail[2] -= fields.edge_rate[TAIL, members]
-        state.velocity[:, members] = tail
-    state.anchor[:] = TAIL
-    return state
+        z[:, members] = make(members, int(reference)).edge_velocity(state.velocity[:, members])[:, TAIL]
+    z[2] -= fields.edge_rate[TAIL]
+    converged = state.residual <= tolerance
+    return BalanceSolution(z * speed, state.residual, state.iterations, converged, state.anchor, state.velocity * speed)
+
+
+class _At(NamedTuple):
+    """Instants of one anchor: their batch, curve, nodes' velocities and forces per length."""
+
+    batch: PanelBatch
+    curve: Curve
+    vs: np.ndarray
+    vn: np.ndarray
+    fs: np.ndarray
+    fn: np.ndarray
+
+
+def _at_anchor(
+    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+) -> _At:
+    batch = PanelBatch(_fields(body, q, rates), friction, np.arange(q.shape[1]), reference)
+    now = Curve(*batch.curve)
+    vs, vn = node_velocity(now, z)
+    return _At(batch, now, vs, vn, *force_density(vs, vn, delta, friction))
+
+
+def modal_motion(
+    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+) -> BalancedMotion:
+    """The motion at instants that were solved for."""
+    n = q.shape[1]
+    centre, power, bending = np.empty((2, n)), np.empty(n), np.empty(n)
+    for reference in np.unique(solved.anchor):
+        at = solved.anchor == reference
+        velocity = solved.anchor_velocity[:, at]
+        batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q[:, at], rates[:, at], delta, int(reference), velocity)
+        centre[:, at] = mean_velocity(now, vs, vn)
+        power[at] = -(now.weight * (fs * vs + fn * vn)).sum(axis=0)
+        bending[at] = bending_power(batch.panels, now, fs, fn, batch.fields.rate)
+    return BalancedMotion(solved.z, centre, power, bending)
+
+
+def modal_slopes(
+    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+) -> np.ndarray:
+    """Derivatives ``(6, 2 modes, n_time)`` of (z, centre, power) with respect to amplitudes and rates."""
+    slopes = np.empty((6, 2 * body.modes, q.shape[1]))
+    for reference in np.unique(solved.anchor):
+        at = solved.anchor == reference
+        velocity = solved.anchor_velocity[:, at]
+        slopes[:, :, at] = _slopes(body, friction, q[:, at], rates[:, at], delta, int(reference), velocity)
+    return slopes
+
+
+def _slopes(
+    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+) -> np.ndarray:
+    """The nodes take the place of a chain's links: their weights that of lengths, without a couple."""
+    batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q, rates, delta, reference, z)
+    panels, n_time = batch.panels, q.shape[1]
+    c, s, weight = now.cos, now.sin, now.weight
+    x, y = now.arm_s * s + now.arm_n * c, now.arm_n * s - now.arm_s * c
+    none = np.zeros_like(vs)
+    turning = batch.fields.rate - batch.edge_rate[reference] + z[2]
+    modes, anchor = body.modes_at(body.grid.nodes[:, 0]), body.modes_at(body.grid.edges[reference])[0]
+    dphi = np.concatenate([modes, np.zeros_like(modes)], axis=1)[:, :, None]
+    dw = np.concatenate([np.zeros_like(modes), modes - anchor], axis=1)[:, :, None]
+
+    def along_path(a: np.ndarray) -> np.ndarray:
+        return panels.integrate((panels.widths[:, :1, None] * a).reshape(len(a), -1), reference).reshape(a.shape)
+
+    (k_ss, k_sn), (k_ns, k_nn) = density_jacobian(vs, vn, delta, friction)
+    left = np.array([[entry[0] for entry in row] for row in pulled_back(now, ((k_ss, k_sn), (k_ns, k_nn)))])
+    stiffness = ((weight * k_ss, weight * k_sn, none), (weight * k_ns, weight * k_nn, none), (none, none, none))
+    d = implicit_changes(
+        (c, s, x, y), (vs, vn, turning), (weight * fs, weight * fn, none), stiffness, left.transpose(2, 0, 1), along_path,
+        dphi * np.ones(n_time), dw * np.ones(n_time),
+    )  # fmt: skip
+    back = (panels.edge_path(reference)[TAIL] * panels.widths[:, 0])[:, None, None]
+    full = d.w  # the change of the tangents' rotation rate, that of the anchor included
+    swing_x = -(back * (full * s[:, None] + (turning * c)[:, None] * dphi)).sum(axis=0)
+    swing_y = (back * (full * c[:, None] - (turning * s)[:, None] * dphi)).sum(axis=0)
+    axes = d.anchor[2] - np.concatenate([np.zeros(body.modes), anchor])[:, None]
+    centre_x, centre_y = ((weight[:, None] * v).sum(axis=0) for v in (d.vx, d.vy))
+    return np.stack([d.anchor[0] + swing_x, d.anchor[1] + swing_y, axes, centre_x, centre_y, d.power])

@@ -11,9 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
-from colloc.mechanics.chain_motion import chain_motion
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay import Path
@@ -35,12 +33,12 @@ class Rates:
     power: np.ndarray
 
 
-def rates_at(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None) -> Rates:
+def rates_at(body: Body, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None) -> Rates:
     """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
     start = None if near is None else near.reshape(3, -1)
-    solved = solve_balance(body, friction, angles, rates, delta, start=start).require()
-    now = chain_motion(body, friction, angles, rates, delta, solved)
+    solved = body.solve(friction, angles, rates, delta, start=start).require()
+    now = body.motion(friction, angles, rates, delta, solved)
     return Rates(now.z.reshape(3, *t.shape), (now.centre[0] + 1j * now.centre[1]).reshape(t.shape), now.power.reshape(t.shape))
 
 
@@ -107,7 +105,7 @@ class FineMotion:
         )
 
 
-def fine_motion(body: Chain, friction: Friction, path: Path, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
+def fine_motion(body: Body, friction: Friction, path: Path, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
     """Integrate a path between the first and the last of `edges` to a relative efficiency error.
 
     Parameters

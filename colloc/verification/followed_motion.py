@@ -13,10 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.bodies import Body, Branches
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.solution_branches import Branches, all_balanced_velocities
 
 FORWARDS, BACKWARDS = 1, -1
 
@@ -38,15 +36,15 @@ class FollowedMotion(NamedTuple):
 
 
 def followed_motion(
-    body: Chain,
+    body: Body,
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
     before: np.ndarray | None = None,
     sense: int = FORWARDS,
-) -> FollowedMotion:
-    """The motion of a gait where its law may allow several.
+) -> FollowedMotion | None:
+    """The motion of a gait where its law may allow several; None for a body whose other motions are not looked for.
 
     Parameters
     ----------
@@ -60,7 +58,9 @@ def followed_motion(
     sense : {FORWARDS, BACKWARDS}
         Which neighbour: the branches are followed with or against time.
     """
-    found = all_balanced_velocities(body, friction, angles, rates, delta)
+    found = body.all_velocities(friction, angles, rates, delta)
+    if found is None:
+        return None
     apart = np.zeros((3, angles.shape[1]))
     several = np.flatnonzero(found.number > 1)
     if not several.size:
@@ -89,14 +89,12 @@ def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
     return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
 
 
-def _ranges(
-    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, found: Branches
-) -> np.ndarray:
+def _ranges(body: Body, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, found: Branches) -> np.ndarray:
     """`FollowedMotion.apart`."""
     rows = []
     for z, sign in zip(found.z, found.sign, strict=True):
-        now = instant(body, friction, angles, rates, z, delta)
-        row = np.concatenate([*body.centre_velocity(now.posture, now.velocity), z[2:], total_power(now.velocity, now.force)])
+        now = body.sliding(friction, angles, rates, z, delta)
+        row = np.concatenate([now.centre, z[2:], now.power])
         rows.append(np.where(sign > 0, row, np.nan))
     apart = np.nanmax(rows, axis=0) - np.nanmin(rows, axis=0)
     return np.stack([np.hypot(apart[0], apart[1]), apart[2], apart[3]])

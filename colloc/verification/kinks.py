@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.mechanics.balance import instant
-from colloc.mechanics.body import Chain, LinkVelocity
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.verification.adaptive_motion import FineMotion, rates_at
 from colloc.verification.replay import Path
@@ -22,7 +21,7 @@ _ZOOMS, _SAMPLES = 5, 9
 _SEPARATE = 1e-6
 
 
-def kink_phases(body: Chain, friction: Friction, path: Path, delta: float, fine: FineMotion) -> np.ndarray:
+def kink_phases(body: Body, friction: Friction, path: Path, delta: float, fine: FineMotion) -> np.ndarray:
     """Phases of kinks inside the solved part of a gait, ascending, to 1e-3 of the spacing of the panels of `fine` there.
 
     Parameters
@@ -56,12 +55,6 @@ def kink_phases(body: Chain, friction: Friction, path: Path, delta: float, fine:
     return found[np.concatenate([[True], np.diff(found) > _SEPARATE])] if found.size else found
 
 
-def _slowness(body: Chain, friction: Friction, path: Path, delta: float, t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """What has to vanish for a kink, ``(n_link, n_time)``: the speed of the slowest point of each link, or where mu_f and
-    mu_b differ the tangential speed."""
-    angles, rates = path(t)
-    velocity: LinkVelocity = instant(body, friction, angles, rates, z, delta).velocity
-    if friction.mu_f != friction.mu_b:
-        return np.abs(velocity.vs)
-    beyond = np.maximum(np.abs(velocity.vn) - 0.5 * body.length_column() * np.abs(velocity.w), 0.0)
-    return np.hypot(velocity.vs, beyond)
+def _slowness(body: Body, friction: Friction, path: Path, delta: float, t: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """What has to vanish for a kink, ``(n_part, n_time)``."""
+    return body.slowness(friction, *path(t), delta, z)

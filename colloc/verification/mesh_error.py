@@ -16,7 +16,7 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
-from colloc.mechanics.contact import crossing_bounds, crossing_depth, far_pairs
+from colloc.mechanics.contact import smooth_minimum
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, increments, rates_at
@@ -190,9 +190,6 @@ def constraint_violation(problem: Problem, mesh: Mesh, gait: AnyGait) -> np.ndar
     """Largest excess over a joint limit or penetration of any two links inside each interval, ``(n_interval,)``; 0 if none."""
     t = (mesh.edges[:-1, None] + mesh.h[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)).ravel()
     angles, body = gait.angles(t), problem.body
-    rows = [np.abs(angles).max(axis=0) - problem.joint_limit]
-    bounds = crossing_bounds(body, angles)
-    if bounds is not None:
-        rows.append(bounds.max(axis=0) - np.pi)
-    rows.append(crossing_depth(body, angles, far_pairs(body)))
+    rows = [np.abs(body.limited @ angles).max(axis=0) - problem.joint_limit, body.crossing_depth(angles, body.far_pairs)]
+    rows += [smooth_minimum(near.first, near.second, near.width)[0] for near in body.contacts(angles)]
     return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)

@@ -18,9 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
-from colloc.mechanics.chain_motion import chain_motion
-from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
@@ -128,7 +126,7 @@ class _Panels(NamedTuple):
 
 
 def _evaluated(
-    body: Chain,
+    body: Body,
     friction: Friction,
     path: Path | MixedPath,
     delta: float,
@@ -151,17 +149,18 @@ def _evaluated(
     for share, some in zip(shares, rates if mixed else rates[None], strict=True):
         start = near
         if not friction.isotropic:
-            start, spread = followed_motion(body, friction, angles, some, delta, None if whole else near, sense)
-            start, apart = np.nan_to_num(start), apart + share * spread
-        solved = solve_balance(body, friction, angles, some, delta, start=start).require()
-        motions.append(chain_motion(body, friction, angles, some, delta, solved))
-        residual = np.maximum(residual, solved.residual)
+            followed = followed_motion(body, friction, angles, some, delta, None if whole else near, sense)
+            if followed is not None:
+                start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
+        motion, left = body.replayed(friction, angles, some, delta, start)
+        motions.append(motion)
+        residual = np.maximum(residual, left)
 
     def mean(name: str) -> np.ndarray:
         return np.asarray(sum(share * getattr(motion, name) for share, motion in zip(shares, motions, strict=True)))
 
     centre = mean("centre")
-    (x, y), (gx, gy) = body.joints(angles), body.centre(body.posture(angles))
+    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
     values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
@@ -189,7 +188,7 @@ def _increments(rule: np.ndarray, panels: _Panels, every: int) -> tuple[np.ndarr
 
 
 def replay(
-    body: Chain,
+    body: Body,
     friction: Friction,
     path: Path | MixedPath,
     delta: float,

@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.mechanics.balance import Instant, instant, net_force
-from colloc.mechanics.body import Chain, LinkVelocity
+from colloc.mechanics.body import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.links import LinkVelocity
 
 SLOW = 1e-3
 """Speed below which the paper counts a link as held (its figure 9)."""

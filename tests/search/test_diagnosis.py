@@ -10,7 +10,8 @@ from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.problem import FORMULATIONS, Problem
+from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import FORMULATIONS
 from colloc.mechanics.body import Chain
 from colloc.reduced.spaces import transcribed
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning

@@ -9,7 +9,7 @@ from colloc.bounds.infinitesimal import small_gait
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import path_length
-from colloc.gaits.problem import FORMULATIONS, FULL
+from colloc.mechanics.bodies import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED

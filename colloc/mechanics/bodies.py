@@ -1,0 +1,321 @@
+"""What a body has to answer for: its balance, the velocities that keep it, the shapes it may take, and its outline.
+
+A body is described by n_joint *shape coordinates* (joint angles of a chain, amplitudes of the modes of a smooth body), in axes
+that move with it. The *tail velocity* ``z = (u, v, omega)`` is that of its tail in those axes, and their rotation rate. All
+that lies above `mechanics` and `smooth` is written for a `Body`; `colloc.mechanics.body.Chain` and
+`colloc.smooth.modal_body.ModalBody` are two, docs/a_body_of_your_own.md makes a third.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from colloc.mechanics.friction import Friction
+from colloc.numerics.arrays import Array
+from colloc.system.errors import NotConvergedError
+
+FULL, IMPLICIT = FORMULATIONS = ("full", "implicit velocity")
+"""Nonlinear programs, see `colloc.collocation.point_equations`: with tail velocities and link forces as variables and the
+balance as constraints, or with the velocities tied to those of the balance solver."""
+ARROWS = 12
+"""Points along a body at which friction is usually drawn."""
+Pairs = tuple[tuple[int, int], ...]
+"""Pairs of parts of a body."""
+
+
+class Sliding(NamedTuple):
+    """A body that slides with a given tail velocity.
+
+    Attributes
+    ----------
+    force : (3, n_time)
+        Net force and torque about the tail, zero in balance (paper, eq. ftb).
+    centre : (2, n_time)
+        Velocity of the centre of mass, in the body's axes.
+    power : (1, n_time)
+        Dissipated by friction (integrand of the paper's eq. W).
+    """
+
+    force: Array
+    centre: Array
+    power: Array
+
+
+class Lifted(NamedTuple):
+    """A body whose parts' forces are variables: what vanishes where they obey the law of friction, scaled like velocities, and
+    where they balance; velocity of the centre of mass ``(2, n_time)`` and power ``(1, n_time)``."""
+
+    laws: Array
+    balance: Array
+    centre: Array
+    power: Array
+
+
+@dataclass(frozen=True)
+class BalanceSolution:
+    """Tail velocities that balance the body, instant by instant.
+
+    Attributes
+    ----------
+    z : (3, n_time)
+        Tail velocity (u, v, omega) in the body frame.
+    residual : (n_time,)
+        Largest of |net force| and |torque about the anchor| / body length, in units of the friction on a body that moves at
+        the largest rate: the largest coefficient, or less where delta exceeds that rate.
+    iterations : (n_time,)
+        Newton and fixed-point steps taken.
+    converged : (n_time,)
+        Whether the residual reached the tolerance.
+    anchor : (n_time,)
+        The slowest part (link of a chain, edge of a panel), in whose velocity the instant was solved.
+    anchor_velocity : (3, n_time)
+        Velocity of the anchor (the midpoint of a link), and its rotation rate, in body-frame axes.
+    """
+
+    z: np.ndarray
+    residual: np.ndarray
+    iterations: np.ndarray
+    converged: np.ndarray
+    anchor: np.ndarray
+    anchor_velocity: np.ndarray
+
+    def require(self) -> BalanceSolution:
+        """This solution, or a `NotConvergedError` naming the instants that failed."""
+        if not self.converged.all():
+            bad = np.flatnonzero(~self.converged)
+            raise NotConvergedError(
+                f"the balance did not converge at {bad.size} of {self.converged.size} instants "
+                f"(first: {bad[:5].tolist()}, worst residual {self.residual[bad].max():.1e})."
+            )
+        return self
+
+
+class BalancedMotion(NamedTuple):
+    """Motion of a balanced body at instants.
+
+    Attributes
+    ----------
+    z : (3, n_time)
+        Tail velocity (u, v, omega) in the body frame.
+    centre : (2, n_time)
+        Velocity of the centre of mass, in the body frame.
+    power : (n_time,)
+        Power dissipated by friction.
+    actuator_power : (n_time,)
+        Power of what bends the body, from the moments of the friction on all that lies ahead; equals `power` in balance.
+    """
+
+    z: np.ndarray
+    centre: np.ndarray
+    power: np.ndarray
+    actuator_power: np.ndarray
+
+
+class Branches(NamedTuple):
+    """Balanced velocities of instants, from one to `n_root` each.
+
+    Attributes
+    ----------
+    z : (n_root, 3, n_time)
+        Tail velocities (u, v, omega) in the body frame; NaN beyond those that were found.
+    sign : (n_root, n_time)
+        Of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0 beyond those that were found.
+    """
+
+    z: np.ndarray
+    sign: np.ndarray
+
+    @property
+    def number(self) -> np.ndarray:
+        """How many were found, ``(n_time,)``; 0 where the solver failed."""
+        return (self.sign != 0).sum(axis=0)
+
+    @property
+    def complete(self) -> np.ndarray:
+        """Whether the signs add up to 1, as they do over all solutions, ``(n_time,)``."""
+        return self.sign.sum(axis=0) == 1
+
+
+class Contact(NamedTuple):
+    """Two parts of a body that must not cross: the smaller of two functions of shape ``(1, n_time)`` must not be positive.
+
+    `width` is that over which the minimum is smoothed.
+    """
+
+    name: str
+    first: Array
+    second: Array
+    width: float
+
+
+class Usual(NamedTuple):
+    """Numbers of a body that a problem takes where it names none, and what a certificate allows.
+
+    delta, delta_start: regularisation speeds of the end and the start of a search [body lengths per period]. limit: on the
+    angles of `Body.limited`, largest_limit: the most that may be asked for, limit_name: what the bound is called. Allowed are
+    an excess over it [rad] and a relative change of the efficiency for delta -> 0.
+    """
+
+    delta: float
+    delta_start: float
+    limit: float
+    largest_limit: float
+    limit_name: str
+    excess: float
+    delta_influence: float
+
+
+@runtime_checkable
+class Body(Protocol):
+    """A crawling body of unit length and mass. Arrays are ``(n, n_time)``; `angles` and `rates` are shape coordinates and their
+    rates ``(n_joint, n_time)``."""
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def n_joint(self) -> int:
+        """Number of shape coordinates."""
+
+    @property
+    def coordinate(self) -> str:
+        """What one is called: "joint"."""
+
+    @property
+    def quantity(self) -> str:
+        """What it measures: "joint angle"."""
+
+    @property
+    def formulations(self) -> tuple[str, ...]:
+        """Of `FORMULATIONS`, those that can be stated for it, the usual one first."""
+
+    @property
+    def n_force(self) -> int:
+        """Number of forces that are variables of a full program."""
+
+    @property
+    def symmetries(self) -> tuple[str, ...]:
+        """Of `colloc.gaits.symmetry`, those that its gaits may have."""
+
+    @property
+    def symmetric(self) -> bool:
+        """It reads the same from both ends."""
+
+    def swapped(self, shape: np.ndarray) -> np.ndarray:
+        """Shape coordinates ``(n_joint, ...)`` of the same shape named from the other end, for a symmetric body."""
+
+    @property
+    def usual(self) -> Usual: ...
+
+    def describe(self) -> str:
+        """The body in words, for reports."""
+
+    # mechanics
+    def sliding(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+        """The balance at any tail velocity z ``(3, n_time)``: the one statement of it, for NumPy and CasADi."""
+
+    def with_forces(self, friction: Friction, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
+        """The same with the forces ``(n_force, n_time)`` on the body's parts as variables: only for the full formulation."""
+
+    def forces(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
+        """Their values, ``(n_force, n_time)``."""
+
+    def largest_forces(self, friction: Friction) -> np.ndarray:
+        """Their largest magnitudes, ``(n_force, 1)``."""
+
+    def solve(
+        self,
+        friction: Friction,
+        angles: np.ndarray,
+        rates: np.ndarray,
+        delta: float,
+        *,
+        start: np.ndarray | None = None,
+        tolerance: float = 1e-11,
+    ) -> BalanceSolution:
+        """Tail velocities that keep the balance, from `start` ``(3, n_time)`` or from anywhere; NumPy."""  # fmt: skip
+
+    def motion(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    ) -> BalancedMotion:
+        """What follows from a balance."""
+
+    def slopes(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    ) -> np.ndarray:
+        """Derivatives ``(6, 2 n_joint, n_time)`` of tail velocity, velocity of the centre and power along (angles, rates)."""
+
+    def replayed(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
+    ) -> tuple[BalancedMotion, np.ndarray]:
+        """The motion by the most accurate solver there is, and its residual ``(n_time,)``: what certificates are made of."""
+
+    @property
+    def looks_for_all_velocities(self) -> bool:
+        """Whether `all_velocities` finds more than one."""
+
+    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches | None:
+        """Every tail velocity that keeps the balance, as far as they can be found; None where others are not looked for."""
+
+    def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
+        """What has to vanish for a kink of the velocities in time, ``(n_part, n_time)``; no rows where there are none."""
+
+    # shapes
+    @property
+    def limited(self) -> np.ndarray:
+        """``(n, n_joint)``: the angles that a search bounds, per shape coordinate; `limit_names` tells them apart."""
+
+    @property
+    def limit_names(self) -> tuple[str, ...]: ...
+
+    def largest_angles(self, angles: np.ndarray) -> np.ndarray:
+        """The largest angle of the kind that is bounded, at any place of the body, ``(n_time,)``."""
+
+    def contacts(self, angles: Array, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
+        """Parts that a search keeps from crossing: near ones always, pairs `far` apart if asked for; NumPy and CasADi."""
+
+    @property
+    def far_pairs(self) -> Pairs:
+        """Pairs of parts that might cross and are not among `contacts` unless asked for."""
+
+    def crossing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
+        """How far parts penetrate each other, ``(n_time,)``; of all pairs, or of given ones."""
+
+    def passing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
+        """How far parts pass through each other from instant to instant of a path."""
+
+    # form
+    def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points along the body in its axes, seen from the tail, x and y, ``(n_point, n_time)`` each, tail first."""
+
+    @property
+    def hinges(self) -> slice:
+        """Which points of the outline are joints."""
+
+    def centre(self, angles: np.ndarray) -> np.ndarray:
+        """Centre of mass in the same axes, ``(2, n_time)``."""
+
+    def rubbing(
+        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """About `count` points along the body and the force per length there, in its axes, ``(2, n_point, n_time)`` each."""
+
+    def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
+        """Speeds of a few parts ``(n_part, n_time)``, and what a part is called: for drawing what sticks."""
+
+    def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity of the head in the axes of a body that is named from it, and its heading in the body's own axes, turned by
+        half a turn [rad]: what a bilateral gait needs."""  # fmt: skip
+
+    def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
+        """A travelling wave of bending: the factors ``(n_joint,)`` of the cosine and the sine of the phase."""
+
+    @property
+    def bending(self) -> np.ndarray:
+        """``(n_place, n_joint)``: how far the body bends at places from tail to head, per shape coordinate."""
+
+    def laid(self, lengths: np.ndarray) -> np.ndarray:
+        """``(n_joint, n_joint of a chain)``: the shape nearest to that of a chain of given lengths, per joint angle."""

@@ -1,0 +1,154 @@
+"""Chains of straight links: where the links are and how fast they move, given shape, rates and one velocity.
+
+Frame: the body frame of the paper, tail link along +x. Link tangent angles are ``phi_i = sum of the first i joint angles``
+(the paper's Theta); joint angles are its Delta-theta, positive counter-clockwise, counted from the tail.
+The rigid velocity ``z = (u, v, omega)`` is that of a *reference*: the tail point, or the midpoint of a link. The second
+choice keeps the relative precision of a link at rest, which the first loses by cancellation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.numerics.arrays import Array, namespace
+from colloc.system.errors import ProblemError
+
+TAIL = None
+"""The reference of `Links.posture`: the free end of link 0; an integer means the midpoint of that link."""
+
+
+class Posture(NamedTuple):
+    """Links in the body frame, each ``(n_link, n_time)``: direction cosines, and midpoints seen from the reference."""
+
+    cos: Array
+    sin: Array
+    x: Array
+    y: Array
+
+
+class LinkVelocity(NamedTuple):
+    """Velocity of each link, ``(n_link, n_time)``: tangential and normal at its midpoint, and rotation rate."""
+
+    vs: Array
+    vn: Array
+    w: Array
+
+
+@dataclass(frozen=True)
+class Links:
+    """Straight links joined end to end: their geometry. `colloc.mechanics.body.Chain` is the body.
+
+    Parameters
+    ----------
+    lengths : tuple of float
+        Link lengths from tail to head; they add up to the body length, 1.
+    """
+
+    lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)
+
+    def __post_init__(self) -> None:
+        try:
+            lengths = tuple(float(value) for value in self.lengths)
+        except (TypeError, ValueError):
+            raise ProblemError(f"body.lengths must be a sequence of numbers, not {self.lengths!r}.") from None
+        object.__setattr__(self, "lengths", lengths)
+        if len(lengths) < 2:
+            raise ProblemError("body.lengths needs at least two links.")
+        if not all(np.isfinite(lengths)) or min(lengths) <= 0:
+            raise ProblemError(f"body.lengths must be positive and finite, not {lengths}.")
+        if abs(sum(lengths) - 1.0) > 1e-12:
+            raise ProblemError(f"body.lengths must add up to the body length 1, not {sum(lengths):.12g}.")
+
+    @property
+    def in_series(self) -> bool:
+        """Every link hangs on the one before it, as the compiled kernel takes for granted; a tree of links says no."""
+        return True
+
+    @property
+    def n_link(self) -> int:
+        return len(self.lengths)
+
+    @property
+    def n_joint(self) -> int:
+        return len(self.lengths) - 1
+
+    @property
+    def symmetric(self) -> bool:
+        """The lengths read the same from both ends."""
+        return bool(np.allclose(self.lengths, self.lengths[::-1], rtol=0, atol=1e-14))
+
+    def length_column(self) -> np.ndarray:
+        """Lengths as an ``(n_link, 1)`` column."""
+        return np.array(self.lengths)[:, None]
+
+    def _joint_sum(self, reference: int | None) -> np.ndarray:
+        """``(n_link, n_joint)``: joint quantities to link angles, relative to the reference link (the tail link: 0)."""
+        full = np.tril(np.ones((self.n_link, self.n_joint)), -1)
+        return full if reference is TAIL else full - full[reference]
+
+    def _path(self, reference: int | None) -> np.ndarray:
+        """``(n_link, n_link)``: link vectors to midpoints, relative to the reference point."""
+        full = np.tril(np.ones((self.n_link, self.n_link)), -1) + 0.5 * np.eye(self.n_link)
+        return full if reference is TAIL else full - full[reference]
+
+    def weighted_path(self, reference: int | None) -> np.ndarray:
+        """``(n_link, n_link)``: directions of links to midpoints, relative to the reference point."""
+        return self._path(reference) * self.lengths
+
+    def tangent_angles(self, angles: Array) -> Array:
+        """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles ``(n_joint, n_time)``."""
+        return namespace(angles).matmul(self._joint_sum(TAIL), angles)
+
+    def posture(self, angles: Array, reference: int | None = TAIL) -> Posture:
+        """Directions and midpoints of the links in the body frame, from joint angles ``(n_joint, n_time)``."""
+        xp = namespace(angles)
+        phi = self.tangent_angles(angles)
+        cos, sin = xp.cos(phi), xp.sin(phi)
+        path = self.weighted_path(reference)
+        return Posture(cos, sin, xp.matmul(path, cos), xp.matmul(path, sin))
+
+    def velocity(self, posture: Posture, rates: Array, z: Array, reference: int | None = TAIL) -> LinkVelocity:
+        """Link velocities (paper, eq. dtz0) for joint rates ``(n_joint, n_time)`` and rigid velocity z ``(3, n_time)``."""
+        xp = namespace(rates, z, posture.cos)
+        path = self.weighted_path(reference)
+        w = xp.matmul(self._joint_sum(reference), rates) + z[2:3, :]
+        vx = z[0:1, :] - xp.matmul(path, w * posture.sin)
+        vy = z[1:2, :] + xp.matmul(path, w * posture.cos)
+        return LinkVelocity(vx * posture.cos + vy * posture.sin, vy * posture.cos - vx * posture.sin, w)
+
+    def tail_velocity(self, posture: Posture, rates: np.ndarray, z: np.ndarray, reference: int | None) -> np.ndarray:
+        """Velocity of the tail, ``(3, n_time)``, when `z` is that of `reference` (whose posture is given)."""
+        if reference is TAIL:
+            return z
+        link = self.velocity(posture, rates, z, reference)
+        half = 0.5 * self.lengths[0]
+        # the tail link has direction (1, 0) in the body frame
+        return np.stack([link.vs[0], link.vn[0] - half * link.w[0], link.w[0]])
+
+    def centre_of_mass(self, posture: Posture) -> tuple[Array, Array]:
+        """Centre of mass relative to the reference, two ``(1, n_time)`` rows."""
+        xp = namespace(posture.x)
+        length = self.length_column()
+        return xp.sum_rows(length * posture.x), xp.sum_rows(length * posture.y)
+
+    def centre_velocity(self, posture: Posture, link: LinkVelocity) -> tuple[Array, Array]:
+        """Velocity of the centre of mass in body-frame axes, two ``(1, n_time)`` rows."""
+        xp = namespace(link.vs)
+        length = self.length_column()
+        return (
+            xp.sum_rows(length * (link.vs * posture.cos - link.vn * posture.sin)),
+            xp.sum_rows(length * (link.vs * posture.sin + link.vn * posture.cos)),
+        )
+
+    def joints(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Link end points in the body frame, x and y, each ``(n_link + 1, n_time)``, tail first."""
+        phi = self.tangent_angles(angles)
+        length = self.length_column()
+        start = np.zeros((1, phi.shape[1]))
+        return (
+            np.concatenate([start, np.cumsum(length * np.cos(phi), axis=0)]),
+            np.concatenate([start, np.cumsum(length * np.sin(phi), axis=0)]),
+        )
