@@ -9,7 +9,7 @@ from pathlib import Path
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.commands.ending import BAD_PROBLEM, FAILED, OK
-from colloc.gaits.problem import Problem
+from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import ProblemFile
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.relaxed_store import save_relaxed
@@ -21,7 +21,7 @@ from colloc.system.progress import StatusLine
 STARTS = 8
 
 
-def summary_lines(solution: RelaxedSolution) -> list[str]:
+def summary_lines(solution: RelaxedSolution, reference: Reference | None = None) -> list[str]:
     """What a person wants to know at the end."""
     relaxed, best = solution.certificate, solution.best
     lines = [
@@ -43,6 +43,10 @@ def summary_lines(solution: RelaxedSolution) -> list[str]:
             f"{r.certificate.distance:.4f}, {verdict}"
         )
     lines += [f"  {check.line()}" for check in relaxed.checks]
+    if reference is not None:
+        agrees = abs(relaxed.efficiency - reference.efficiency) <= reference.tolerance
+        verdict = "agrees with" if agrees else "DIFFERS from"
+        lines.append(f"  relaxed {verdict} {reference.efficiency:g} +- {reference.tolerance:g} ({reference.source})")
     return lines if not solution.message else [*lines, f"  {solution.message}"]
 
 
@@ -98,7 +102,10 @@ def solve_relaxed(problem: Problem, stated: ProblemFile, path: Path, options: ar
     if options.json:
         print(json.dumps(summary_dict(solution, path, None if bound is None else bound.sampled)), flush=True)
     else:
-        print("\n".join([*summary_lines(solution), gap_line(problem, solution.measured.efficiency, bound)]), flush=True)
+        print(
+            "\n".join([*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]),
+            flush=True,
+        )
     if not options.no_figure:
         from colloc.pictures.relaxed_figure import relaxed_figure
         from colloc.pictures.style import save as save_figure
