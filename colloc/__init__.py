@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from colloc.gaits.paths import ArcPath, Corners
     from colloc.gaits.problem import Problem, Reference
     from colloc.gaits.problem_file import load_problem
+    from colloc.gaits.relaxed import Relaxed
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
@@ -56,6 +57,7 @@ _HOME = {
     "mechanics.friction": ("Friction",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
+    "gaits.relaxed": ("Relaxed",),
     "gaits.paths": ("ArcPath", "Corners"),
     "search.optimise": ("maximise_efficiency",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
@@ -86,6 +88,7 @@ __all__ = [
     "Problem",
     "ProblemError",
     "Reference",
+    "Relaxed",
     "Solution",
     "Starts",
     "StoreError",

@@ -42,6 +42,7 @@ ORDER = (
             "theory.md",
             "convergence.md",
             "gait_classes.md",
+            "relaxed.md",
             "bound.md",
             "bodies.md",
             "smooth_bodies.md",

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.bounds.coulomb_motion import Motion
+from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.bounds.sampling import Domain
 from colloc.numerics.minimax_program import Minimax, smallest_maximum
@@ -23,6 +24,7 @@ _EARLY_ROUNDS = 4
 _LARGEST_CUT = 1500
 _INNER_ROUNDS = 15
 _HELD = 2e-4
+_WEIGHTY = 1e-5
 _SIDES = (0.0, 0.08, -0.08)
 """A motion enters with the heading of its largest gain and these [rad] to the sides of it, as the best heading will move."""
 _WINDOW = 0.03
@@ -35,7 +37,7 @@ class Optimum(NamedTuple):
 
     free: its coefficients. floor: value of the program, which no potential of the space undercuts by more than the smoothing
     on the samples held. top, summit: the largest ratio met anywhere, and its motion. samples: motions evaluated. rounds: used.
-    converged: whether the last climbs stayed within the tolerance.
+    converged: whether the last climbs stayed within the tolerance. measure: the multipliers of the last program.
     """
 
     free: np.ndarray
@@ -45,6 +47,7 @@ class Optimum(NamedTuple):
     samples: int
     rounds: int
     converged: bool
+    measure: Measure
 
 
 class _Program:
@@ -55,10 +58,25 @@ class _Program:
         self.samples = samples
         self.rng = rng
         chosen = np.sort(rng.permutation(samples.motion.size)[: 3 * space.size])
-        pieces = [samples.rows(chosen, np.full(chosen.size, h)) for h in np.arange(12) * (np.pi / 6)]
+        self.rows, self.constants = sparse.csr_matrix((0, space.size)), np.empty(0)
+        self.index, self.heading = np.empty(0, dtype=int), np.empty(0)
+        self._hold([(chosen, np.full(chosen.size, h)) for h in np.arange(12) * (np.pi / 6)])
+        self.best = self._solved()
+
+    def _hold(self, added: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray | slice = slice(None)) -> None:
+        """The inequalities kept, and those of more samples at given headings."""
+        pieces = [(self.rows[kept], self.constants[kept]), *(self.samples.rows(*each) for each in added)]
         self.rows = sparse.vstack([p[0] for p in pieces], format="csr")
         self.constants = np.concatenate([p[1] for p in pieces])
-        self.best = self._solved()
+        self.index = np.concatenate([self.index[kept], *(index for index, _ in added)])
+        self.heading = np.concatenate([self.heading[kept], *(heading for _, heading in added)])
+
+    def measure(self) -> Measure:
+        """The multipliers of the inequalities: the optimal mixture of motions."""
+        weight = self.best.weights / self.best.weights.sum()
+        used = weight > _WEIGHTY * weight.max()
+        share = weight[used] / weight[used].sum()
+        return Measure(self.samples.motion.take(self.index[used]), self.heading[used], share)
 
     def _solved(self) -> Minimax:
         return smallest_maximum(self.rows, self.constants, self.smoothing * self.roughness)
@@ -71,10 +89,7 @@ class _Program:
         broken = self.rng.permutation(broken)[:_LARGEST_CUT]
         near = self.rows @ self.best.x + self.constants > level - 0.01
         kept = near | (self.best.weights > 1e-6 * self.best.weights.max())
-        pieces = [(self.rows[kept], self.constants[kept])]
-        pieces += [self.samples.rows(broken, heading[broken] + side) for side in _SIDES]
-        self.rows = sparse.vstack([p[0] for p in pieces], format="csr")
-        self.constants = np.concatenate([p[1] for p in pieces])
+        self._hold([(broken, heading[broken] + side) for side in _SIDES], kept)
         self.best = self._solved()
 
     def settle(self, excess: float) -> float:
@@ -158,4 +173,4 @@ def exchanged_optimum(
         program.add(summit.take(np.flatnonzero(reached > program.best.value + 0.25 * tolerance)))
     best = int(np.argmax(reached))
     assert held <= top
-    return Optimum(free, program.best.value, top, summit.take(np.array([best])), seen, count, quiet == 2)
+    return Optimum(free, program.best.value, top, summit.take(np.array([best])), seen, count, quiet == 2, program.measure())

@@ -24,6 +24,7 @@ from colloc.bounds.loaded_balance import Loaded, loaded_balance
 from colloc.bounds.sampled import Bound
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
+from colloc.numerics.spline import DEGREE
 from colloc.system.errors import ProblemError
 
 _KAPPA = np.sqrt(2.0) - 1.0
@@ -88,12 +89,14 @@ class _Reference:
 
         The derivative is a spline of lower degree: inside a knot cell it lies in the hull of its coefficients there.
         """
-        n, h = self.spline.per_joint, self.spline.spacing
+        n, knots = self.spline.per_joint, self.spline.extended
         table = self.c.reshape(2, n, n)
         for axis, times in enumerate(order):
-            for _ in range(times):
-                table = np.diff(table, axis=axis + 1) / h
-        cell = np.clip(np.floor((angles + self.spline.limit) / h).astype(int), 0, self.spline.intervals - 1)
+            for k in range(times):
+                degree = DEGREE - k
+                width = knots[DEGREE + 1 : -1 - k] - knots[1 + k : -DEGREE - 1]
+                table = degree * np.diff(table, axis=axis + 1) / width.reshape((-1, 1) if axis == 0 else (1, -1))
+        cell = self.spline.cell(angles)
         best = np.zeros((2, angles.shape[1]))
         for i in range(4 - order[0]):
             for j in range(4 - order[1]):

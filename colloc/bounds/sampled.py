@@ -48,6 +48,8 @@ class Budget:
         Climbs a round.
     tolerance : float
         Excess of the summits over the program's value at which a bound counts as converged.
+    graded : tuple of float
+        Inner knots in every joint angle, if they are not to be evenly spaced (`colloc.numerics.spline`).
     """
 
     intervals: int = 10
@@ -57,6 +59,7 @@ class Budget:
     rounds: int = 24
     starts: int = 250
     tolerance: float = 5e-4
+    graded: tuple[float, ...] = ()
 
 
 QUICK = Budget()
@@ -89,6 +92,8 @@ class Bound:
     samples : int
     seconds : float
         Processor time.
+    graded : tuple of float
+        Inner knots, if they are not evenly spaced.
     """
 
     sampled: float
@@ -104,10 +109,11 @@ class Bound:
     coefficients: tuple[float, ...]
     samples: int
     seconds: float
+    graded: tuple[float, ...] = ()
 
     def potential_space(self, body: Chain) -> PotentialSpace:
         """The space `coefficients` belong to."""
-        spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals)
+        spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals, self.graded)
         return PotentialSpace(spline, self.harmonics, swaps_ends(body))
 
     def gap(self, efficiency: float) -> float:
@@ -132,7 +138,8 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     begin = time.process_time()
     body = domain.body
     harmonics = budget.harmonics or ((1, 3) if domain.friction.reversible else (0, 1))
-    space = PotentialSpace(TensorSpline(body.n_joint, domain.joint_limit, budget.intervals), harmonics, swaps_ends(body))
+    spline = TensorSpline(body.n_joint, domain.joint_limit, budget.intervals, budget.graded)
+    space = PotentialSpace(spline, harmonics, swaps_ends(body))
     found = exchanged_optimum(
         domain,
         space,
@@ -157,6 +164,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         coefficients=tuple(found.free.tolist()),
         samples=found.samples,
         seconds=time.process_time() - begin,
+        graded=budget.graded,
     )
 
 

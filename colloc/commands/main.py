@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from colloc.commands.ending import BAD_PROBLEM, OK, exit_code
 from colloc.system.errors import ProblemError
+from colloc.system.processors import one_thread_each
 
 SUBCOMMANDS = {
     "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
@@ -47,6 +48,7 @@ def help_text() -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``colloc``; returns the exit code."""
+    one_thread_each()
     words = list(sys.argv[1:] if arguments is None else arguments)
     return exit_code(lambda: _command(words), as_json="--json" in words)
 

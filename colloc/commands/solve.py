@@ -19,6 +19,7 @@ from colloc.commands.options import add_bound, add_printing, add_problem, change
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
+from colloc.gaits.relaxed import Relaxed
 from colloc.results.level import PRESCRIBED, REDUCED, Level
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, ProblemError, StoreError
@@ -184,6 +185,10 @@ def _solve(options: argparse.Namespace) -> int:
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
     if options.starts is not None and options.starts < 1:
         raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
+    if isinstance(problem.gait, Relaxed):
+        from colloc.commands.solve_relaxed import solve_relaxed
+
+        return solve_relaxed(problem, stated, path, options)
     solution = _solved(problem, stated, path, options, quiet)
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")

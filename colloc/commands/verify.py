@@ -17,6 +17,8 @@ from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import add_printing, add_result, new_parser
 from colloc.results.certificate import certify
 from colloc.results.checks import Certificate
+from colloc.results.relaxed_solution import RelaxedSolution
+from colloc.results.relaxed_store import is_relaxed, load_relaxed
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -68,6 +70,37 @@ def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
     return certify(solution, tolerance=tolerance, instants=2 * (3 * before // 8) + 2)
 
 
+def _verify_relaxed(solution: RelaxedSolution, options: argparse.Namespace) -> int:
+    """The relaxed gait and all finite ones, on other instants than before."""
+    before = solution.certificate.instants
+    with StatusLine(enabled=not (options.quiet or options.json)) as line:
+        line.say(f"{solution.problem.name}: replaying")
+        again = solution.recertified(2 * (3 * before // 8) + 2, options.tolerance)
+    recorded = [("relaxed", solution.certificate), *((f"{r.corners} corners", r.certificate) for r in solution.realised)]
+    now = [again.certificate, *(r.certificate for r in again.realised)]
+    complaints = [disagreement(old, new) for (_, old), new in zip(recorded, now, strict=True)]
+    good = again.status == solution.status == "solved" and not any(complaints)
+    rows = [
+        {
+            "gait": name,
+            "efficiency": new.efficiency,
+            "efficiency_error": new.efficiency_error,
+            "passed": new.passed,
+            "complaint": c,
+        }
+        for (name, _), new, c in zip(recorded, now, complaints, strict=True)
+    ]
+    if options.json:
+        print(json.dumps({"file": options.result, "name": solution.problem.name, "certified": good, "gaits": rows}))
+        return OK if good else FAILED
+    print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
+    for row in rows:
+        failed = "" if row["passed"] else "   a check fails"
+        words = f"{row['gait']:<14s}  {row['efficiency']:.8f} +- {row['efficiency_error']:.0e}{failed}  {row['complaint']}"
+        print(f"  {words}".rstrip())
+    return OK if good else FAILED
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     return run(_parser(), _verify, arguments)
@@ -76,6 +109,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _verify(options: argparse.Namespace) -> int:
     if not 0 < options.tolerance < 1:
         raise ProblemError(f"--tolerance must lie between 0 and 1, not {options.tolerance:g}.")
+    if is_relaxed(options.result):
+        return _verify_relaxed(load_relaxed(options.result), options)
     solution = load(options.result)
     with StatusLine(enabled=not (options.quiet or options.json)) as line:
         line.say(f"{solution.problem.name}: replaying")

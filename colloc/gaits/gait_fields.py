@@ -9,9 +9,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.mixture import Mixture
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.prescribed import Phases, Prescribed
+from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
 from colloc.smooth.concertina import Concertina
@@ -22,8 +24,8 @@ AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Phases)
-CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Prescribed)
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases)
+CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
 BODIES: list[type] = [Chain, ModalBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 

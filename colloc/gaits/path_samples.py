@@ -13,7 +13,7 @@ import numpy as np
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, fraction
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, fraction
 
 _DENSE = 2000
 _BEND = 1.5
@@ -49,6 +49,9 @@ def symmetric_samples(gait: Gait, symmetry: str, count: int = _DENSE) -> np.ndar
     """
     if symmetry == NONE:
         return gait.angles(np.linspace(0.0, 1.0, count + 1))
+    if symmetry == BOTH:
+        half = symmetric_samples(gait, BILATERAL, 2 * count)
+        return (0.5 * (half + half[::-1, ::-1]))[:, : count + 1]
     n = 2 * count
     t = np.arange(n) / n
     angles = gait.angles(t)

@@ -16,6 +16,7 @@ from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.gaits.prescribed import Prescribed
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -74,7 +75,7 @@ class Problem:
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
-    gait : Harmonic, FreePath or Polygon
+    gait : Harmonic, FreePath, Polygon or Relaxed
         The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md). By default one
         harmonic or, for a body whose motion is prescribed, that motion (`colloc.gaits.prescribed`).
     delta : float
@@ -216,7 +217,8 @@ class Problem:
             )
 
     def _check_symmetry(self) -> None:
-        if self.gait.symmetry not in self.body.symmetries:
+        needed = {BILATERAL, ANTIPODAL} if self.gait.symmetry == BOTH else {self.gait.symmetry}
+        if not needed <= set(self.body.symmetries):
             raise ProblemError(
                 f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
                 f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."

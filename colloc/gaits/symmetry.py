@@ -6,6 +6,8 @@ head ``(S q)_j = -q_(n+1-j)``:
 - ``bilateral``: q(-t) = S q(t); the path starts and ends its half on shapes with S q = q, with tangents that S reverses.
 - ``antipodal``: q(t + 1/2) = -q(t).
 - ``none``.
+- ``both``: bilateral and antipodal; so q(1/2 - t) is q(t) with its joints in reversed order, and the quarter ends on a shape
+  that equals its reverse. For relaxed gaits only.
 """
 
 from __future__ import annotations
@@ -13,11 +15,12 @@ from __future__ import annotations
 import numpy as np
 
 NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")
+BOTH = "both"
 
 
 def fraction(symmetry: str) -> float:
     """The part of the period that has to be solved."""
-    return 1.0 if symmetry == NONE else 0.5
+    return {NONE: 1.0, BOTH: 0.25}.get(symmetry, 0.5)
 
 
 def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -49,10 +52,10 @@ def imaged(symmetry: str, angles: np.ndarray, rates: np.ndarray, image: np.ndarr
 def end_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
     """Matrices (A, B), independent rows, of the equations ``A q(first) + B q(last) = 0`` that close a path of angles."""
     unit = np.eye(n_joint)
-    if symmetry == BILATERAL:
-        pairs = [unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j] for j in range((n_joint + 1) // 2)]
-        rows, zero = np.array(pairs), np.zeros((len(pairs), n_joint))
-        return np.vstack([rows, zero]), np.vstack([zero, rows])
+    if symmetry in (BILATERAL, BOTH):
+        first = [unit[j] + unit[n_joint - 1 - j] if 2 * j + 1 < n_joint else unit[j] for j in range((n_joint + 1) // 2)]
+        last = first if symmetry == BILATERAL else [unit[j] - unit[n_joint - 1 - j] for j in range(n_joint // 2)]
+        return np.vstack([first, np.zeros((len(last), n_joint))]), np.vstack([np.zeros((len(first), n_joint)), last])
     return (unit if symmetry == ANTIPODAL else -unit), unit
 
 

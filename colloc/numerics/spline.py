@@ -1,8 +1,8 @@
 """Tensor-product cubic B-splines over the joint angles, with the symmetries of a body built in.
 
-Uniform knots on [-A, A] in every joint angle; N = intervals + 3 functions a joint. A function of the angles is a vector of
-N^n_joint coefficients, last joint fastest. Symmetries of the body permute the coefficients, so a function with a given
-parity has fewer free ones: ``full = E @ free`` with the sparse matrix of `symmetric_basis`.
+The same knots on [-A, A] in every joint angle, uniform or graded; N = intervals + 3 functions a joint. A function of the angles
+is a vector of N^n_joint coefficients, last joint fastest. Symmetries of the body permute the coefficients, so a function with a
+given parity has fewer free ones: ``full = E @ free`` with the sparse matrix of `symmetric_basis`.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
+from scipy.interpolate import BSpline, PPoly
 
 from colloc.system.errors import ProblemError
 
-# rows: the four cubic pieces that live on one interval, as polynomials 1, x, x^2, x^3 of the local coordinate
-_CUBIC = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6.0
+DEGREE = 3
 
 
 @dataclass(frozen=True)
@@ -30,15 +30,43 @@ class TensorSpline:
         Half-width of the cube [rad].
     intervals : int
         Knot intervals a joint.
+    graded : tuple of float
+        The ``intervals - 1`` inner knots, ascending and symmetric about 0; evenly spaced if empty.
     """
 
     n_joint: int
     limit: float
     intervals: int
+    graded: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.intervals < 1 or self.n_joint < 1 or not self.limit > 0:
             raise ProblemError("a spline needs at least one joint and one interval, and a positive limit.")
+        inner = np.array(self.graded)
+        if self.graded and (
+            inner.size != self.intervals - 1 or (np.diff(self.knots) <= 0).any() or np.abs(inner + inner[::-1]).max() > 1e-9
+        ):
+            raise ProblemError(f"graded knots must be {self.intervals - 1} angles, ascending, symmetric and within the limit.")
+
+    @cached_property
+    def knots(self) -> np.ndarray:
+        """Ends of the knot intervals, ``(intervals + 1,)``."""
+        if not self.graded:
+            return np.linspace(-self.limit, self.limit, self.intervals + 1)
+        return np.array([-self.limit, *self.graded, self.limit])
+
+    @cached_property
+    def extended(self) -> np.ndarray:
+        """The knots and as many more beyond either end, ``(intervals + 1 + 2 DEGREE,)``, spaced as at that end."""
+        beyond = np.arange(1, DEGREE + 1) * (self.knots[1] - self.knots[0])
+        return np.concatenate([self.knots[0] - beyond[::-1], self.knots, self.knots[-1] + beyond])
+
+    @cached_property
+    def _cubics(self) -> np.ndarray:
+        """On every knot interval the four functions that live there, as polynomials 1, x, x^2, x^3 of the distance from its
+        begin, ``(intervals, 4, 4)``."""
+        each = [PPoly.from_spline(BSpline(self.extended, one, DEGREE)).c[::-1] for one in np.eye(self.per_joint)]
+        return np.array([[each[k + i][:, k + DEGREE] for i in range(DEGREE + 1)] for k in range(self.intervals)])
 
     @property
     def per_joint(self) -> int:
@@ -48,19 +76,18 @@ class TensorSpline:
     def size(self) -> int:
         return self.per_joint**self.n_joint
 
-    @property
-    def spacing(self) -> float:
-        return 2.0 * self.limit / self.intervals
-
     def _pieces(self, angle: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
         """First index ``(n,)`` and the four values ``(4, n)`` of the functions of one joint, or of a derivative of them."""
-        position = (angle + self.limit) / self.spacing
-        cell = np.clip(np.floor(position).astype(int), 0, self.intervals - 1)
-        x = position - cell
-        powers = np.zeros((4, angle.size))
-        for k in range(order, 4):
+        cell = self.cell(angle)
+        x = angle - self.knots[cell]
+        powers = np.zeros((DEGREE + 1, angle.size))
+        for k in range(order, DEGREE + 1):
             powers[k] = np.prod(np.arange(k - order + 1, k + 1)) * x ** (k - order)
-        return cell, _CUBIC @ powers / self.spacing**order
+        return cell, np.einsum("nfp,pn->fn", self._cubics[cell], powers)
+
+    def cell(self, angle: np.ndarray) -> np.ndarray:
+        """The knot interval that holds each angle."""
+        return np.clip(np.searchsorted(self.knots, angle, side="right") - 1, 0, self.intervals - 1)
 
     def matrix(self, angles: np.ndarray, orders: tuple[int, ...] | None = None) -> sparse.csr_matrix:
         """Values of all functions, or of their partial derivatives of the given orders, ``(n, size)``.
@@ -92,16 +119,17 @@ class TensorSpline:
     @cached_property
     def roughness(self) -> sparse.csr_matrix:
         """Gram matrix ``(size, size)`` of the second derivatives: ``c.roughness.c`` is about the integral of |D^2 f|^2."""
-        points = 2 * self.intervals
-        axis = -self.limit + (np.arange(points) + 0.5) * 0.5 * self.spacing
+        half = 0.5 * np.diff(self.knots)
+        axis = (self.knots[:-1, None] + half[:, None] * np.array([0.5, 1.5])).ravel()
         angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.n_joint, indexing="ij")])
+        weights = np.stack([a.ravel() for a in np.meshgrid(*[np.repeat(half, 2)] * self.n_joint, indexing="ij")]).prod(axis=0)
         total = sparse.csr_matrix((self.size, self.size))
         for i in range(self.n_joint):
             for j in range(self.n_joint):
                 orders = tuple(int(k == i) + int(k == j) for k in range(self.n_joint))
                 second = self.matrix(angles, orders)
-                total = total + second.T @ second
-        return (total * (0.5 * self.spacing) ** self.n_joint).tocsr()
+                total = total + second.T @ sparse.diags(weights) @ second
+        return total.tocsr()
 
     def symmetric_basis(self, mirror: int, swap: int | None) -> sparse.csr_matrix:
         """``(size, n_free)``: functions with f(-q) = mirror f(q), and f(-reversed q) = swap f(q) unless swap is None."""

@@ -15,6 +15,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours, styled
+from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import SOLVED, Solution
 
 _GAP, _NARROWEST = 0.12, 0.3
@@ -25,7 +26,7 @@ _MOST_PERIODS = 3
 _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
+def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int = 11) -> None:
     """The body at equal steps of a period, side by side and apart; below, the phase and how far its centre has come."""
     t = np.linspace(0.0, 1.0, count)
     motion = solution.sample(t)
@@ -52,7 +53,7 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, hinges: sl
     axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
 
 
-def draw_lab(axes: Axes, solution: Solution) -> None:
+def draw_lab(axes: Axes, solution: Solution | RelaxedSolution) -> None:
     """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of them, apart.
 
     As many periods as it takes for the body to leave the place where it began, and one body if that takes too many.

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc.pictures.animation import pictures
+from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
@@ -71,7 +72,7 @@ def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
 
 
 def write_movie(
-    solution: Solution,
+    solution: Solution | RelaxedSolution,
     path: Path,
     *,
     periods: int = 2,
@@ -85,7 +86,7 @@ def write_movie(
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or RelaxedSolution
     path : Path
         Ends in ``.gif`` or ``.mp4``.
     periods : int
@@ -113,7 +114,7 @@ def write_movie(
         raise ProblemError(f"width must lie between 200 and 4000, not {width}.")
     if path.suffix not in (".gif", ".mp4"):
         raise ProblemError(f"{path} should end in .gif or .mp4.")
-    solution.last  # noqa: B018  raises where there is no gait
+    solution.gait  # noqa: B018  raises where there is none
     if path.suffix == ".mp4":
         _ffmpeg()  # before anything is drawn
     drawn = pictures(solution, count, periods, arrows=arrows, width=2 * (width // 2))

@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.gaits.symmetry import ANTIPODAL
+from colloc.gaits.symmetry import ANTIPODAL, BOTH
 from colloc.mechanics.bodies import BalanceSolution, Body
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
@@ -37,7 +37,10 @@ class Shapes(Protocol):
         """Number of parameters v."""
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are multiplied."""
+        """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are multiplied.
+
+        A mixture of several directions has a block of `n_point` columns for each, and its velocities are sums over the blocks.
+        """
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         """Derivatives ``(k, n)`` of k numbers, from those with respect to ``(angles, rates)``, ``(k, n_point, 2 n_joint)``,
@@ -76,7 +79,8 @@ class ReducedMotion:
 
     def __init__(self, body: Body, friction: Friction, symmetry: str, mesh: Mesh, shapes: Shapes) -> None:
         self.body, self.friction, self.shapes, self.mesh = body, friction, shapes, mesh
-        self._centred = symmetry == ANTIPODAL
+        # share of the rotation, and of the sum of all bends, by which the direction of travel is turned
+        self._turned_by = {ANTIPODAL: (0.5, 0.0), BOTH: (1.0, 0.5)}.get(symmetry)
         self._weight = mesh.h[:, None] * mesh.scheme.b
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray] | None = None
@@ -95,7 +99,8 @@ class ReducedMotion:
         out = np.vstack([now.z[_OMEGA], now.centre, now.power])
         out[:, ~(solved.residual < _ACCEPTED * _TOLERANCE)] = np.nan
         mesh, points = self.mesh, self.mesh.points
-        omega, c, power = ((row * pace)[points] for row in (out[0], out[1] + 1j * out[2], out[3]))
+        omega, cx, cy, power = (out * pace).reshape(4, -1, mesh.n_point).sum(axis=1)[:, points]
+        c = cx + 1j * cy
         before = np.concatenate([[0.0], np.cumsum((self._weight * omega).sum(axis=1))])
         theta = before[:-1, None] + mesh.h[:, None] * (omega @ mesh.scheme.A.T)
         turn = np.exp(1j * theta)
@@ -116,15 +121,26 @@ class ReducedMotion:
 
     def _direction(self, s: _State) -> complex:
         """Unit vector along which the displacement counts."""
-        if not self._centred:
+        if self._turned_by is None:
             return s.displacement / max(abs(s.displacement), 1e-300)
-        half = np.exp(0.5j * s.rotation)
-        return complex(half if (s.displacement * np.conj(half)).real >= 0 else -half)
+        on_rotation, on_bend = self._turned_by
+        bend = (self._weight * self._bending(s)).sum()
+        axis = np.exp(1j * (on_rotation * s.rotation + on_bend * bend))
+        return complex(axis if (s.displacement * np.conj(axis)).real >= 0 else -axis)
+
+    def _bending(self, s: _State) -> np.ndarray:
+        """Rate of the sum of all joint angles at the stages, ``(n, s)``."""
+        return (s.rates.sum(axis=0) * s.pace).reshape(-1, self.mesh.n_point).sum(axis=0)[self.mesh.points]
 
     def values(self, v: np.ndarray, delta: float) -> tuple[float, float]:
         """-d/W and the net rotation over the part of the period that is solved [rad]."""
         s = self.at(v, delta)
-        return -(s.displacement * np.conj(self._direction(s))).real / s.work, s.rotation
+        return -self.distance(v, delta) / s.work, s.rotation
+
+    def distance(self, v: np.ndarray, delta: float) -> float:
+        """Displacement along the direction of travel, over the part of the period that is solved."""
+        s = self.at(v, delta)
+        return float((s.displacement * np.conj(self._direction(s))).real)
 
     def gradients(self, v: np.ndarray, delta: float) -> np.ndarray:
         """Derivatives of `values`, ``(2, n)``."""
@@ -138,8 +154,8 @@ class ReducedMotion:
         on_theta = self._weight * (1j * s.turned * back).real
         later = np.concatenate([np.cumsum(on_theta.sum(axis=1)[::-1])[::-1][1:], [0.0]])
         on_omega = h * (on_theta @ rule.A + rule.b * later[:, None])
-        if self._centred:
-            on_omega += 0.5 * (s.displacement * back).imag * self._weight
+        on_rotation, on_bend = (part * (s.displacement * back).imag for part in self._turned_by or (0.0, 0.0))
+        on_omega += on_rotation * self._weight
         on_c = self._weight * np.conj(s.turn * back)
         zero = np.zeros_like(self._weight)
         rows = np.array(
@@ -149,10 +165,17 @@ class ReducedMotion:
                 [self._weight, zero, zero, zero],
             ]
         )
-        on_out = np.zeros((*rows.shape[:2], s.pace.size))
+        on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
+        on_out = np.tile(on_out, s.pace.size // mesh.n_point)
         on_pace = np.einsum("krt,rt->kt", on_out, s.out)
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[_OUTPUTS])
+        if on_bend:
+            weight = np.zeros(mesh.n_point)
+            np.add.at(weight, mesh.points, on_bend * self._weight)
+            weight = np.tile(weight, s.pace.size // mesh.n_point)
+            on_shape[0, :, len(s.rates) :] += (weight * s.pace)[:, None]
+            on_pace[0] += weight * s.rates.sum(axis=0)
         d, w, rotation = self.shapes.pulled_back(v, on_shape, on_pace)
         return np.stack([(distance / s.work * w - d) / s.work, rotation])

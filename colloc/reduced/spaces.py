@@ -15,11 +15,15 @@ from colloc.collocation.transcription import transcribe
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
+from colloc.system.errors import ProblemError
+
+_OWN_SEARCH = "relaxed gaits have a search of their own: colloc solve, or colloc.search.relaxed_search."
 
 
 def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:
@@ -39,6 +43,11 @@ def _program(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.nd
 @_program.register(Polygon)
 def _path_program(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, far: Pairs) -> GaitProgram:
     return transcribe_path(problem, gait, edges, far)
+
+
+@_program.register
+def _no_program(gait_class: Relaxed, problem: Problem, gait: AnyGait, edges: np.ndarray | None, far: Pairs) -> GaitProgram:
+    raise ProblemError(_OWN_SEARCH)
 
 
 def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
@@ -83,3 +92,8 @@ def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:
     """Parameters of the member of a program's class that is nearest to a gait, on the program's mesh."""
     space, v = space_near(program.problem, gait, program.mesh.edges)
     return space.full_parameters(v)
+
+
+@_space.register
+def _no_space(gait_class: Relaxed, problem: Problem, gait: AnyGait, edges: np.ndarray | None, scheme: str) -> SearchSpace:
+    raise ProblemError(_OWN_SEARCH)

@@ -16,7 +16,7 @@ from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
-from colloc.verification.replay import Path, Replay, replay
+from colloc.verification.replay import MixedPath, Path, Replay, replay
 
 KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK = 1e-6, 1e-8, 1e-6, 1e-9, 1e-4, 1e-6, 1e-4, 1e-7
 """Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
@@ -68,23 +68,58 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
         usual = problem.body.usual
         each = 0.5 * usual.instants_a_point / problem.gait.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * solution.mesh.n_point)))
-    known = measured(
-        problem.body,
-        problem.friction,
+    return gait_certificate(
+        problem,
         path,
         solution.delta_per_period,
-        tolerance=tolerance,
-        instants=instants,
-        breaks=solution.gait.corner_phases,
+        solution.gait.corner_phases,
+        instants,
+        tolerance,
+        claimed=solution.efficiency,
+        before=(*_optimality(solution), _second_order(solution)),
+        after=(*_class(solution), *_mesh(solution)),
     )
+
+
+def gait_certificate(
+    problem: Problem,
+    path: Path | MixedPath,
+    delta: float,
+    breaks: np.ndarray,
+    instants: int = 1600,
+    tolerance: float = 1e-6,
+    *,
+    claimed: float | None = None,
+    before: tuple[Check, ...] = (),
+    after: tuple[Check, ...] = (),
+) -> Certificate:
+    """The certificate of any gait, found in whatever way, by its replay at three deltas.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose body, friction and joint limit are meant.
+    path : callable
+        The gait's angles and rates, and of a relaxed gait shares (`colloc.verification.replay`).
+    delta : float
+        Per period.
+    breaks : (n,)
+        Phases where the rates jump.
+    instants, tolerance
+        Of the replay, see `certify`.
+    claimed : float, optional
+        An efficiency that the replay has to confirm.
+    before, after : tuple of Check
+        What else has to hold.
+    """
+
+    known = measured(problem.body, problem.friction, path, delta, tolerance=tolerance, instants=instants, breaks=breaks)
     fine = known.fine
     checks = (
-        *_optimality(solution),
-        _second_order(solution),
-        *_motion(solution, fine, path, tolerance),
+        *before,
+        *_motion(problem, path, fine, breaks, tolerance, claimed),
         _one_motion(problem, fine),
-        *_class(solution),
-        *_mesh(solution),
+        *after,
         *_delta(problem, fine, known.limit.value),
     )
     return Certificate(
@@ -114,7 +149,7 @@ class Measured(NamedTuple):
 def measured(
     body: Body,
     friction: Friction,
-    path: Path,
+    path: Path | MixedPath,
     delta: float,
     *,
     tolerance: float = 1e-6,
@@ -175,20 +210,25 @@ def _second_order(solution: Solution) -> Check:
     return Check("second order", value, SADDLE, f"{verdict} [1/rad^2]")
 
 
-def _motion(solution: Solution, fine: Replay, path: Path, tolerance: float) -> list[Check]:
-    problem, level, body = solution.problem, solution.last, solution.problem.body
-    ends, _ = path(np.array([0.0, 1.0]))
-    angles, _ = path(np.linspace(0.0, 1.0, _FINE_PHASES + 1))
+def _motion(
+    problem: Problem, path: Path | MixedPath, fine: Replay, breaks: np.ndarray, tolerance: float, claimed: float | None
+) -> list[Check]:
+    body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
+    angles = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))[0]
     beyond = max(float(body.largest_angles(angles).max()) - problem.joint_limit, 0.0)
-    gap = level.efficiency / fine.efficiency - 1
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
-    return [
+    checks = [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
         Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),
         Check("net rotation", fine.turning, ROTATION, "over a period, times the body's reach over the distance"),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
-        Check("replay gap", _beyond(gap, fine.ambiguity), GAP, "collocated over replayed efficiency, less 1"),
+    ]
+    if claimed is not None:
+        gap = _beyond(claimed / fine.efficiency - 1, fine.ambiguity)
+        checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
+    return [
+        *checks,
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
     ]

@@ -145,7 +145,7 @@ def _write(file: h5py.File, solution: Solution) -> None:
     if solution.levels:
         _write_motion(file, solution)
     if solution.certificate.replayed:
-        _write_certificate(file.create_group("certificate"), solution.certificate)
+        write_certificate(file.create_group("certificate"), solution.certificate)
 
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
@@ -162,12 +162,21 @@ def _write_motion(file: h5py.File, solution: Solution) -> None:
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
 
 
-def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
+def write_certificate(group: h5py.Group, certificate: Certificate) -> None:
+    """Write a certificate into a group of its own."""
     for field in dataclasses.fields(certificate):
         if field.name != "checks":
             put_attribute(group, field.name, getattr(certificate, field.name))
     for name in ("name", "value", "threshold", "passed", "meaning"):
         put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
+
+
+def read_certificate(group: h5py.Group) -> Certificate:
+    """The certificate that `write_certificate` wrote."""
+    columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
+    checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
+    stated = [f.name for f in dataclasses.fields(Certificate) if f.default is dataclasses.MISSING or f.name in group.attrs]
+    return Certificate(checks, **{name: attribute(group, name) for name in stated if name != "checks"})
 
 
 def _read(file: h5py.File) -> Solution:
@@ -185,12 +194,7 @@ def _read(file: h5py.File) -> Solution:
         levels.append(Level(**arrays, **rest))
     certificate = UNCERTIFIED
     if "certificate" in file:
-        group = child(file, "certificate")
-        columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
-        checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-        stated = [f.name for f in dataclasses.fields(Certificate) if f.default is dataclasses.MISSING or f.name in group.attrs]
-        rest = {name: attribute(group, name) for name in stated if name != "checks"}
-        certificate = Certificate(checks, **rest)
+        certificate = read_certificate(child(file, "certificate"))
     solution = Solution(
         problem,
         levels,

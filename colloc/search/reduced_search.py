@@ -97,13 +97,19 @@ Report = Callable[[Found], None]
 
 
 def settled(
-    space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float, curvature: np.ndarray | None = None
+    space: SearchSpace,
+    v: np.ndarray,
+    delta: float,
+    radius: float,
+    accuracy: float,
+    curvature: np.ndarray | None = None,
+    rounds: int | None = None,
 ) -> Found:
-    """Optimise from v at one delta on one mesh until checks, box and gait rest."""
+    """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
     space.move_checks(v)
-    for _ in range(_ROUNDS[accuracy]):
+    for _ in range(rounds or _ROUNDS[accuracy]):
         before = v
         fresh = curvature is None
         result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
@@ -120,14 +126,20 @@ def settled(
 
 
 def settled_apart(
-    space: SearchSpace, v: np.ndarray, delta: float, radius: float, accuracy: float, curvature: np.ndarray | None = None
+    space: SearchSpace,
+    v: np.ndarray,
+    delta: float,
+    radius: float,
+    accuracy: float,
+    curvature: np.ndarray | None = None,
+    rounds: int | None = None,
 ) -> Found:
     """The same, keeping pairs of links more than two apart from crossing as they turn out to cross."""
-    found = settled(space, v, delta, radius, accuracy, curvature)
+    found = settled(space, v, delta, radius, accuracy, curvature, rounds)
     while new := tuple(p for p in crossing_pairs(found.space, found.v) if p not in found.space.far):
         begin = last_free(found.space, v, found.v)
         space = found.space.with_far(found.space.far + new)
-        found = settled(space, begin, delta, radius, accuracy)
+        found = settled(space, begin, delta, radius, accuracy, rounds=rounds)
     return found
 
 

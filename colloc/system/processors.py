@@ -22,3 +22,12 @@ def available_threads() -> int:
         return 1
     said = os.environ.get(_SAID, "")
     return max(1, int(said)) if said.isdigit() else available_processes()
+
+
+def one_thread_each() -> None:
+    """Have linear algebra use one thread, unless the environment says otherwise; before NumPy is loaded.
+
+    The matrices of a search are small. On two busy cores two threads that wait for each other made SQP with 360 parameters take
+    thirty times the processor time.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

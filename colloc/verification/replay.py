@@ -26,6 +26,9 @@ from colloc.verification.panels import WHOLE, Panels, begun, differences, halves
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
+MixedPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Of a relaxed gait: joint angles; rates ``(n_direction, n_joint, n_time)`` in every direction; their shares of the time
+``(n_direction, n_time)``, of sum 1."""
 
 _ONE_SIDED = 1e-12
 _NARROWEST = 1e-10
@@ -95,7 +98,7 @@ class Replay:
 def _evaluated(
     body: Body,
     friction: Friction,
-    path: Path,
+    path: Path | MixedPath,
     delta: float,
     t: np.ndarray,
     near: np.ndarray | None,
@@ -105,26 +108,39 @@ def _evaluated(
 ) -> tuple[np.ndarray, ...]:
     """The last seven of `Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
 
-    Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole` period, the branch in time.
+    Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole` period, the branch in time. The
+    directions of a relaxed gait are solved for one after the other, and averaged.
     """
-    angles, rates = path(t.ravel())
-    apart = np.zeros((3, t.size))
-    if not friction.isotropic:
-        followed = followed_motion(body, friction, angles, rates, delta, None if whole else near, sense)
-        if followed is not None:
-            near, apart = np.nan_to_num(followed.z), followed.apart
-    motion, residual = body.replayed(friction, angles, rates, delta, near)
+    angles, rates, *mixed = path(t.ravel())
+    if mixed:
+        near = None  # which is a mean, and of no one direction
+    shares = mixed[0] if mixed else np.ones((1, t.size))
+    motions, residual, apart = [], np.zeros(t.size), np.zeros((3, t.size))
+    for share, some in zip(shares, rates if mixed else rates[None], strict=True):
+        start = near
+        if not friction.isotropic:
+            followed = followed_motion(body, friction, angles, some, delta, None if whole else near, sense)
+            if followed is not None:
+                start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
+        motion, left = body.replayed(friction, angles, some, delta, start)
+        motions.append(motion)
+        residual = np.maximum(residual, left)
+
+    def mean(name: str) -> np.ndarray:
+        return np.asarray(sum(share * getattr(motion, name) for share, motion in zip(shares, motions, strict=True)))
+
+    centre = mean("centre")
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    values = (motion.centre[0] + 1j * motion.centre[1], motion.power, motion.actuator_power, residual, lever)
-    z, apart = (a.T.reshape(*t.shape, 3) for a in (motion.z, apart))
+    values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), residual, lever)
+    z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
     return z, *(value.reshape(t.shape) for value in values), apart
 
 
 def replay(
     body: Body,
     friction: Friction,
-    path: Path,
+    path: Path | MixedPath,
     delta: float,
     *,
     instants: int = 1600,
@@ -140,7 +156,8 @@ def replay(
     ----------
     body, friction
     path : callable
-        Joint angles and rates at phases in [0, 1].
+        Joint angles and rates at phases in [0, 1]; of a relaxed gait (`MixedPath`) rates and shares of its directions. Then
+        the body moves, and pays, as the mean over the directions.
     delta : float
         Regularisation speed, per period.
     instants : int

@@ -1,0 +1,212 @@
+"""Relaxed gaits as a search sees them: where they start, and how long they take every direction on every piece.
+
+Durations have a bound of 0 below; directions of two joints are angles, of more joints any vectors, divided by their length.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.collocation.shape_checks import shape_checks
+from colloc.gaits.mixture import Mixture
+from colloc.gaits.path_samples import Gait, symmetric_samples
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import end_conditions
+from colloc.mechanics.bodies import Pairs
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
+
+_NEAR = 0.6
+"""A check that is nearer to its bound than this [rad, or body lengths] is among the rows."""
+_CELLS = 3
+"""Mesh intervals of a piece: where links begin to stick the velocities have kinks, which are narrow for small delta."""
+_LONGEST = 1.0
+"""Time in a direction on a piece [rad], at most. A gait that loops at one shape could go on for ever."""
+_LOOP = 0.05
+"""Time that a mixture begun along a path spends in every other direction, as a share of that along the path."""
+_SAMPLES = 2000
+
+
+class MixtureSpace:
+    """Relaxed gaits of a number of pieces by their parameters; attributes as `colloc.reduced.program.SearchSpace`.
+
+    Rows: what closes the path, checks on shapes where pieces meet and in their middle, and the path's length.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of a class `colloc.gaits.relaxed.Relaxed`.
+    pieces : int
+    far : pairs of links more than two apart that are kept from crossing.
+    directions : int, optional
+        Other than those of the class, to see what more would be worth.
+    """
+
+    def __init__(self, problem: Problem, pieces: int, far: Pairs = (), directions: int = 0) -> None:
+        self.problem, self.pieces, self.far = problem, pieces, far
+        self.n_joint, self.n_direction = problem.body.n_joint, directions or problem.gait.directions
+        self.mesh = Mesh(scheme(problem.scheme), np.arange(pieces * _CELLS + 1.0) / _CELLS)
+        piece = np.repeat(np.arange(pieces), _CELLS * self.mesh.scheme.s)
+        self._piece, self._part = piece, self.mesh.times - piece
+        self._in_piece = (piece == np.arange(pieces)[:, None]).astype(float)
+        self._checks = shape_checks(problem.body, far)
+        self._first, self._last = end_conditions(problem.gait.symmetry, self.n_joint)
+        count = pieces * self.n_direction
+        self.time = slice(self.n_joint, self.n_joint + count)
+        self.n = self.time.stop + count * (1 if self.n_joint == 2 else self.n_joint)
+        self.own = np.arange(self.n)
+        self.lower, self.upper = np.full(self.n, -np.inf), np.full(self.n, np.inf)
+        self.lower[self.time], self.upper[self.time] = 0.0, _LONGEST
+        # instants of the checks as means of the shapes where pieces meet
+        ends = np.eye(pieces + 1)
+        self._watch = np.vstack([ends, 0.5 * (ends[:-1] + ends[1:])])
+        self._least = 2 * np.pi * problem.smallest_shape_speed * problem.gait.fraction
+        self._placed: list[np.ndarray] = []
+        self.watched: dict[str, np.ndarray] = {}
+        self.row_lower = self.row_upper = np.empty(0)
+
+    def _split(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Durations ``(n_piece, n_direction)``, directions as they are parametrised, and as unit vectors."""
+        durations = v[self.time].reshape(self.pieces, self.n_direction)
+        raw = v[self.time.stop :].reshape(self.pieces, self.n_direction, -1)
+        if self.n_joint == 2:
+            return durations, raw, np.concatenate([np.cos(raw), np.sin(raw)], axis=2)
+        return durations, raw, raw / np.linalg.norm(raw, axis=2, keepdims=True)
+
+    def member(self, v: np.ndarray) -> Mixture:
+        """The gait of parameters v."""
+        durations, _, directions = self._split(v)
+        return Mixture(np.maximum(durations, 0.0), directions, v[: self.n_joint], self.problem.gait.symmetry)
+
+    def parameters(self, gait: Gait) -> np.ndarray:
+        """Parameters of a mixture of so many pieces, or of one along the path of another gait."""
+        mixture = gait if isinstance(gait, Mixture) else self._along(gait)
+        raw = mixture.directions
+        if self.n_joint == 2:
+            raw = np.arctan2(raw[..., 1], raw[..., 0])
+        return np.concatenate([mixture.start, mixture.durations.ravel(), raw.ravel()])
+
+    def _along(self, gait: Gait) -> Mixture:
+        """A mixture that follows a path: the first direction along it, the others spread, for a small part of the time."""
+        points = symmetric_samples(gait, self.problem.gait.symmetry, _SAMPLES)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points), axis=0))])
+        at = np.linspace(0.0, along[-1], self.pieces + 1)
+        steps = np.diff(np.stack([np.interp(at, along, row) for row in points])).T
+        size = np.linalg.norm(steps, axis=1, keepdims=True)
+        ahead = (steps / np.maximum(size, 1e-300))[:, None]
+        turn = 2 * np.pi * np.arange(1, self.n_direction) / self.n_direction
+        if self.n_joint == 2:
+            c, s = np.cos(turn)[None, :, None], np.sin(turn)[None, :, None]
+            others = c * ahead + s * np.stack([-ahead[..., 1], ahead[..., 0]], axis=2)
+        else:
+            others = np.random.default_rng(0).standard_normal((self.pieces, self.n_direction - 1, self.n_joint))
+            others /= np.linalg.norm(others, axis=2, keepdims=True)
+        shares = np.concatenate([[1.0], np.full(self.n_direction - 1, _LOOP)])
+        return Mixture(size * shares, np.concatenate([ahead, others], axis=1), points[:, 0], self.problem.gait.symmetry)
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        """There is no other program: they are v."""
+        return v
+
+    def phase_mesh(self, gait: Mixture) -> Mesh:
+        """The pieces in phases of a member."""
+        return Mesh(self.mesh.scheme, gait.phases[: self.pieces + 1])
+
+    def remeshed(self, gait: Mixture, edges: np.ndarray, scheme: str) -> MixtureSpace:
+        """The class with as many pieces as there are intervals between the edges."""
+        return MixtureSpace(self.problem.with_(scheme=scheme), edges.size - 1, self.far)
+
+    def with_far(self, far: Pairs) -> MixtureSpace:
+        """The class with other pairs of links kept apart."""
+        return MixtureSpace(self.problem, self.pieces, far)
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, directions and durations at the points of the mesh: a block of columns for each direction."""
+        durations, _, directions = self._split(v)
+        shapes = self.member(v).shapes
+        angles = shapes[:, self._piece] + self._part * np.diff(shapes)[:, self._piece]
+        rates = directions[self._piece].transpose(2, 1, 0).reshape(self.n_joint, -1)
+        return np.tile(angles, self.n_direction), rates, durations[self._piece].T.ravel()
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        """See `colloc.reduced.motion.Shapes`."""
+        durations, raw, directions = self._split(v)
+        on = on_shape.reshape(len(on_shape), self.n_direction, self.mesh.n_point, -1)
+        on_angles = on[..., : self.n_joint].sum(axis=1)
+        here = np.einsum("np,kpj->knj", self._in_piece, on_angles)
+        within = np.einsum("np,kpj->knj", self._in_piece * self._part, on_angles)
+        since = np.cumsum(here[:, ::-1], axis=1)[:, ::-1]
+        on_rates = np.einsum("np,kapj->knaj", self._in_piece, on[..., self.n_joint :])
+        on_time = np.einsum("np,kap->kna", self._in_piece, on_pace.reshape(on.shape[:3]))
+        return self._on_parameters(since[:, 0], within + since - here, on_time, on_rates, durations, raw, directions)
+
+    @staticmethod
+    def _on_parameters(
+        on_start: np.ndarray,
+        on_step: np.ndarray,
+        on_time: np.ndarray,
+        on_rates: np.ndarray,
+        durations: np.ndarray,
+        raw: np.ndarray,
+        directions: np.ndarray,
+    ) -> np.ndarray:
+        """Derivatives by v, from those by the start, the steps of the shape, durations and directions; k of them each."""
+        on_time = on_time + np.einsum("knj,naj->kna", on_step, directions)
+        on_rates = on_rates + durations[:, :, None] * on_step[:, :, None]
+        if raw.shape[2] == 1:
+            on_raw = on_rates[..., 1] * directions[..., 0] - on_rates[..., 0] * directions[..., 1]
+        else:
+            along = (on_rates * directions).sum(axis=-1, keepdims=True)
+            on_raw = (on_rates - along * directions) / np.linalg.norm(raw, axis=2, keepdims=True)
+        k = len(on_start)
+        return np.concatenate([on_start, on_time.reshape(k, -1), on_raw.reshape(k, -1)], axis=1)
+
+    def _through_shapes(self, v: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Derivatives ``(k, n)`` of numbers from those by the shapes where pieces meet, ``(k, n_piece + 1, n_joint)``."""
+        since = np.cumsum(weights[:, ::-1], axis=1)[:, ::-1]
+        return self._on_parameters(since[:, 0], since[:, 1:], np.zeros(1), np.zeros(1), *self._split(v))
+
+    def move_checks(self, v: np.ndarray) -> float:
+        """Choose the instants at which checks may bind; how far the gait exceeds any bound [rad, or body lengths]."""
+        angles, limit = self.member(v).shapes @ self._watch.T, self.problem.joint_limit
+        self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
+        closing = np.zeros(len(self._first))
+        for check in self._checks:
+            values = check.along(angles)
+            beyond = check.excess(values, limit)
+            at = np.flatnonzero(beyond > -_NEAR)
+            lower, upper = check.bounds(limit)
+            # of the two bounds on an angle the nearer one
+            below = values[at] - lower < upper - values[at]
+            self._placed.append(at)
+            self.watched[check.name] = at
+            low.append(np.where(below, lower, -np.inf))
+            high.append(np.where(below, np.inf, upper))
+            excess = max(excess, float(beyond.max()))
+        self.row_lower = np.concatenate([closing, *low, [self._least]])
+        self.row_upper = np.concatenate([closing, *high, [np.inf]])
+        return excess
+
+    def rows(self, v: np.ndarray) -> np.ndarray:
+        """Values of the rows."""
+        shapes = self.member(v).shapes
+        values = [
+            check.along(shapes @ self._watch[at].T) for check, at in zip(self._checks, self._placed, strict=True) if at.size
+        ]
+        return np.concatenate([self._first @ shapes[:, 0] + self._last @ shapes[:, -1], *values, [v[self.time].sum()]])
+
+    def row_slopes(self, v: np.ndarray) -> np.ndarray:
+        """Derivatives of the rows, ``(n_row, n)``."""
+        shapes = self.member(v).shapes
+        closing = np.zeros((len(self._first), self.pieces + 1, self.n_joint))
+        closing[:, 0] += self._first
+        closing[:, -1] += self._last
+        weights = [closing]
+        for check, at in zip(self._checks, self._placed, strict=True):
+            if at.size:
+                share = np.full((1, at.size), -1.0)
+                slope = check.slope(shapes @ self._watch[at].T, share).full()
+                weights.append(np.einsum("jw,wn->wnj", slope, self._watch[at]))
+        length = np.zeros((1, self.n))
+        length[0, self.time] = 1.0
+        return np.vstack([self._through_shapes(v, np.concatenate(weights)), length])

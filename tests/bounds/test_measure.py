@@ -1,0 +1,95 @@
+"""The multipliers of the bound's program are a motion: they close in the mean, and travel as far as the program says."""
+
+import numpy as np
+import pytest
+
+from colloc.bounds.coulomb_motion import balanced_motion
+from colloc.bounds.cutting_plane import exchanged_optimum
+from colloc.bounds.measure import Measure
+from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.sampling import Domain
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.numerics.spline import TensorSpline
+from colloc.system.errors import ProblemError
+
+LIMIT = 2.5
+
+
+@pytest.fixture(scope="module")
+def found():
+    domain = Domain(Chain(), Friction(), LIMIT)
+    space = PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True)
+    optimum = exchanged_optimum(domain, space, shapes=10, directions=24, rounds=4, starts=20, tolerance=1e-2)
+    return space, optimum
+
+
+def test_the_measure_travels_as_the_program_says(found):
+    _, optimum = found
+    assert optimum.measure.weight.sum() == pytest.approx(1.0)
+    assert optimum.measure.efficiency() == pytest.approx(optimum.floor, abs=2e-3)
+
+
+def test_no_potential_of_the_space_changes_what_the_measure_travels(found):
+    space, optimum = found
+    measure = optimum.measure
+    matrix, constant = Samples(space, measure.motion).rows(np.arange(measure.weight.size), measure.heading)
+    # the rate of every potential of the space vanishes in the mean, up to the penalty on roughness
+    mean = measure.weight @ matrix
+    sizes = np.abs(matrix).T @ measure.weight
+    assert np.abs(mean).max() < 1e-2 * sizes.max()
+    assert measure.weight @ constant == pytest.approx(measure.efficiency())
+
+
+def motions(angles, weight):
+    """A measure at given shapes."""
+    angles = np.array(angles, dtype=float).T
+    motion = balanced_motion(Chain(), Friction(), angles, np.ones_like(angles) / np.sqrt(2))
+    return Measure(motion, np.zeros(angles.shape[1]), np.array(weight))
+
+
+def test_knots_go_where_the_weight_is():
+    even = np.linspace(-LIMIT, LIMIT, 11)[1:-1]
+    measure = motions([(2.0, -2.0), (2.05, -1.95), (1.95, -2.05)], [0.4, 0.3, 0.3])
+    for intervals in (9, 10):
+        knots = np.array(measure.graded_knots(intervals, LIMIT))
+        assert knots.size == intervals - 1
+        assert np.allclose(knots, -knots[::-1])
+        assert (np.diff(knots) > 0).all()
+        assert (np.abs(np.abs(knots) - 2.0) < 0.3).sum() > (np.abs(np.abs(even) - 2.0) < 0.3).sum()
+
+
+def test_a_measure_round_the_straight_body_shows_a_path_with_both_symmetries():
+    turn = np.linspace(0.05, 1.5, 40)
+    shapes = np.stack([1.5 * np.cos(turn) + 0.9 * np.sin(turn), -1.5 * np.cos(turn) + 0.9 * np.sin(turn)], axis=1)
+    path = motions(shapes, np.full(40, 1 / 40)).path()
+    t = np.linspace(0.0, 1.0, 101)
+    q = path.angles(t)
+    assert np.allclose(path.angles((t + 0.5) % 1.0), -q, atol=1e-9)
+    radius = np.hypot(0.5 * (q[0] - q[1]) / 1.5, 0.5 * (q[0] + q[1]) / 0.9)
+    assert np.abs(radius - 1).max() < 0.05
+
+
+def test_loops_at_one_shape_are_no_path():
+    with pytest.raises(ProblemError, match="no path"):
+        motions([(2.2, -2.2), (2.21, -2.2)], [0.5, 0.5]).path()
+
+
+@pytest.mark.parametrize("knots", [(-1.0, 0.0, 1.2), (1.0, 0.0, -1.0), (-3.0, 0.0, 3.0), (0.0,)])
+def test_knots_that_are_none_are_refused(knots):
+    with pytest.raises(ProblemError, match="graded knots"):
+        TensorSpline(2, LIMIT, 4, knots)
+
+
+def test_graded_splines_hold_every_cubic_exactly():
+    spline = TensorSpline(1, LIMIT, 6, (-1.9, -1.2, 0.0, 1.2, 1.9))
+    angles = np.linspace(-LIMIT, LIMIT, 200)[None]
+
+    def cubic(x):
+        return 1 - 2 * x + 0.3 * x**2 - 0.7 * x**3
+
+    matrix = spline.matrix(angles).toarray()
+    coefficients = np.linalg.lstsq(matrix, cubic(angles[0]), rcond=None)[0]
+    assert np.allclose(matrix @ coefficients, cubic(angles[0]), atol=1e-10)
+    slope = spline.matrix(angles, (1,)).toarray() @ coefficients
+    assert np.allclose(slope, -2 + 0.6 * angles[0] - 2.1 * angles[0] ** 2, atol=1e-9)

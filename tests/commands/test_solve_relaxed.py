@@ -1,0 +1,47 @@
+"""``colloc solve`` and ``colloc animate`` on a class of relaxed gaits."""
+
+import json
+
+import pytest
+
+from colloc.commands.main import main
+
+FILE = """
+from colloc import Friction, Problem, Relaxed
+PROBLEM = Problem(
+    "loops", friction=Friction(1, 1, 1), gait=Relaxed(2, "both"), delta=2e-4, delta_start=1e-2, joint_limit=2.5, intervals=8
+)
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("relaxed")
+    (folder / "loops.py").write_text(FILE)
+    return folder
+
+
+def test_solve_reports_the_best_finite_gait_and_what_it_tends_to(folder, capsys):
+    code = main(["solve", str(folder / "loops.py"), "--starts", "1", "--json", "--output", f"{folder}/"])
+    told = json.loads(capsys.readouterr().out)
+    assert code == 0
+    assert told["efficiency"] < told["relaxed"]["efficiency"]
+    assert told["efficiency"] == max(each["efficiency"] for each in told["realised"])
+    assert (folder / "loops.png").exists()
+
+
+def test_animate_draws_the_finite_gait(folder):
+    result = next(folder.glob("loops*.h5"))
+    assert (
+        main(["animate", str(result), "--seconds", "0.4", "--fps", "5", "--periods", "1", "--output", f"{folder}/a.gif"]) == 0
+    )
+    assert (folder / "a.gif").read_bytes().startswith(b"GIF")
+
+
+def test_verify_replays_the_relaxed_gait_and_all_finite_ones(folder, capsys):
+    result = next(folder.glob("loops*.h5"))
+    code = main(["verify", str(result), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["gaits"]) == 4
+    assert not any(gait["complaint"] for gait in told["gaits"])
+    assert told["certified"] == (code == 0)

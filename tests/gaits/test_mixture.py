@@ -1,0 +1,124 @@
+"""Relaxed gaits: mixtures of directions, their symmetries, and the polygons that come near them."""
+
+import numpy as np
+import pytest
+
+from colloc.gaits.gait_fields import class_from, fields, gait_from
+from colloc.gaits.mixture import Mixture, corners_of
+from colloc.gaits.relaxed import Relaxed
+from colloc.system.errors import ProblemError
+
+
+def mixture(symmetry="none", pieces=4, directions=3, n_joint=2, seed=0):
+    """A random mixture whose mean path closes as its symmetry asks."""
+    rng = np.random.default_rng(seed)
+    raw = rng.standard_normal((pieces, directions, n_joint))
+    raw /= np.linalg.norm(raw, axis=2, keepdims=True)
+    gait = Mixture(rng.uniform(0.1, 0.3, (pieces, directions)), raw, np.zeros(n_joint), symmetry)
+    start = rng.standard_normal(n_joint)
+    if symmetry in ("bilateral", "both"):
+        start = start - start[::-1]
+    missing = -gait.shapes[:, -1]
+    if symmetry == "both":  # ends on a shape that equals its reverse
+        missing = 0.5 * (missing + missing[::-1]) + 0.5 * (start[::-1] - start) + 0.5 * (missing - missing[::-1])
+    if symmetry == "bilateral":
+        missing = 0.5 * (missing + missing[::-1])
+    if symmetry == "antipodal":
+        missing = missing - 2 * start
+    step = missing / np.linalg.norm(missing)
+    last = np.zeros((1, directions))
+    last[0, 0] = np.linalg.norm(missing)
+    return Mixture(
+        np.concatenate([gait.durations, last]),
+        np.concatenate([gait.directions, np.broadcast_to(step, (1, directions, n_joint))]),
+        start,
+        symmetry,
+    )
+
+
+@pytest.mark.parametrize("n_joint", [2, 3])
+@pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal", "both"])
+def test_the_whole_period_closes_and_has_the_symmetry(symmetry, n_joint):
+    gait = mixture(symmetry, n_joint=n_joint)
+    t = np.linspace(0.0, 0.999, 57)
+    q = gait.angles(t)
+    assert np.abs(gait.angles(np.array([0.0, 1.0])) @ [1, -1]).max() < 1e-12
+    if symmetry in ("bilateral", "both"):
+        assert np.allclose(gait.angles(1 - t), -q[::-1], atol=1e-12)
+    if symmetry in ("antipodal", "both"):
+        assert np.allclose(gait.angles((t + 0.5) % 1.0), -q, atol=1e-12)
+
+
+def test_mixed_rates_are_the_slopes_of_the_mean_shape():
+    gait, h = mixture("both"), 1e-6
+    t = np.setdiff1d(np.linspace(0.01, 0.99, 41), gait.breaks)
+    difference = (gait.angles(t + h) - gait.angles(t - h)) / (2 * h)
+    assert np.allclose(gait.rates(t), difference, atol=1e-6 * gait.length)
+    rates, shares = gait.mixed_rates(t)
+    assert np.allclose(shares.sum(axis=0), 1.0)
+    assert np.allclose(np.linalg.norm(rates, axis=1), gait.length)
+
+
+@pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal", "both"])
+def test_realised_polygons_stay_near_the_mean_shape_the_nearer_the_more_they_repeat(symmetry):
+    gait = mixture(symmetry)
+    apart = []
+    for repeats in (1, 4, 16):
+        polygon = gait.realised(repeats)
+        assert polygon.length == pytest.approx(gait.length, rel=1e-12)
+        t = np.linspace(0.0, 1.0, 2001)
+        apart.append(np.abs(polygon.angles(t) - gait.angles(t)).max())
+    assert apart[1] < 0.3 * apart[0]
+    assert apart[2] < 0.3 * apart[1]
+
+
+def test_a_piece_of_one_direction_is_one_side_however_often_it_is_repeated():
+    gait = Mixture([[1.0, 0.0], [0.5, 0.5], [1.0, 0.0]], [[[1, 0], [0, 1]], [[0, 1], [1, 0]], [[-1, 0], [0, 1]]], [0.0, 0.0])
+    assert corners_of(gait.realised(1)) == 4
+    assert corners_of(gait.realised(5)) == 12
+
+
+def test_a_mixture_taken_apart_is_the_polygon_and_its_mean_follows_the_same_shapes():
+    gait = mixture("both")
+    apart = gait.unmixed(2)
+    assert apart.durations.shape[1] == 1
+    assert np.allclose(apart.shapes[:, -1], gait.shapes[:, -1], atol=1e-12)
+    assert np.allclose(apart.realised().corners, gait.realised(2).corners, atol=1e-12)
+    assert np.allclose(gait.mean.shapes, gait.shapes, atol=1e-12)
+
+
+def test_splitting_pieces_changes_no_motion():
+    gait = mixture("bilateral")
+    finer = gait.split(17)
+    t = np.linspace(0.0, 1.0, 301)
+    assert len(finer.durations) == 17
+    assert np.allclose(finer.angles(t), gait.angles(t), atol=1e-12)
+
+
+def test_gaits_and_classes_survive_being_written_down():
+    gait, kind = mixture("both"), Relaxed(2, "antipodal")
+    assert class_from(fields(kind)) == kind
+    again = gait_from(fields(gait))
+    assert (again.durations == gait.durations).all()
+    assert again.symmetry == "both"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (([[1.0]], [[[2.0, 0.0]]], [0.0, 0.0]), "unit vectors"),
+        (([[-1.0]], [[[1.0, 0.0]]], [0.0, 0.0]), "negative"),
+        (([[1.0, 1.0]], [[[1.0, 0.0]]], [0.0, 0.0]), "disagree"),
+        (([[np.nan]], [[[1.0, 0.0]]], [0.0, 0.0]), "finite"),
+    ],
+)
+def test_a_mixture_that_is_none_is_refused(arguments, complaint):
+    with pytest.raises(ProblemError, match=complaint):
+        Mixture(*arguments)
+
+
+def test_a_class_that_is_none_is_refused():
+    with pytest.raises(ProblemError, match="directions"):
+        Relaxed(0)
+    with pytest.raises(ProblemError, match="symmetry"):
+        Relaxed(3, "quarter")
