@@ -47,7 +47,7 @@ KEPT = {
     "grid_confirmation.md": "python -m benchmarks.grid_confirmation",
     "robustness.json": "python -m benchmarks.robustness --starts 100",
     "crawlers.md": "python -m scripts.optimise_crawlers",
-    "smooth_low_mode.md": "colloc solve problems/smooth_low_mode.py, and the like: see its first lines",
+    "smooth_low_mode.md": "python -m colloc.solve problems/smooth_low_mode.py  # a row; see its first lines",
     "sweep_scaling.md": "python -m benchmarks.sweep_scaling --cells 24 --tasks 500 --dask",
     "bound_table.md": "python -m scripts.bound_table",
     "without_contact.md": "python -m scripts.without_contact",
