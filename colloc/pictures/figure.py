@@ -41,7 +41,13 @@ def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int 
         axes.plot(motion.centre[0, k] + shift[k], motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
         axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, 0), color=GREY, **below)
-        axes.annotate(f"{motion.centre[0, k]:.2f}".replace("-", "−"), (middle[k], low), (0, -10), color=VERMILION, **below)
+        axes.annotate(
+            f"{round(float(motion.centre[0, k]), 2) + 0.0:.2f}".replace("-", "−"),
+            (middle[k], low),
+            (0, -10),
+            color=VERMILION,
+            **below,
+        )
     axes.set(xlim=(0, float(room.sum())), ylim=(low, float(y.max()) + 0.04), aspect="equal")
     axes.set_axis_off()
 
