@@ -17,10 +17,10 @@ WHOLE[:3, :3] = 0.5 * HALF
 WHOLE[3:] = WHOLE[2]
 WHOLE[2:, 2:] += 0.5 * HALF
 """The same for five instants, parabola by parabola."""
-_SMOOTH = 1 / 15
-"""Of a change by halving, what a rule of fourth order leaves where the motion is smooth."""
+_SMOOTH = 1 / (2 * 16 * 15)
+"""What a rule of fourth order leaves on a panel of the change on the panel twice as wide, where the motion is smooth."""
 _MARGIN = 3.0
-"""Factor of safety (Roache, 1994): where kinks lie anywhere, changes do not fall by the same factor from one to the next."""
+"""Factor of safety (Roache, 1994)."""
 
 
 class Panels(NamedTuple):
@@ -75,13 +75,13 @@ def differences(panels: Panels) -> np.ndarray:
 
 
 def left_over(changed: np.ndarray, wider: np.ndarray) -> np.ndarray:
-    """Error of the halves of panels ``(n, 3)``: the rest of a geometric series, from the last change and the one before.
+    """Error of the halves of panels ``(n, 3)``, from the last change and the one before, on the panel twice as wide.
 
-    With the usual margin; never more than the last change, nor less than for smooth motion, since a change that falls faster
-    does so by accident.
+    The rest of a geometric series; but no less than smooth motion would leave of the change before, with a margin, since a
+    change that falls faster does so by accident.
     """
     falloff = np.minimum(2 * changed / np.maximum(wider, 1e-300), 0.5)
-    return changed * np.clip(_MARGIN * falloff / (1 - falloff), _MARGIN * _SMOOTH, 1.0)
+    return np.maximum(changed * falloff / (1 - falloff), _MARGIN * _SMOOTH * wider)
 
 
 def increments(rule: np.ndarray, panels: Panels, every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
