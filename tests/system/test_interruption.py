@@ -10,12 +10,11 @@ import time
 import numpy as np
 import pytest
 
-from colloc.collocation import implicit_velocity
-from colloc.collocation.implicit_velocity import balanced_near
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
+from colloc.mechanics.body import Chain
 from colloc.results.store import load
 from colloc.search.nlp import Solver
 from colloc.system.interruption import interrupted, interruptible
@@ -134,13 +133,15 @@ def test_ipopt_stops_between_iterations_and_says_nothing(capfd, monkeypatch):
     solver, calls = Solver(transcribe(problem)), []
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
 
-    def pressed(*arguments):
+    exact = Chain.solve
+
+    def pressed(*arguments, **settings):
         calls.append(arguments)
         if len(calls) == 10:
             signal.raise_signal(signal.SIGINT)
-        return balanced_near(*arguments)
+        return exact(*arguments, **settings)
 
-    monkeypatch.setattr(implicit_velocity, "balanced_near", pressed)
+    monkeypatch.setattr(Chain, "solve", pressed)
     with pytest.raises(KeyboardInterrupt):
         solver.solve(x, 0.1)
     assert 10 <= len(calls) < 20
