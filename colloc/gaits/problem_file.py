@@ -67,7 +67,7 @@ def load_problem(path: str | os.PathLike[str]) -> Problem:
     --------
     >>> import colloc
     >>> colloc.load_problem("problems/three_link.py")
-    <Problem three_link: 3 links, friction (1, 1, 1), 1 harmonic, symmetry bilateral, delta 1e-04>
+    <Problem three_link: 2 joints, friction (1, 1, 1), 1 harmonic, symmetry bilateral, delta 1e-04>
     """
     return read_problem_file(path).problem
 

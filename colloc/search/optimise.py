@@ -103,6 +103,12 @@ def maximise_efficiency(
     -------
     Solution
         With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
+
+    Examples
+    --------
+    >>> from colloc import Harmonic, Problem, ellipse, maximise_efficiency
+    >>> maximise_efficiency(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral"))).status
+    'solved'
     """
     begin = time.perf_counter()
     solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
