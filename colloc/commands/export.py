@@ -104,6 +104,8 @@ def _export(options: argparse.Namespace) -> int:
         raise ProblemError(f"--periods must be at least 1, not {options.periods}.")
     source = Path(options.result)
     solution = load(source)
+    if not solution.problem.gait.free:
+        raise ProblemError(f"{source} holds a prescribed motion of a smooth body: it has no joints to export.")
     kind = output_kind(options, ("csv", "json"))
     path = output_path(options.output, source.with_suffix(f".{kind}"))
     limits = options.max_speed

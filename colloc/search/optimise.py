@@ -109,9 +109,8 @@ def maximise_efficiency(
 
     Examples
     --------
-    >>> import colloc
-    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    >>> colloc.maximise_efficiency(problem).status
+    >>> from colloc import Harmonic, Problem, ellipse, maximise_efficiency
+    >>> maximise_efficiency(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral"))).status
     'solved'
     """
     begin = time.perf_counter()

@@ -195,6 +195,7 @@ def _two_bumps(crawler: Concertina) -> Motion:
 
     def state(t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Coefficients a, b and centre of the rear bump, with their rates."""
+        t, places = np.unique(t, return_inverse=True)  # a solver asks for the same phases panel by panel
         legs = [_ramp(t % 1.0, k / 4, (k + 1) / 4) for k in range(4)]
         phi, phi_rate = np.pi * (legs[0][0] - legs[2][0]), np.pi * (legs[0][1] - legs[2][1])
         centre = 0.25 + travel * (0.5 - legs[1][0] + legs[3][0])
@@ -203,7 +204,7 @@ def _two_bumps(crawler: Concertina) -> Motion:
         a, b = A * np.sin(phi), A * np.cos(phi)
         a_rate = (dA * np.sin(phi) + A * np.cos(phi)) * phi_rate
         b_rate = (dA * np.cos(phi) - A * np.sin(phi)) * phi_rate
-        return a, b, centre, a_rate, b_rate, centre_rate
+        return tuple(part[places] for part in (a, b, centre, a_rate, b_rate, centre_rate))
 
     def half(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Arc length of the point or its mirror image in the rear half, and +1 there or -1 in the front half."""

@@ -14,7 +14,9 @@ import pytest
 
 from colloc.commands.report import main
 from colloc.gaits.gait_fields import BODIES
-from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.path_classes import FreePath
+from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.problem import Problem, Reference
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -152,6 +154,8 @@ def test_every_check_of_a_certificate_is_put_in_plain_words(page, three_link):
         assert PLAIN[check.name] in unescape(page)
     source = Path(certificate.__file__).read_text(encoding="utf-8")
     limits = {kind.usual.limit_name for kind in BODIES}
+    path = arcs_through(ellipse(0.0, 1.0, 1.0), FreePath(), np.linspace(0.0, 1.0, 41))
+    limits |= {name for name, *_ in FreePath().own_checks(path)}
     assert set(re.findall(r'Check\(\s*"([^"]+)"', source)) | limits == set(PLAIN)
 
 

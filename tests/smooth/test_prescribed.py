@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from colloc.commands.export import main as export
 from colloc.gaits.gait_fields import body_from, class_from, fields
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.prescribed import Prescribed
@@ -44,6 +45,7 @@ def test_it_is_read_as_it_was_written(wave, tmp_path):
     assert (read.problem.hash, read.problem.body, read.problem.gait) == (wave.problem.hash, Wave(), wave.problem.gait)
     np.testing.assert_array_equal(read.sample(0.7).tail, wave.sample(0.7).tail)
     assert frames(read, count=5).ends.shape == (2, 97, 5)
+    assert export([str(tmp_path / "wave.h5"), "--period", "1"]) == 2
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, shape_speed, start_gait
+from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
@@ -108,7 +108,7 @@ def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, 
         angles = gait.angles(t)
         assert np.abs(angles).max() <= 2.8
         assert not crossing_depth(stated.body, angles).any()
-        assert shape_speed(gait) >= stated.smallest_shape_speed
+        assert gait.shape_speed >= stated.smallest_shape_speed
         again = stated.gait.fourier(stated.gait.parameters(gait), 2)
         assert phase_distance(gait, again) < 1e-7
         np.testing.assert_array_equal(angles, start_gait(stated, sampler, 3, k).angles(t))
