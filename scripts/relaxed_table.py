@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from scripts.bound_table import COEFFICIENTS
 DELTA, LEAST_EXTENT, FEW, PIECES = 1e-5, 0.3, 60, (6, 8, 10)
 """At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one, and
 pieces of the part that is solved, of the relaxed gaits that it is made from."""
+NEARLY_DRY = 4e-4
 BOUNDS = Path("results/curated/bound_table.md")
 HEAD = """# Relaxed gaits and finite ones near them: three equal links
 
@@ -79,13 +81,14 @@ def polygon(many: RelaxedSolution, folder: Path) -> RelaxedSolution:
         return load_relaxed(path)
     problem, sides, found = many.problem, round(FEW * many.problem.gait.fraction), []
     begin = time.process_time()
-    for pieces in PIECES:
-        coarse = problem.with_(intervals=pieces)
+    for directions, pieces in product((2, 3), PIECES):
+        coarse = problem.with_(gait=Relaxed(directions, problem.gait.symmetry), intervals=pieces)
         relaxed = relaxed_gaits(coarse, 0, first=(many.relaxed.mean.realised(),), least_extent=LEAST_EXTENT)[0].gait
         alone = relaxed.unmixed()
         if len(alone.durations) > sides:  # then without loops
             alone = relaxed.mean
-        stated = problem.with_(gait=Relaxed(1, relaxed.symmetry), intervals=sides)
+        # at a large delta it would fall back to what polygons without loops do
+        stated = problem.with_(gait=Relaxed(1, relaxed.symmetry), intervals=sides, delta_start=NEARLY_DRY)
         found.append(best_relaxed_gait(stated, 0, (1,), first=(alone,), least_extent=LEAST_EXTENT))
     best = max(found, key=lambda solution: solution.measured.efficiency)
     best.seconds = time.process_time() - begin
