@@ -31,7 +31,9 @@ def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray
 
 def _check_has_program(problem: Problem) -> None:
     if isinstance(problem.gait, Relaxed):
-        raise ProblemError("relaxed gaits have a search of their own: colloc solve, or colloc.search.relaxed_search.")
+        raise ProblemError(
+            "relaxed gaits have a search of their own: colloc solve FILE, or colloc.search.relaxed_search.best_relaxed_gait."
+        )
 
 
 def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:

@@ -4,7 +4,12 @@ import os
 import subprocess
 import sys
 
-PROGRAM = "from colloc.system.processors import one_thread_each; one_thread_each(); import os; print(os.environ['OPENBLAS_NUM_THREADS'])"
+PROGRAM = """
+import os
+from colloc.system.processors import one_thread_each
+one_thread_each()
+print(os.environ["OPENBLAS_NUM_THREADS"])
+"""
 
 
 def said(environment):
