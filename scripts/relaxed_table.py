@@ -34,8 +34,9 @@ HEAD = """# Relaxed gaits and finite ones near them: three equal links
 range over at least 0.3 rad; delta = 1e-5 at unit shape speed. *Gait*: the best certified finite gait, its corners, its
 distance a period and the largest joint angle. *60 corners*: the best certified polygon with 60. *Relaxed*: what finite gaits
 tend to, for delta -> 0. *Small gait*: the best infinitesimal gait, and *bound*: the smallest sampled bound valid for this
-limit, both of [bound_table.md](bound_table.md). *Gap*: of the relaxed gait to the bound, relative. CPU seconds on a loaded
-machine.
+limit; both of [bound_table.md](bound_table.md). *Gap*: of the relaxed gait to the bound, relative. CPU seconds on a loaded
+machine. A star: the relaxed gait's own certificate fails a check (constraint violation above 1e-8), so its value is not sharp.
+Few starts: what is found are lower ends, and a polygon may beat the relaxed gait of another basin.
 
 | mu_t, mu_f, mu_b | limit | gait | corners | distance | angle | 60 corners | relaxed | small gait | bound | gap | CPU s |
 |---|---|---|---|---|---|---|---|---|---|---|---|
@@ -102,12 +103,13 @@ def row(
     """A line of the table."""
     best, angle = many.best, np.abs(many.gait.corners).max()
     relaxed = many.certificate.efficiency_at_zero_delta
+    star = "" if many.certificate.passed else "*"
     bound = "" if known is None else f"{known[0]:.4f}"
     gap = "" if known is None else f"{100 * (1 - relaxed / known[0]):.1f} %"
     gait, simple = (f"{s.measured.efficiency:.4f}" + ("" if s.measured.passed else " (not certified)") for s in (many, few))
     return (
         f"| {mu[0]:g}, {mu[1]:g}, {mu[2]:g} | {limit:.4g} | {gait} | {best.corners} | {best.certificate.distance:.3f} "
-        f"| {angle:.3f} | {simple} | {relaxed:.4f} | {'' if known is None else f'{known[1]:.4f}'} | {bound} | {gap} "
+        f"| {angle:.3f} | {simple} | {relaxed:.4f}{star} | {'' if known is None else f'{known[1]:.4f}'} | {bound} | {gap} "
         f"| {many.seconds + few.seconds:.0f} |"
     )
 
