@@ -47,7 +47,7 @@ KEPT = {
     "crawlers.md": "python -m scripts.optimise_crawlers",
     "sweep_scaling.md": "python -m benchmarks.sweep_scaling --cells 24 --tasks 500 --dask",
     "bound_table.md": "python -m scripts.bound_table",
-    "three_link_relaxed.png": "colloc solve problems/three_link_relaxed.py",
+    "three_link_relaxed.png": "python -m colloc.solve problems/three_link_relaxed.py",
     "measure.png": "python -m scripts.measure_to_gait",
     "relaxed_table.md": "python -m scripts.relaxed_table --limits 2.5 --symmetry both --starts 1 --pieces 40",
     "without_contact.md": "python -m scripts.without_contact",

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from scripts.bound_table import COEFFICIENTS
 DELTA, LEAST_EXTENT, FEW, PIECES = 1e-5, 0.3, 60, (6, 8, 10)
 """At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one, and
 pieces of the part that is solved, of the relaxed gaits that it is made from."""
+NEARLY_DRY = 4e-4
 BOUNDS = Path("results/curated/bound_table.md")
 HEAD = """# Relaxed gaits and finite ones near them: three equal links
 
@@ -32,8 +34,9 @@ HEAD = """# Relaxed gaits and finite ones near them: three equal links
 range over at least 0.3 rad; delta = 1e-5 at unit shape speed. *Gait*: the best certified finite gait, its corners, its
 distance a period and the largest joint angle. *60 corners*: the best certified polygon with 60. *Relaxed*: what finite gaits
 tend to, for delta -> 0. *Small gait*: the best infinitesimal gait, and *bound*: the smallest sampled bound valid for this
-limit, both of [bound_table.md](bound_table.md). *Gap*: of the relaxed gait to the bound, relative. CPU seconds on a loaded
-machine.
+limit; both of [bound_table.md](bound_table.md). *Gap*: of the relaxed gait to the bound, relative. CPU seconds on a loaded
+machine. A star: the relaxed gait's own certificate fails a check (constraint violation above 1e-8), so its value is not sharp.
+Few starts: what is found are lower ends, and a polygon may beat the relaxed gait of another basin.
 
 | mu_t, mu_f, mu_b | limit | gait | corners | distance | angle | 60 corners | relaxed | small gait | bound | gap | CPU s |
 |---|---|---|---|---|---|---|---|---|---|---|---|
@@ -79,13 +82,14 @@ def polygon(many: RelaxedSolution, folder: Path) -> RelaxedSolution:
         return load_relaxed(path)
     problem, sides, found = many.problem, round(FEW * many.problem.gait.fraction), []
     begin = time.process_time()
-    for pieces in PIECES:
-        coarse = problem.with_(intervals=pieces)
+    for directions, pieces in product((2, 3), PIECES):
+        coarse = problem.with_(gait=Relaxed(directions, problem.gait.symmetry), intervals=pieces)
         relaxed = relaxed_gaits(coarse, 0, first=(many.relaxed.mean.realised(),), least_extent=LEAST_EXTENT)[0].gait
         alone = relaxed.unmixed()
         if len(alone.durations) > sides:  # then without loops
             alone = relaxed.mean
-        stated = problem.with_(gait=Relaxed(1, relaxed.symmetry), intervals=sides)
+        # at a large delta it would fall back to what polygons without loops do
+        stated = problem.with_(gait=Relaxed(1, relaxed.symmetry), intervals=sides, delta_start=NEARLY_DRY)
         found.append(best_relaxed_gait(stated, 0, (1,), first=(alone,), least_extent=LEAST_EXTENT))
     best = max(found, key=lambda solution: solution.measured.efficiency)
     best.seconds = time.process_time() - begin
@@ -99,12 +103,13 @@ def row(
     """A line of the table."""
     best, angle = many.best, np.abs(many.gait.corners).max()
     relaxed = many.certificate.efficiency_at_zero_delta
+    star = "" if many.certificate.passed else "*"
     bound = "" if known is None else f"{known[0]:.4f}"
     gap = "" if known is None else f"{100 * (1 - relaxed / known[0]):.1f} %"
     gait, simple = (f"{s.measured.efficiency:.4f}" + ("" if s.measured.passed else " (not certified)") for s in (many, few))
     return (
         f"| {mu[0]:g}, {mu[1]:g}, {mu[2]:g} | {limit:.4g} | {gait} | {best.corners} | {best.certificate.distance:.3f} "
-        f"| {angle:.3f} | {simple} | {relaxed:.4f} | {'' if known is None else f'{known[1]:.4f}'} | {bound} | {gap} "
+        f"| {angle:.3f} | {simple} | {relaxed:.4f}{star} | {'' if known is None else f'{known[1]:.4f}'} | {bound} | {gap} "
         f"| {many.seconds + few.seconds:.0f} |"
     )
 

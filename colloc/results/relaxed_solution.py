@@ -22,6 +22,8 @@ from colloc.system.errors import NotConvergedError
 
 STATIONARY = 1e-3
 """Largest slope of the Lagrangian of the reduced program at a relaxed optimum: the efficiency is off by about its square."""
+_NEAR, _MOST_CORNERS = 5e-3, 10_000
+"""Relative loss of a finite gait that is near enough, and corners over a period, at most, of one."""
 _GRID = 2000
 """Instants of a motion to draw, besides the corners, where the rates jump."""
 
@@ -219,23 +221,35 @@ def finite_certificate(problem: Problem, gait: Corners, instants: int = 1600, to
 
 
 def realised_gaits(
-    problem: Problem, gait: Mixture, repeats: tuple[int, ...], report: Callable[[str], None] = lambda _: None
+    problem: Problem,
+    gait: Mixture,
+    repeats: tuple[int, ...],
+    tends_to: float = 0.0,
+    report: Callable[[str], None] = lambda _: None,
 ) -> tuple[Realised, ...]:
     """Finite gaits for several numbers of repeats, of either sense of their loops the better one.
+
+    Where none of them comes near the relaxed efficiency `tends_to`, since loops are large, the last number is doubled until
+    one does, or has too many corners to be of use.
 
     Raises
     ------
     NotConvergedError
-        If none can be replayed.
+        If there are to be none.
     """
-    found = []
-    for m in repeats:
+    found: list[Realised] = []
+    wanted = list(repeats)
+    while wanted:
+        m = wanted.pop(0)
         report(f"certifying {m} repeats")
         both = []
         for sense in (1, -1):
             corners = gait.realised(m, sense)
             both.append(Realised(m, sense, corners, finite_certificate(problem, corners)))
         found.append(max(both, key=lambda r: (r.certificate.passed, r.certificate.efficiency)))
+        far = max(r.certificate.efficiency for r in found) < (1 - _NEAR) * tends_to
+        if not wanted and far and 2 * found[-1].corners < _MOST_CORNERS:
+            wanted.append(2 * m)
     if not found:
         raise NotConvergedError("a relaxed gait was to be realised by no repeats at all.")
     return tuple(found)

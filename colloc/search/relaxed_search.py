@@ -209,7 +209,7 @@ def best_relaxed_gait(
     problem, starts, seconds, report, first, least_extent
         See `relaxed_gaits`.
     repeats : tuple of int
-        Of the directions on every piece, in the finite gaits.
+        Of the directions on every piece, in the finite gaits; more if these lose more than half a percent.
     """
     begin = time.perf_counter()
     best, *others = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
@@ -220,12 +220,13 @@ def best_relaxed_gait(
     free = (gait.durations <= _IDLE).any(axis=1)
     price = float(prices(best)[0][free].min(initial=0.0))
     optimality = Optimality(-best.objective, conditions.kkt_error, conditions.violation, price, best.iterations)
+    certificate = relaxed_certificate(problem, gait, optimality)
     return RelaxedSolution(
         problem,
         gait,
         optimality,
-        relaxed_certificate(problem, gait, optimality),
-        realised_gaits(problem, gait, repeats, report),
+        certificate,
+        realised_gaits(problem, gait, repeats, certificate.efficiency, report),
         time.perf_counter() - begin,
         starts=starts,
         others=tuple((-other.objective, other.gait.extent) for other in others),

@@ -5,7 +5,8 @@ import pytest
 
 from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency, replay
 from colloc.reduced.mixture_space import MixtureSpace
-from colloc.results.relaxed_solution import Optimality, finite_certificate, relaxed_certificate
+from colloc.results import relaxed_solution
+from colloc.results.relaxed_solution import Optimality, finite_certificate, realised_gaits, relaxed_certificate
 from colloc.results.relaxed_store import is_relaxed, load_relaxed, save_relaxed
 from colloc.search.reduced_search import VERY_ROUGH, Found, settled
 from colloc.search.relaxed_search import best_relaxed_gait, prices, readied
@@ -35,6 +36,15 @@ def test_what_finite_gaits_lose_falls_with_the_number_of_repeats(solution):
     assert lost[0] > 0
     assert lost[1] < 0.7 * lost[0]
     assert lost[2] < 0.7 * lost[1]
+
+
+def test_repeats_are_doubled_where_finite_gaits_stay_far_from_what_they_tend_to(solution, monkeypatch):
+    monkeypatch.setattr(relaxed_solution, "_MOST_CORNERS", 600)
+    near = realised_gaits(solution.problem, solution.relaxed, (1,), 0.9 * solution.certificate.efficiency)
+    assert [r.repeats for r in near] == [1]
+    far = realised_gaits(solution.problem, solution.relaxed, (1,), 2 * solution.certificate.efficiency)
+    assert [r.repeats for r in far][:2] == [1, 2]
+    assert 300 <= far[-1].corners < 600
 
 
 def test_the_replay_of_a_relaxed_gait_is_the_limit_of_replays_of_finite_ones(solution):
