@@ -58,7 +58,7 @@ def disagreement(recorded: Certificate, now: Certificate) -> str:
 
 
 def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
-    """A new certificate on other instants than the one in the file.
+    """A new certificate on other instants than the one in the file, whose check of second order is taken over.
 
     Raises
     ------
@@ -67,7 +67,8 @@ def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
     """
     solution.last  # noqa: B018  raises
     before = solution.certificate.instants or 1600
-    return certify(solution, tolerance=tolerance, instants=2 * (3 * before // 8) + 2)
+    known = next((check for check in solution.certificate.checks if check.name == "second order"), None)
+    return certify(solution, tolerance=tolerance, instants=2 * (3 * before // 8) + 2, second_order=known)
 
 
 def _verify_relaxed(solution: RelaxedSolution, options: argparse.Namespace) -> int:

@@ -10,8 +10,6 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.second_order import curvature
-from colloc.reduced.spaces import space_near
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
 from colloc.results.solution import Solution
@@ -39,7 +37,9 @@ def gait_path(solution: Solution) -> Path:
     return lambda t: (gait.angles(t), gait.rates(t))
 
 
-def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
+def certify(
+    solution: Solution, *, tolerance: float = 1e-6, instants: int | None = None, second_order: Check | None = None
+) -> Certificate:
     """Replay the last level's gait on a much finer grid and measure everything a claim of success rests on.
 
     Parameters
@@ -49,6 +49,8 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
         Relative error of the replayed efficiency; a replay that does not reach it fails its check.
     instants : int, optional
         Instants of the first replay grid; by default many times the collocation points of a period.
+    second_order : Check, optional
+        The check of second order, where it was made before: it is the only one that needs CasADi.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def certify(solution: Solution, *, tolerance: float = 1e-6, instants: int | None
         instants,
         tolerance,
         claimed=solution.efficiency,
-        before=(*_optimality(solution), _second_order(solution)),
+        before=(*_optimality(solution), second_order or _second_order(solution)),
         after=(*_class(solution), *_mesh(solution)),
     )
 
@@ -188,6 +190,9 @@ def _second_order(solution: Solution) -> Check:
     problem, level = solution.problem, solution.last
     if not problem.gait.free:
         return Check("second order", 0.0, SADDLE, "nothing is free in a prescribed motion")
+    from colloc.reduced.second_order import curvature  # both load CasADi
+    from colloc.reduced.spaces import space_near
+
     space, v = space_near(problem, solution.gait, level.edges, level.scheme)
     space = space.with_far(problem.body.far_pairs)
     space.move_checks(v)

@@ -10,6 +10,7 @@ from colloc.commands.verify import main as recheck
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.paths import ArcPath
 from colloc.mechanics.body import Chain
+from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
 from colloc.results.certificate import certify
@@ -256,15 +257,15 @@ def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link, monk
 
     def run(f, error=0.0):
         found = Curvature(-(f * 1e-2 + error) * size, error * size, 2, np.array([1.0, 0.0, 0.0]), 0.0)
-        monkeypatch.setattr(verify, "curvature", lambda *a: found)
+        monkeypatch.setattr(second_order, "curvature", lambda *a: found)
         return failures()
 
     judged("second order", run)
     assert run(0.5, error=1.0) == set()
     assert run(1.1, error=1.0) == {"second order"}
-    monkeypatch.setattr(verify, "curvature", lambda *a: Curvature(-1.0, 0.0, 3, np.eye(3)[0], 0.0))
+    monkeypatch.setattr(second_order, "curvature", lambda *a: Curvature(-1.0, 0.0, 3, np.eye(3)[0], 0.0))
     assert "a saddle" in next(c.meaning for c in certify(three_link).checks if c.name == "second order")
-    monkeypatch.setattr(verify, "curvature", lambda *a: Curvature(1e-6, 0.0, 3, np.eye(3)[0], 0.0))
+    monkeypatch.setattr(second_order, "curvature", lambda *a: Curvature(1e-6, 0.0, 3, np.eye(3)[0], 0.0))
     assert "flat" in next(c.meaning for c in certify(three_link).checks if c.name == "second order")
 
 
