@@ -107,7 +107,7 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
     assert all(f"  {name} " in printed for name in SUBCOMMANDS)
     assert main([]) == 2
     capsys.readouterr()
-    for words, hint in ((["repot"], "colloc report?"), (["x.py"], "colloc solve x.py?"), (["zzzz"], "choose one of init, solve,")):
+    for words, hint in ((["repot"], "colloc report?"), (["x.py"], "colloc solve x.py?"), (["zzzz"], "choose one of init,")):
         assert main(words) == 2
         assert hint in capsys.readouterr().err
     assert main(["--version"]) == 0
