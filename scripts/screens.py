@@ -15,7 +15,6 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-import markdown
 import numpy as np
 from PIL import Image
 
@@ -96,6 +95,8 @@ def main() -> int:
         if code:
             return code
         report([str(folder / "mine.h5"), "--quiet"])
+        import markdown  # of the extra docs
+
         body = markdown.markdown((ROOT / "README.md").read_text(encoding="utf-8"), extensions=["tables", "fenced_code"])
         (folder / "readme.html").write_text(_HOST.format(base=f"file://{ROOT}/", body=body), encoding="utf-8")
         page, site = f"file://{folder / 'mine.html'}#t=1.4", folder / "site"
