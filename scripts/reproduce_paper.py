@@ -15,7 +15,7 @@ from pathlib import Path
 from colloc.system.errors import CollocError
 from colloc.system.processors import available_processes
 from scripts.paper import crawlers, map, pacing, static, three_link, waves
-from scripts.paper.study import Part, Study
+from scripts.paper.study import PaperStudy, Part
 
 DELTA = 1e-4
 
@@ -144,9 +144,9 @@ PARTS = (
 )
 
 
-def study(folder: Path, *, quick: bool) -> Study:
+def study(folder: Path, *, quick: bool) -> PaperStudy:
     """The reproduction with its files in `folder`."""
-    return Study(PARTS, folder, quick=quick)
+    return PaperStudy(PARTS, folder, quick=quick)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -27,7 +27,7 @@ _MAX_ITERATIONS = 300
 
 
 @dataclass(frozen=True)
-class Motion:
+class CoulombMotion:
     """Balanced motions, one a column.
 
     Attributes
@@ -52,32 +52,34 @@ class Motion:
     def size(self) -> int:
         return self.spin.size
 
-    def take(self, chosen: np.ndarray) -> Motion:
+    def take(self, chosen: np.ndarray) -> CoulombMotion:
         """The motions of the chosen columns."""
-        return Motion(
+        return CoulombMotion(
             self.angles[:, chosen], self.rates[:, chosen], self.velocity[:, chosen], self.spin[chosen], self.power[chosen]
         )
 
-    def joined(self, other: Motion) -> Motion:
+    def joined(self, other: CoulombMotion) -> CoulombMotion:
         """These motions followed by others."""
-        return Motion(*(np.concatenate([getattr(self, k), getattr(other, k)], axis=-1) for k in _FIELDS))
+        return CoulombMotion(*(np.concatenate([getattr(self, k), getattr(other, k)], axis=-1) for k in _FIELDS))
 
-    def reversed(self) -> Motion:
+    def reversed(self) -> CoulombMotion:
         """The motions for the opposite rates; these are balanced only if mu_b = mu_f."""
-        return Motion(self.angles, -self.rates, -self.velocity, -self.spin, self.power)
+        return CoulombMotion(self.angles, -self.rates, -self.velocity, -self.spin, self.power)
 
 
 _FIELDS = ("angles", "rates", "velocity", "spin", "power")
 
 
-def balanced_motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA) -> Motion:
+def balanced_motion(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
+) -> CoulombMotion:
     """One motion for each of some shapes and joint rates ``(n_joint, n)``; those that do not converge are left out."""
     return _one_motion(body, friction, angles, rates, delta)[0]
 
 
 def _one_motion(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float
-) -> tuple[Motion, np.ndarray]:
+) -> tuple[CoulombMotion, np.ndarray]:
     solution = solve_balance(body, friction, angles, rates, delta, max_iterations=_MAX_ITERATIONS)
     kept = np.flatnonzero(solution.converged)
     return _motion(body, friction, angles[:, kept], rates[:, kept], solution.z[:, kept], delta), kept
@@ -85,7 +87,7 @@ def _one_motion(
 
 def all_motions(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
-) -> tuple[Motion, np.ndarray]:
+) -> tuple[CoulombMotion, np.ndarray]:
     """All balanced motions for shapes and joint rates ``(n_joint, n)``, and of which of these each is, ``(n_motion,)``."""
     if friction.isotropic:
         return _one_motion(body, friction, angles, rates, delta)
@@ -94,11 +96,13 @@ def all_motions(
     return _motion(body, friction, angles[:, source], rates[:, source], found.z[root, :, source].T, delta), source
 
 
-def _motion(body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> Motion:
+def _motion(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
+) -> CoulombMotion:
     now = instant(body, friction, angles, rates, z, delta)
     middle = body.n_link // 2
     velocity = np.stack([now.velocity.vs[middle], now.velocity.vn[middle]])
-    return Motion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0])
+    return CoulombMotion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0])
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:

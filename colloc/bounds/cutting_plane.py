@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from colloc.bounds.coulomb_motion import Motion
+from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.bounds.sampling import Domain
@@ -43,7 +43,7 @@ class Optimum(NamedTuple):
     free: np.ndarray
     floor: float
     top: float
-    summit: Motion
+    summit: CoulombMotion
     samples: int
     rounds: int
     converged: bool
@@ -101,12 +101,12 @@ class _Program:
             self._exchange(ratio, heading)
         return float(self.samples.ratio(self.best.x)[0].max())
 
-    def add(self, motion: Motion) -> None:
+    def add(self, motion: CoulombMotion) -> None:
         if motion.size:
             self.samples = self.samples.joined(motion)
 
 
-def _starts(motion: Motion, ratio: np.ndarray, level: float, spacing: float, count: int) -> np.ndarray:
+def _starts(motion: CoulombMotion, ratio: np.ndarray, level: float, spacing: float, count: int) -> np.ndarray:
     """Indices of up to `count` of the largest that come near `level`, one for each cell of shapes and directions."""
     near = np.flatnonzero(ratio > level - _WINDOW)
     near = near[np.argsort(-ratio[near])]
@@ -153,7 +153,7 @@ def exchanged_optimum(
         held = program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
         free = program.best.x
 
-        def ratio(motion: Motion, free: np.ndarray = free) -> np.ndarray:
+        def ratio(motion: CoulombMotion, free: np.ndarray = free) -> np.ndarray:
             return Samples(space, motion).ratio(free)[0]
 
         last = quiet > 0 or count == rounds

@@ -36,7 +36,7 @@ _LOADS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Guarantee:
     """What the cells prove.
 
     Attributes
@@ -212,7 +212,7 @@ def certify(
     multiplier: float = 4.0,
     deepest: int = 9,
     delta: float = 1e-7,
-) -> Certificate:
+) -> Guarantee:
     """Prove that no gait of a three-link body exceeds `target`, or as low a value as the time allows.
 
     Parameters
@@ -276,12 +276,12 @@ def certify(
         low = (low[:, :, None] + size[:, None, None] * _CORNERS.T[:, None, :]).reshape(3, -1)
         parents = np.repeat(parents, 8)
     worst = float(parents.max(initial=0.0)) / friction.mu_t
-    return Certificate(
+    return Guarantee(
         max(target, worst), target, int(parents.size), examined, largest / friction.mu_t, time.process_time() - begin
     )
 
 
-def with_guarantee(bound: Bound, certificate: Certificate) -> Bound:
+def with_guarantee(bound: Bound, certificate: Guarantee) -> Bound:
     """The bound together with what was proved; what is still missing is named if cells were left open."""
     missing = "" if certificate.open_cells == 0 else f"{certificate.open_cells} of {certificate.cells} cells left open"
     return dataclasses.replace(bound, guaranteed=certificate.guaranteed, missing=missing)

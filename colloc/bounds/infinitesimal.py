@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from colloc.bounds.coulomb_motion import Motion, admissible, balanced_motion, fundamental, unit_directions
+from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion, fundamental, unit_directions
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError
@@ -52,11 +52,11 @@ class _Program:
     def __init__(self, body: Chain, friction: Friction, shape: np.ndarray, delta: float) -> None:
         self.body, self.friction, self.shape, self.delta = body, friction, np.asarray(shape, dtype=float), delta
 
-    def motion(self, rates: np.ndarray) -> Motion:
+    def motion(self, rates: np.ndarray) -> CoulombMotion:
         angles = np.repeat(self.shape[:, None], rates.shape[1], axis=1)
         return balanced_motion(self.body, self.friction, angles, rates, self.delta)
 
-    def solve(self, motion: Motion, heading: float) -> tuple[float, np.ndarray, np.ndarray]:
+    def solve(self, motion: CoulombMotion, heading: float) -> tuple[float, np.ndarray, np.ndarray]:
         """Efficiency along `heading`, weights of the motions, and multipliers of closure, rotation and work."""
         along = np.cos(heading) * motion.velocity[0] + np.sin(heading) * motion.velocity[1]
         closed = np.vstack([motion.rates, motion.spin, motion.power])
@@ -67,15 +67,15 @@ class _Program:
             raise NotConvergedError(f"the linear program of the small gait failed: {program.message}")
         return -program.fun, program.x, -program.eqlin.marginals
 
-    def turned(self, motion: Motion, weights: np.ndarray) -> tuple[float, np.ndarray]:
+    def turned(self, motion: CoulombMotion, weights: np.ndarray) -> tuple[float, np.ndarray]:
         """Direction of travel and displacement of a mixture."""
         way = motion.velocity @ weights
         return float(np.arctan2(way[1], way[0])), way
 
-    def climbed(self, motion: Motion, heading: float, multipliers: np.ndarray, turn: float) -> np.ndarray:
+    def climbed(self, motion: CoulombMotion, heading: float, multipliers: np.ndarray, turn: float) -> np.ndarray:
         """Rate directions whose reduced gain is locally largest: what the program would most like to add."""
 
-        def reduced(some: Motion) -> np.ndarray:
+        def reduced(some: CoulombMotion) -> np.ndarray:
             along = np.cos(heading) * some.velocity[0] + np.sin(heading) * some.velocity[1]
             return (along - multipliers @ np.vstack([some.rates, some.spin, some.power])) / some.power
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import Motion
+from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.gaits.paths import Corners
 from colloc.gaits.symmetry import BILATERAL
 from colloc.system.errors import ProblemError
@@ -30,7 +30,7 @@ class Measure:
 
     Attributes
     ----------
-    motion : Motion
+    motion : CoulombMotion
         Shapes and unit directions.
     heading : (n,)
         Of the middle link [rad]; the body travels along 0.
@@ -38,7 +38,7 @@ class Measure:
         Share of the work, of sum 1.
     """
 
-    motion: Motion
+    motion: CoulombMotion
     heading: np.ndarray
     weight: np.ndarray
 

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from colloc.bounds.coulomb_motion import Motion
+from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.numerics.spline import TensorSpline
 
 _HEADINGS = 48
@@ -82,12 +82,12 @@ class PotentialSpace:
 class Samples:
     """Motions with what a potential needs to be evaluated on them."""
 
-    def __init__(self, space: PotentialSpace, motion: Motion) -> None:
+    def __init__(self, space: PotentialSpace, motion: CoulombMotion) -> None:
         self.space, self.motion = space, motion
         self.value = space.spline.matrix(motion.angles)
         self.slope = space.spline.slope(motion.angles, motion.rates)
 
-    def joined(self, motion: Motion) -> Samples:
+    def joined(self, motion: CoulombMotion) -> Samples:
         """These samples and new ones."""
         new = Samples(self.space, motion)
         both = Samples.__new__(Samples)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import Motion, admissible, all_motions, fundamental, unit_directions
+from colloc.bounds.coulomb_motion import CoulombMotion, admissible, all_motions, fundamental, unit_directions
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 
@@ -40,11 +40,11 @@ class Domain:
         inside = (np.abs(angles) <= self.joint_limit + 1e-12).all(axis=0)
         return inside & admissible(self.body, angles, _EDGE)
 
-    def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[Motion, np.ndarray]:
+    def solved(self, angles: np.ndarray, rates: np.ndarray) -> tuple[CoulombMotion, np.ndarray]:
         """All balanced motions, and the column of shapes and rates that each is of."""
         return all_motions(self.body, self.friction, angles, rates, _DELTA)
 
-    def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> Motion:
+    def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> CoulombMotion:
         """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions.
 
         One of each class of mirror images; with directed friction the end swap reverses time, so both senses of every rate
@@ -62,14 +62,14 @@ class Domain:
 
     def summits(
         self,
-        value: Callable[[Motion], np.ndarray],
-        start: Motion,
+        value: Callable[[CoulombMotion], np.ndarray],
+        start: CoulombMotion,
         spacing: float,
         turn: float,
         steps: int,
         rng: np.random.Generator,
         hopeless: float = -np.inf,
-    ) -> Motion:
+    ) -> CoulombMotion:
         """Climb `value` from every motion of `start`, ``(n_joint, n)``, in random directions of shape and rates.
 
         Pattern search: ridges where a link changes between stick and slip are creases, and run at any angle to the axes.

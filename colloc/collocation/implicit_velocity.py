@@ -12,7 +12,7 @@ _TOLERANCE, ACCEPTED = 1e-12, 1e3
 """Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
 
 
-class VelocityMap(ca.Callback):
+class ImplicitVelocity(ca.Callback):
     """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``; not differentiable by CasADi.
 
     The start only saves steps; NaN stands for the velocities last found. The same arguments are not solved twice. An

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.collocation.implicit_velocity import VelocityMap
+from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import Layout, problem_layout, problem_mesh
 from colloc.collocation.path_equations import ADVANCE, OMEGA, POWER, arc, full_path_point, path_point, side, squared_distance
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
@@ -46,7 +46,7 @@ class PathTranscription:
     constraint_lower: np.ndarray
     constraint_upper: np.ndarray
     groups: dict[str, slice]
-    velocity: VelocityMap | None
+    velocity: ImplicitVelocity | None
 
     def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> PathTranscription:
         """The program with other bounds of its rows."""
@@ -174,7 +174,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
         quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
     ]
-    velocity = VelocityMap(problem.body, problem.friction, n_point)
+    velocity = ImplicitVelocity(problem.body, problem.friction, n_point)
     piece = geometry.piece
     place = ca.Function("place", [piece.shape, piece.given], [piece.angles, piece.direction]).map(n_point)
     unknown = ca.DM(np.full((3, n_point), np.nan))
@@ -223,7 +223,7 @@ def _assembled(
     groups: list[Group],
     objective: Block,
     implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]],
-    velocity: VelocityMap | None,
+    velocity: ImplicitVelocity | None,
 ) -> PathTranscription:
     rows = np.cumsum([0] + [g.m for g in groups])
     linear = sparse.vstack([g.linear for g in groups]).tocsr()

@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.collocation.implicit_velocity import VelocityMap
+from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.collocation.point_equations import N_RATE, gait_check, mean_square, minus_efficiency, point_function
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
@@ -58,7 +58,7 @@ class Transcription:
         Names of the constraint rows, in order.
     checks : list of ShapeCheck
         Shape functions whose largest value in each mesh cell is constrained.
-    velocity : VelocityMap
+    velocity : ImplicitVelocity
         Kept alive here for the functions that call it.
     """
 
@@ -72,7 +72,7 @@ class Transcription:
     constraint_upper: np.ndarray
     groups: dict[str, slice]
     checks: list[ShapeCheck]
-    velocity: VelocityMap
+    velocity: ImplicitVelocity
 
     def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> Transcription:
         """The program with other bounds of its rows."""
@@ -170,7 +170,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
             {"shape speed": sparse.eye(1, format="csr")},
         ),
     ]
-    velocity = VelocityMap(problem.body, problem.friction, mesh.n_point)
+    velocity = ImplicitVelocity(problem.body, problem.friction, mesh.n_point)
 
     def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])

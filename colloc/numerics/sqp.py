@@ -29,7 +29,7 @@ _TRIED, _DAMPED = 12, 0.2
 """Points along a step; the least curvature along it, as a share of what was known (Powell)."""
 
 
-class ReducedProgram(Protocol):
+class NonlinearProgram(Protocol):
     """Minimise ``objective(v)`` with v within ``lower, upper`` and ``rows(v)`` within ``row_lower, row_upper``; where those are
     equal, rows are equations."""
 
@@ -77,7 +77,7 @@ class Stationarity:
     on_bounds: np.ndarray
 
 
-def stationarity(program: ReducedProgram, v: np.ndarray) -> Stationarity:
+def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
     """Measure the first-order conditions at v, with the non-negative multipliers that minimise the Lagrangian's gradient."""
     gradient, rows, slopes = program.gradient(v), program.rows(v), program.row_slopes(v)
     values, unit = np.concatenate([rows, v]), np.vstack([slopes, np.eye(v.size)])
@@ -135,14 +135,14 @@ class _Point:
     outside: np.ndarray
 
     @classmethod
-    def at(cls, program: ReducedProgram, v: np.ndarray) -> _Point:
+    def at(cls, program: NonlinearProgram, v: np.ndarray) -> _Point:
         value, rows = program.objective(v), np.nan_to_num(program.rows(v), nan=_NOWHERE)
         outside = np.maximum(np.maximum(program.row_lower - rows, rows - program.row_upper), 0.0)
         return cls(v, value if np.isfinite(value) else _NOWHERE, rows, outside)
 
 
 def minimised(
-    program: ReducedProgram,
+    program: NonlinearProgram,
     v: np.ndarray,
     radius: float,
     accuracy: float,
@@ -156,7 +156,7 @@ def minimised(
 
     Parameters
     ----------
-    program : ReducedProgram
+    program : NonlinearProgram
     v : (n,)
     radius : float
     accuracy : float
@@ -199,7 +199,7 @@ def minimised(
 
 
 def _improved(
-    program: ReducedProgram, here: _Point, d: np.ndarray, price: np.ndarray, promised: float
+    program: NonlinearProgram, here: _Point, d: np.ndarray, price: np.ndarray, promised: float
 ) -> tuple[_Point | None, int]:
     """The first point along a step that keeps a tenth of what the model promises, if there is one; points tried."""
     merit, size = here.objective + price @ here.outside, 1.0

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import null_space
 
-from colloc.numerics.sqp import ReducedProgram, stationarity
+from colloc.numerics.sqp import NonlinearProgram, stationarity
 
 _STEP = 1e-6
 """Of the differences, over the length of the parameters' vector."""
@@ -49,7 +49,7 @@ class Curvature:
     kkt_error: float
 
 
-def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
+def curvature(program: NonlinearProgram, v: np.ndarray) -> Curvature:
     """Smallest curvature of the Lagrangian at v, a point that satisfies the first-order conditions; ``2 n_free + 2`` gradients.
 
     Examples

@@ -18,7 +18,7 @@ SAMPLES = 401
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Motion:
+class SampledMotion:
     """The body at given instants, ``n_time`` columns each.
 
     Attributes
@@ -43,7 +43,7 @@ class Motion:
     tail: np.ndarray
 
     def __repr__(self) -> str:
-        return f"<Motion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
+        return f"<SampledMotion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
 
 
 class Column(NamedTuple):
@@ -54,7 +54,7 @@ class Column(NamedTuple):
     dims: tuple[str, ...]
 
 
-def motion_columns(motion: Motion, power: np.ndarray) -> dict[str, Column]:
+def motion_columns(motion: SampledMotion, power: np.ndarray) -> dict[str, Column]:
     """Name to column, with the power against friction ``(n_time,)``."""
     return {
         "t": Column(motion.t, "period", ("t",)),

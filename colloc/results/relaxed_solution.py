@@ -17,7 +17,7 @@ from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
 from colloc.results.certificate import VIOLATION, gait_certificate
 from colloc.results.checks import Certificate, Check
-from colloc.results.solution import CERTIFICATE_FAILED, SOLVED, Motion, versions
+from colloc.results.solution import CERTIFICATE_FAILED, SOLVED, SampledMotion, versions
 from colloc.system.errors import NotConvergedError
 
 STATIONARY = 1e-3
@@ -168,7 +168,7 @@ class RelaxedSolution:
         ahead = np.conj(centre[-1]) / max(abs(centre[-1]), 1e-300)
         return edges, motion.z, theta + np.angle(ahead), centre * ahead
 
-    def sample(self, t: np.ndarray | float) -> Motion:
+    def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion of the best finite gait at phases t, good enough to draw; whole periods add up."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         period, phase = np.divmod(t, 1.0)
@@ -180,9 +180,9 @@ class RelaxedSolution:
         cx, cy = body.centre(angles)
         tail = place - np.exp(1j * theta_at) * (cx + 1j * cy)
         lab = np.stack([place.real, place.imag])
-        return Motion(t, angles, self.gait.rates(phase), z, theta_at, lab, np.stack([tail.real, tail.imag]))
+        return SampledMotion(t, angles, self.gait.rates(phase), z, theta_at, lab, np.stack([tail.real, tail.imag]))
 
-    def power(self, motion: Motion) -> np.ndarray:
+    def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         problem = self.problem
         delta = np.full((1, motion.t.size), self.delta_per_period)

@@ -21,7 +21,7 @@ from colloc.numerics.schemes import scheme
 from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.level import Level
-from colloc.results.motion import SAMPLES, Column, Motion, motion_columns, motion_dataset, motion_frame
+from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.solution_card import solution_card
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -187,7 +187,7 @@ class Solution:
         angles, rates = gait.angles(times), gait.rates(times)
         return angles, rates, problem.body.solve(problem.friction, angles, rates, self.delta_per_period).z
 
-    def sample(self, t: np.ndarray | float) -> Motion:
+    def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers; whole periods add up.
 
         Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's, so that the error
@@ -222,7 +222,7 @@ class Solution:
         cx, cy = body.centre(angles)
         c, s = np.cos(theta), np.sin(theta)
         tail = centre - np.stack([c * cx - s * cy, s * cx + c * cy])
-        return Motion(t, angles, rates, z, theta, centre, tail)
+        return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
     def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """z, theta and centre of mass at phases t of the solved part, and the centre's displacement at its end."""
@@ -245,7 +245,7 @@ class Solution:
         centre = edges[:, k] + mesh.h[k] * np.einsum("ts,cts->ct", integral, lab[:, points])
         return z, theta, centre, edges[:, -1]
 
-    def power(self, motion: Motion) -> np.ndarray:
+    def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         problem = self.problem
         delta = np.full((1, motion.t.size), self.delta_per_period)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from colloc.pictures.style import styled
 from scripts.paper import figures_bodies, figures_crawlers, figures_maps
-from scripts.paper.study import Study
+from scripts.paper.study import PaperStudy
 
 FIGURES: tuple[tuple[Callable[..., list[Path]], tuple[str, ...]], ...] = (
     (figures_bodies.figure_3, ("instant",)),
@@ -26,7 +26,7 @@ FIGURES: tuple[tuple[Callable[..., list[Path]], tuple[str, ...]], ...] = (
 """Each figure, and the parts whose arrays it takes in this order."""
 
 
-def draw_all(study: Study, folder: Path) -> list[Path]:
+def draw_all(study: PaperStudy, folder: Path) -> list[Path]:
     """Draw all figures whose parts are finished, and return the files written."""
     paths: list[Path] = []
     with styled():

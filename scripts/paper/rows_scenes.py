@@ -9,10 +9,10 @@ import numpy as np
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.link_friction import link_force
 from scripts.paper.rows import Row, number_row, statement_row
-from scripts.paper.study import Study
+from scripts.paper.study import PaperStudy
 
 
-def instant(study: Study) -> Iterator[Row]:
+def instant(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("instant")
     u, v, omega = made["z"][0]
     change = np.abs(made["z"][0] - made["z"][-1]).max()
@@ -25,7 +25,7 @@ def instant(study: Study) -> Iterator[Row]:
     )
 
 
-def static(study: Study) -> Iterator[Row]:
+def static(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("static")
     fraction = made["fraction"][list(made["fraction_deltas"]).index(1e-4)]
     sampled = float(np.sqrt(fraction * (1 - fraction) / made["samples"]))
@@ -67,7 +67,7 @@ def static(study: Study) -> Iterator[Row]:
     )
 
 
-def flap(study: Study) -> Iterator[Row]:
+def flap(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("flap")
     holds = bool(made["no_solution"].all())
     least = float(np.abs(made["gap"]).min())
@@ -88,7 +88,7 @@ def flap(study: Study) -> Iterator[Row]:
     )
 
 
-def waves(study: Study) -> Iterator[Row]:
+def waves(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("waves")
     for name, printed in (("5A", "0.93"), ("5B", "0.76")):
         yield number_row(
@@ -113,7 +113,7 @@ def waves(study: Study) -> Iterator[Row]:
         )
 
 
-def wave_parameters(study: Study) -> Iterator[Row]:
+def wave_parameters(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("wave_parameters")
     for name, value in zip(made["names"], made["efficiency"], strict=True):
         printed = "0.93" if name.startswith("A") else "0.76"
@@ -139,7 +139,7 @@ def wave_parameters(study: Study) -> Iterator[Row]:
     yield Row("wave B: mu_t that gives the printed value", "100", f"{float(made['mu_t_for_B']):.0f}", "1 (root search)", "-")
 
 
-def crawlers(study: Study) -> Iterator[Row]:
+def crawlers(study: PaperStudy) -> Iterator[Row]:
     """Rows on the concertina crawlers (figure 13)."""
     made = study.arrays("crawlers")
     smallest = int(np.argmin(made["epsilon"]))

@@ -9,10 +9,10 @@ import numpy as np
 from scripts.models.motion_record import third_slowest_dips
 from scripts.paper.array_store import read_attribute
 from scripts.paper.rows import Row, number_row, statement_row
-from scripts.paper.study import Arrays, Study
+from scripts.paper.study import Arrays, PaperStudy
 
 
-def connection(study: Study) -> Iterator[Row]:
+def connection(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("connection")
     cubic = list(made["methods"]).index("cubic")
     for n, errors in zip(made["resolutions"], made["errors"], strict=True):
@@ -28,7 +28,7 @@ def connection(study: Study) -> Iterator[Row]:
     yield statement_row("maps needed if mu_b != mu_f", "two more", f"{faces - 2} more", faces == 4)
 
 
-def sweep(study: Study) -> Iterator[Row]:
+def sweep(study: PaperStudy) -> Iterator[Row]:
     s = study.arrays("sweep")
     count = int(s["inside"].sum())
     moving = np.hypot(*np.meshgrid(s["A1"], s["B1"], indexing="ij"))[None] > 0
@@ -61,7 +61,7 @@ def sweep(study: Study) -> Iterator[Row]:
     )
 
 
-def pacing(study: Study) -> Iterator[Row]:
+def pacing(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("pacing")
     cubic = list(made["methods"]).index("cubic")
     count = made["gaits"].shape[1]
@@ -83,7 +83,7 @@ def pacing(study: Study) -> Iterator[Row]:
         )
 
 
-def plane(study: Study) -> Iterator[Row]:
+def plane(study: PaperStudy) -> Iterator[Row]:
     p = study.arrays("plane")
     best = int(p["rim_distance"].argmax())
     yield number_row(
@@ -134,7 +134,7 @@ def _nearest(found: Arrays, A0: float) -> int:
     return int(np.argmin(np.abs(found["gaits"][:, 0] - A0) - 0.1 * found["efficiency"]))
 
 
-def optima(study: Study) -> Iterator[Row]:
+def optima(study: PaperStudy) -> Iterator[Row]:
     found = study.arrays("optima")
     places = [_nearest(found, a) for a in (0.0, 1.1, 2.5)]
     influence = study.arrays("delta")
@@ -188,7 +188,7 @@ def _relative_slope(swept: Arrays, key: str, gait: np.ndarray) -> float:
     return float(np.nanmax(np.abs(near / values[node] - 1)) / (axes[0][1] - axes[0][0]))
 
 
-def delta(study: Study) -> Iterator[Row]:
+def delta(study: PaperStudy) -> Iterator[Row]:
     made = study.arrays("delta")
     deltas, values = made["deltas"], made["distance_work_efficiency"]
     below = [i for i, d in enumerate(deltas) if d <= 1e-4]
@@ -212,7 +212,7 @@ def delta(study: Study) -> Iterator[Row]:
         )
 
 
-def motions(study: Study) -> Iterator[Row]:
+def motions(study: PaperStudy) -> Iterator[Row]:
     made, found = study.arrays("motions"), study.arrays("optima")
     step = float(made["D/t"][1])
     for name, printed in (("D", ("0.07", "0.43")), ("F", ("0.33", "0.67"))):

@@ -89,7 +89,7 @@ def source_closure(module: str, packages: tuple[str, ...] = ("colloc", "scripts"
     return found
 
 
-class Study:
+class PaperStudy:
     """Parts in order of dependence, and the folder of their files."""
 
     def __init__(self, parts: Sequence[Part], folder: Path, *, quick: bool = False) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from scripts.paper import rows_scenes, rows_three_link
 from scripts.paper.rows import Row
-from scripts.paper.study import Study
+from scripts.paper.study import PaperStudy
 
 _HEADER = """# The paper's numbers, computed
 
@@ -18,7 +18,7 @@ This file is written by `python -m scripts.reproduce_paper{quick}`; every row by
 """
 
 
-_ROWS: dict[str, Callable[[Study], Iterator[Row]]] = {
+_ROWS: dict[str, Callable[[PaperStudy], Iterator[Row]]] = {
     "connection": rows_three_link.connection,
     "sweep": rows_three_link.sweep,
     "pacing": rows_three_link.pacing,
@@ -37,7 +37,7 @@ _ALSO = {"optima": ("delta", "sweep"), "motions": ("optima",)}
 """Parts whose arrays the rows of another part use too."""
 
 
-def table(study: Study) -> str:
+def table(study: PaperStudy) -> str:
     """The table in Markdown; parts that have not been computed are named at its end."""
     quick = " --quick" if study.quick else ""
     lines = [

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from colloc.bounds.coulomb_motion import Motion, admissible, balanced_motion
+from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion
 from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
@@ -51,7 +51,7 @@ def antipodal_polygons(rng: np.random.Generator, count: int) -> tuple[np.ndarray
     return q, np.repeat(6 * sides, STEPS // 6, axis=2)
 
 
-def replayed(motion: Motion, count: int) -> tuple[np.ndarray, np.ndarray]:
+def replayed(motion: CoulombMotion, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Distance of the middle link and work per period of gaits stored one after the other, ``(count,)`` each."""
     spin = motion.spin.reshape(count, STEPS) / STEPS
     heading = np.cumsum(spin, axis=1) - 0.5 * spin
@@ -59,7 +59,7 @@ def replayed(motion: Motion, count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.abs((np.exp(1j * heading) * v).mean(axis=1)), motion.power.reshape(count, STEPS).mean(axis=1)
 
 
-def ratios(friction: Friction, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, Motion]:
+def ratios(friction: Friction, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, CoulombMotion]:
     count = q.shape[1]
     motion = balanced_motion(Chain(), friction, q.reshape(2, -1), rate.reshape(2, -1))
     assert motion.size == count * STEPS

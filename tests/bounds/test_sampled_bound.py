@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 from scipy.optimize import linprog
 
-from colloc.bounds.coulomb_motion import Motion, balanced_motion, fundamental
+from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
 from colloc.bounds.sampling import Domain
@@ -146,7 +146,7 @@ def test_climbs_find_the_summit_of_a_crease():
     domain = Domain(Chain(), Friction(), 2.0)
     start = domain.lattice(6, 12).take(np.arange(0, 120, 4))
 
-    def crease(motion: Motion) -> np.ndarray:
+    def crease(motion: CoulombMotion) -> np.ndarray:
         turn = np.arctan2(motion.rates[1], motion.rates[0])
         a, b = motion.angles
         return -5 * np.abs(a + 0.7 * b - 0.5 * np.sin(turn)) - (a - 0.3) ** 2 - (b - 0.2) ** 2

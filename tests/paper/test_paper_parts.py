@@ -11,7 +11,7 @@ from scripts.paper import table as paper_table
 from scripts.paper.array_store import read_arrays, read_attribute, write_arrays
 from scripts.paper.parallel import parallel_map
 from scripts.paper.rows import number_row, statement_row
-from scripts.paper.study import Context, Part, Study, source_closure
+from scripts.paper.study import Context, PaperStudy, Part, source_closure
 
 
 def _square(context: Context) -> dict:
@@ -22,9 +22,9 @@ def _sum(context: Context) -> dict:
     return {"total": context.needed["square"]["y"].sum()}
 
 
-def _study(folder, x=(1.0, 2.0), quick=False) -> Study:
+def _study(folder, x=(1.0, 2.0), quick=False) -> PaperStudy:
     parts = [Part("square", _square, settings={"x": list(x)}, quick={"x": [1.0]}), Part("sum", _sum, needs=("square",))]
-    return Study(parts, folder, quick=quick)
+    return PaperStudy(parts, folder, quick=quick)
 
 
 def test_parts_are_finished_until_their_inputs_change(tmp_path):

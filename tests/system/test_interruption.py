@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from colloc.collocation.implicit_velocity import VelocityMap
+from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.harmonic import Harmonic, ellipse
@@ -133,13 +133,13 @@ def test_ipopt_stops_between_iterations_and_says_nothing(capfd, monkeypatch):
     solver, calls = Solver(transcribe(problem)), []
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
 
-    def pressed(velocity_map, arguments, evaluated=VelocityMap.eval):
+    def pressed(velocity_map, arguments, evaluated=ImplicitVelocity.eval):
         calls.append(arguments)
         if len(calls) == 10:
             signal.raise_signal(signal.SIGINT)
         return evaluated(velocity_map, arguments)
 
-    monkeypatch.setattr(VelocityMap, "eval", pressed)
+    monkeypatch.setattr(ImplicitVelocity, "eval", pressed)
     with pytest.raises(KeyboardInterrupt):
         solver.solve(x, 0.1)
     assert 10 <= len(calls) < 20
