@@ -37,13 +37,13 @@ def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
     return uniform_mesh(scheme(problem.scheme), problem.intervals, problem.gait.fraction)
 
 
-def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
-    """Index arrays of all variables of a problem on a mesh."""
+def problem_layout(problem: Problem, mesh: Mesh, knots: np.ndarray | None = None) -> Layout:
+    """Index arrays of all variables of a problem on a mesh; a gait's arcs meet at knots, by default at the edges."""
     n_joint, full = problem.body.n_joint, problem.formulation == FULL
     # without them angles, rates and velocities along a path follow from its parameters
     n_point = mesh.n_point if full or not problem.gait.unit_speed else 0
     sizes = {
-        "parameters": (problem.gait.size(n_joint, mesh.n), 1),
+        "parameters": (problem.gait.size(n_joint, (mesh.edges if knots is None else knots).size - 1), 1),
         "theta": (1, mesh.n_site),
         "distance": (1, mesh.n + 1),
         "work": (1, mesh.n + 1),

@@ -88,8 +88,15 @@ def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
         geometry.groups.append(Group(name, lower, upper, rows, {name: sparse.eye(n_cell, format="csr")}))
 
 
+def _nested(mesh: Mesh, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """How long each piece takes, ``(n_piece,)``, and of every interval its piece, where on it it begins, and its part of it."""
+    h = np.diff(knots)
+    on = np.searchsorted(knots, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])) - 1
+    return h, on, (mesh.edges[:-1] - knots[on]) / h[on], mesh.h / h[on]
+
+
 def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath, far: Pairs) -> PathGeometry:
-    """Arcs that join, close, keep the bound on curvature and admissible, one a mesh interval.
+    """Arcs that join, close, keep the bound on curvature and admissible; the mesh has an edge wherever two of them meet.
 
     Parameters
     ----------
@@ -101,24 +108,25 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     n : int
         Number of all variables.
     near : ArcPath
-        Fixes the winding and the start phase of a path whose symmetry does not fix it.
+        Fixes which part of the period each arc takes, the winding, and the start phase of a path whose symmetry does not.
     """
     gait: FreePath = problem.gait
     n_joint, symmetry = problem.body.n_joint, gait.symmetry
     speed, tangents, shapes = gait.split(parameters, n_joint)
     piece = arc(n_joint)
-    cells = np.arange(mesh.n)
-    shape = np.concatenate([shapes[:, :-1], tangents[:, :-1], tangents[:, 1:], np.repeat(speed, mesh.n, axis=1)])
+    h, on, start, width = _nested(mesh, near.edges)
+    n_arc = h.size
+    arcs = np.concatenate([shapes[:, :-1], tangents[:, :-1], tangents[:, 1:], np.repeat(speed, n_arc, axis=1)])
     geometry = PathGeometry(
-        piece, shape, cells, np.zeros(mesh.n), np.ones(mesh.n), mesh.h, [], {}, shape_checks(problem.body, far),
+        piece, arcs[:, on], on, start, width, h[on], [], {}, shape_checks(problem.body, far),
         np.full(n, -np.inf), np.full(n, np.inf),
     )  # fmt: skip
     geometry.lower[speed], geometry.upper[speed] = problem.smallest_shape_speed, _FASTEST
 
     function = chord(piece)
-    geometry.blocks["chord"] = (function, shape, mesh.h[None])
+    geometry.blocks["chord"] = (function, arcs, h[None])
     columns = selector(shapes[:, 1:].ravel(order="F"), n) - selector(shapes[:, :-1].ravel(order="F"), n)
-    joined = {"chord": -sparse.eye(n_joint * mesh.n, format="csr")}
+    joined = {"chord": -sparse.eye(n_joint * n_arc, format="csr")}
     geometry.groups = [
         equalities("path", columns, joined),
         _ends("closure", end_conditions(symmetry, n_joint), shapes, n),
@@ -126,13 +134,13 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     if n_joint == 2:
         turn = selector(tangents[0, 1:], n) - selector(tangents[0, :-1], n)
         allowed = sparse.csr_matrix(
-            (2 * np.pi * gait.curvature * mesh.h, (cells, np.full(mesh.n, speed[0, 0]))), shape=(mesh.n, n)
+            (2 * np.pi * gait.curvature * h, (np.arange(n_arc), np.full(n_arc, speed[0, 0]))), shape=(n_arc, n)
         )
-        least, most = np.full(mesh.n, -np.inf), np.zeros(mesh.n)
+        least, most = np.full(n_arc, -np.inf), np.zeros(n_arc)
         geometry.groups += [
             Group("curvature to the left", least, most, (turn - allowed).tocsr()),
             Group("curvature to the right", least, most, (-turn - allowed).tocsr()),
-            Group("turn", np.full(mesh.n, -_ANGLE_PER_ARC), np.full(mesh.n, _ANGLE_PER_ARC), turn.tocsr()),
+            Group("turn", np.full(n_arc, -_ANGLE_PER_ARC), np.full(n_arc, _ANGLE_PER_ARC), turn.tocsr()),
         ]
         winding = near.winding if gait.winding is None else gait.winding
         turned = 2 * np.pi * gait.fraction * float(winding or 0)
@@ -146,12 +154,12 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     else:
         norms = tangents if symmetry == BILATERAL else tangents[:, :-1]
         geometry.blocks["norm"] = (unit_norm(n_joint), norms, np.empty((0, norms.shape[1])))
-        geometry.blocks["turn"] = (excess_turn(n_joint, gait.curvature), shape[n_joint:], mesh.h[None])
-        zero, one = np.zeros(mesh.n), sparse.eye(mesh.n, format="csr")
+        geometry.blocks["turn"] = (excess_turn(n_joint, gait.curvature), arcs[n_joint:], h[None])
+        zero, one = np.zeros(n_arc), sparse.eye(n_arc, format="csr")
         ones = sparse.eye(norms.shape[1], format="csr")
         geometry.groups += [
             equalities("unit tangent", sparse.csr_matrix((norms.shape[1], n)), {"norm": ones}),
-            Group("curvature", np.full(mesh.n, -np.inf), zero, sparse.csr_matrix((mesh.n, n)), {"turn": one}),
+            Group("curvature", np.full(n_arc, -np.inf), zero, sparse.csr_matrix((n_arc, n)), {"turn": one}),
             _ends("smooth closure", tangent_conditions(symmetry, n_joint), tangents, n),
         ]
     if symmetry != BILATERAL:
@@ -168,15 +176,10 @@ def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, 
     gait: Polygon = problem.gait
     n_joint, symmetry = problem.body.n_joint, gait.symmetry
     vertices = gait.split(parameters, n_joint)
-    phases = near.phases
-    middle = 0.5 * (mesh.edges[1:] + mesh.edges[:-1])
-    on = np.searchsorted(phases, middle) - 1
-    span = np.diff(phases)[on]
-    width = mesh.h / span
+    span, on, start, width = _nested(mesh, near.phases)
     geometry = PathGeometry(
-        side(n_joint), np.concatenate([vertices[:, on], vertices[:, on + 1]]), on, (mesh.edges[:-1] - phases[on]) / span,
-        width, 1.0 / span, [_ends("closure", end_conditions(symmetry, n_joint), vertices, n)], {},
-        shape_checks(problem.body, far),
+        side(n_joint), np.concatenate([vertices[:, on], vertices[:, on + 1]]), on, start, width, 1.0 / span[on],
+        [_ends("closure", end_conditions(symmetry, n_joint), vertices, n)], {}, shape_checks(problem.body, far),
         np.full(n, -np.inf), np.full(n, np.inf),
     )  # fmt: skip
     across = tangent_conditions(BILATERAL, n_joint)[0][: n_joint // 2]

@@ -31,6 +31,8 @@ from colloc.numerics.blocks import Assembly, Block
 from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
 from colloc.numerics.mesh import Mesh
 
+_BESIDE = 1e-2
+
 
 @dataclass(frozen=True, eq=False)
 class PathTranscription:
@@ -38,6 +40,7 @@ class PathTranscription:
 
     problem: Problem
     mesh: Mesh
+    knots: np.ndarray | None
     layout: Layout
     geometry: PathGeometry
     assembly: Assembly
@@ -66,7 +69,7 @@ class PathTranscription:
 
     def member(self, parameters: np.ndarray) -> ArcPath | Corners:
         """The gait of a parameter vector."""
-        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.mesh.edges)
+        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.knots)
 
     def gait(self, x: np.ndarray) -> ArcPath | Corners:
         """The gait of a vector of variables."""
@@ -109,17 +112,41 @@ def _geometry(
     return side_geometry(problem, mesh, parameters, n, near, far)
 
 
+def _knots(path: ArcPath | Corners) -> np.ndarray | None:
+    return path.edges if isinstance(path, ArcPath) else None
+
+
 def path_through(problem: Problem, gait: Gait, edges: np.ndarray | None) -> tuple[ArcPath | Corners, Mesh]:
-    """A path of the problem's kind laid through a gait, and the mesh in its phases; it need not keep every constraint."""
-    if isinstance(problem.gait, FreePath) and edges is None:
-        edges = graded_edges(gait, problem.gait, problem.intervals)
-    mesh = problem_mesh(problem, edges)
+    """A path of the problem's kind laid through a gait, and the mesh in its phases; it need not keep every constraint.
+
+    Where arcs of a free path meet, the mesh has an edge. Arcs that meet at edges already are kept; else every interval is an
+    arc, if those are not too many.
+    """
     if isinstance(problem.gait, FreePath):
-        return arcs_through(gait, problem.gait, mesh.edges), mesh
+        knots = _arc_knots(problem, gait, edges)
+        mesh = problem_mesh(problem, knots if edges is None else with_knots(edges, knots))
+        return arcs_through(gait, problem.gait, knots), mesh
+    mesh = problem_mesh(problem, edges)
     corners = corners_through(gait, problem.gait)
     if isinstance(gait, Corners) and gait.symmetry == problem.gait.symmetry and gait.corners.shape == corners.corners.shape:
         corners = gait
     return corners, Mesh(mesh.scheme, _with_vertices(mesh.edges, corners.phases))
+
+
+def _arc_knots(problem: Problem, gait: Gait, edges: np.ndarray | None) -> np.ndarray:
+    if edges is not None:
+        if isinstance(gait, ArcPath) and gait.symmetry == problem.gait.symmetry and np.isin(gait.edges, edges).all():
+            return gait.edges
+        if edges.size - 1 <= problem.gait.most_arcs(problem.body.n_joint):
+            return edges
+    return graded_edges(gait, problem.gait, problem.intervals)
+
+
+def with_knots(edges: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Edges and knots together; an edge beside a knot, nearer than a hundredth of its neighbours, is that knot."""
+    near = np.abs(edges[:, None] - knots).min(axis=1)
+    apart = np.minimum(np.diff(edges, prepend=-np.inf), np.diff(edges, append=np.inf))
+    return np.union1d(edges[near > _BESIDE * apart], knots)
 
 
 def _with_vertices(edges: np.ndarray, phases: np.ndarray) -> np.ndarray:
@@ -146,7 +173,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         Phases; by default graded by the turns of the gait (free paths), or evenly spread over the sides (polygons).
     """
     near, mesh = path_through(problem, gait, edges)
-    layout = problem_layout(problem, mesh)
+    layout = problem_layout(problem, mesh, _knots(near))
     geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near, far)
     kind = arc if isinstance(problem.gait, FreePath) else side
     full = layout.forces.size > 0
@@ -187,7 +214,9 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         geometry.lower[state_index] = geometry.upper[state_index] = 0.0
     ends = np.array([[layout.distance[0, -1]], [layout.work[0, -1]]])
     objective = Block(minus_efficiency(), ends, sparse.eye(1, format="csr"), np.empty((0, 1)))
-    return _assembled(problem, mesh, layout, geometry, groups, objective, {} if full else {"point": balanced}, velocity)
+    return _assembled(
+        problem, mesh, _knots(near), layout, geometry, groups, objective, {} if full else {"point": balanced}, velocity
+    )
 
 
 def _full_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
@@ -204,7 +233,7 @@ def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None
     Nearest means in the sum of the squared distances of edges, or corners, to those of a path laid through the gait.
     """
     near, mesh = path_through(problem, gait, edges)
-    size = problem_layout(problem, mesh).parameters.size
+    size = problem_layout(problem, mesh, _knots(near)).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
     layout = Layout(own, none, none, none, none, none, none, none, size)
     geometry = _geometry(problem, mesh, own[:, 0], size, near, far)
@@ -212,12 +241,13 @@ def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None
     shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")
     target = problem.gait.parameters(near)[shapes]
     objective = Block(squared_distance(shapes.size), shapes[:, None], sparse.eye(1, format="csr"), target[:, None])
-    return _assembled(problem, mesh, layout, geometry, geometry.groups, objective, {}, None)
+    return _assembled(problem, mesh, _knots(near), layout, geometry, geometry.groups, objective, {}, None)
 
 
 def _assembled(
     problem: Problem,
     mesh: Mesh,
+    knots: np.ndarray | None,
     layout: Layout,
     geometry: PathGeometry,
     groups: list[Group],
@@ -230,6 +260,7 @@ def _assembled(
     return PathTranscription(
         problem,
         mesh,
+        knots,
         layout,
         geometry,
         Assembly(layout.n, objective, geometry.assembled_blocks(groups, implicit), linear),

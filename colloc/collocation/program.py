@@ -72,6 +72,10 @@ class GaitProgram(Program, Protocol):
     @property
     def layout(self) -> Layout: ...
 
+    @property
+    def knots(self) -> np.ndarray | None:
+        """Phases where the arcs of a free path meet; None for other gaits."""
+
     def member(self, parameters: np.ndarray) -> AnyGait:
         """The gait of a parameter vector ``(n_parameter,)``."""
 

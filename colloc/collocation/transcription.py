@@ -79,6 +79,10 @@ class Transcription:
         return replace(self, constraint_lower=lower, constraint_upper=upper)
 
     @property
+    def knots(self) -> None:
+        return None
+
+    @property
     def lifted(self) -> bool:
         return self.layout.forces.size > 0
 

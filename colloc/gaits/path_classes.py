@@ -82,9 +82,12 @@ class FreePath:
         return fraction(self.symmetry)
 
     def intervals(self, n_joint: int) -> int:
-        """Intervals that a first mesh wants, each of which is an arc: as many as a dense search can take."""
-        per_arc = 1 if n_joint == 2 else n_joint
-        return round(self.fraction * min(_ARCS, _PARAMETERS / per_arc))
+        """Intervals that a first mesh wants, each of which is an arc."""
+        return round(self.fraction * min(_ARCS, self.most_arcs(n_joint)))
+
+    def most_arcs(self, n_joint: int) -> int:
+        """Arcs of the solved part that a dense search can take: finer meshes have several intervals an arc."""
+        return round(_PARAMETERS / (1 if n_joint == 2 else n_joint))
 
     def describe(self) -> str:
         """The class in words, for reports."""
@@ -98,6 +101,10 @@ class FreePath:
     def first_edges(self, edges: np.ndarray) -> np.ndarray:
         """The mesh from which a finer one is grown: its own, because its arcs are the intervals."""
         return edges
+
+    def laid_on(self, path: ArcPath, edges: np.ndarray) -> ArcPath:
+        """A member with every interval of a mesh an arc, or as it is if those are too many."""
+        return path.resampled(edges) if edges.size - 1 <= self.most_arcs(path.n_joint) else path
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for its gaits."""
@@ -217,6 +224,10 @@ class Polygon:
     def first_edges(self, edges: np.ndarray) -> np.ndarray:
         """The mesh from which a finer one is grown: its own, because corners are knots."""
         return edges
+
+    def laid_on(self, gait: Corners, edges: np.ndarray) -> Corners:
+        """A member as it is: the mesh does not matter."""
+        return gait
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for its gaits."""

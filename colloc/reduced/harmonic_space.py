@@ -30,6 +30,8 @@ class HarmonicSpace:
     far : pairs of links more than two apart that are kept from crossing.
     """
 
+    knots: np.ndarray | None = None
+
     def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
         self.problem, self.far = problem, far
         self.mesh = problem_mesh(problem.with_(scheme=scheme or problem.scheme), edges)

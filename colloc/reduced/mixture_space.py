@@ -42,6 +42,8 @@ class MixtureSpace:
         Other than those of the class, to see what more would be worth.
     """
 
+    knots: np.ndarray | None = None
+
     def __init__(self, problem: Problem, pieces: int, far: Pairs = (), directions: int = 0) -> None:
         self.problem, self.pieces, self.far = problem, pieces, far
         self.n_joint, self.n_direction = problem.body.n_joint, directions or problem.gait.directions

@@ -10,11 +10,10 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from colloc.collocation.layout import problem_layout
-from colloc.collocation.path_equations import chord
 from colloc.collocation.path_transcription import path_through, transcribe_fit
 from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
@@ -28,9 +27,13 @@ from colloc.system.errors import NotConvergedError
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
 """Rows that hold whatever the parameters are; for bilateral paths the last one does not."""
 
-_EXACT, _FITTED, _SETTLED, _ROUNDS = 1e-7, 1e-10, 1e-5, 12
-"""Violation at which a gait is a member; accuracy of the squared distance of a new one; violation of a start, where the worst
-instant of a cell swings between two; rounds of moving the checks to the worst instants: three joints need up to 8."""
+_EXACT, _NEAR, _FITTED, _SETTLED, _ROUNDS = 1e-7, 1e-6, 3e-8, 1e-5, 12
+"""Violation at which a gait is a member; accuracy of the squared distance of a new one, at first and
+as the last violations go; violation of a start, where the worst instant of a cell swings between two; rounds of moving the
+checks to the worst instants: three joints need up to 8."""
+
+_LEAST_CURVATURE = 1e-4
+"""Of the distance to a gait, as a share of the largest."""
 
 
 class PathSpace:
@@ -53,8 +56,7 @@ class PathSpace:
         self.problem, self.near, self.far = problem, near, far
         stated = problem.with_(scheme=scheme or problem.scheme)
         self._fit = fit = transcribe_fit(stated, near, edges, far)
-        self.mesh, self._geometry = fit.mesh, fit.geometry
-        self.layout = problem_layout(problem, self.mesh)
+        self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
         self._oracles = oracles(fit.assembly)
         nlp = self._oracles.nlp
         self._row_values = ca.Function("rows", [nlp["x"], nlp["p"]], [nlp["g"]])
@@ -70,7 +72,7 @@ class PathSpace:
             last = tangents[:, : -1 if self._closed else None]
             self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
             self.own = self.own[free[self.own]]
-            self._chord = chord(self._geometry.piece)
+            self._chord, self._on_arcs, self._arc_h = self._geometry.blocks["chord"]
         self.n = self.own.size
         self.lower, self.upper = fit.lower[self.own], fit.upper[self.own]
         dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
@@ -79,8 +81,7 @@ class PathSpace:
         self._kept = np.empty(0, dtype=int)
         self._place()
         self._followed, self._framed = remembered(self._follow), remembered(self._frame)
-        laid = problem.gait.parameters(path_through(problem, near, self.mesh.edges)[0])
-        self.move_checks(laid[self.own])
+        self.move_checks(self._laid(near)[self.own])
 
     def _place(self) -> None:
         """Where the collocation points lie, as functions of the parameters."""
@@ -106,7 +107,7 @@ class PathSpace:
                 if self._closed:
                     tangents[:, -1] = tangents[:, 0] * (1 if self.problem.gait.symmetry == NONE else -1)
                 p[self._tangents] = tangents / np.linalg.norm(tangents, axis=0)
-            step = self._chord.value(p[self._geometry.shape], self.mesh.h[None], 0.0).full()
+            step = self._chord.value(p[self._on_arcs], self._arc_h, 0.0).full()
             start = p[self.shapes[:, :1]]
             p[self.shapes] = np.concatenate([start, start + np.cumsum(step, axis=1)], axis=1)
         return p
@@ -132,10 +133,10 @@ class PathSpace:
                 own = np.zeros((rows.size, self.n))
                 own[:, np.searchsorted(self.own, source)] = (np.eye(rows.size) - np.outer(unit, unit)) * sign / size
                 frame[rows] = own
-        local = self._geometry.shape
+        local = self._on_arcs
         f = self._chord
-        nonzeros = f.jacobian(p[local], self.mesh.h[None], 0.0).full()
-        n_joint, n = self.shapes.shape[0], self.mesh.n
+        nonzeros = f.jacobian(p[local], self._arc_h, 0.0).full()
+        n_joint, n = self.shapes.shape[0], local.shape[1]
         jacobian = np.zeros((n, n_joint, f.n_local))
         jacobian[:, f.jac_row, f.jac_col] = nonzeros.T
         # a chord does not depend on where the arc starts, so the frame of the shapes is not needed for it
@@ -155,28 +156,36 @@ class PathSpace:
         NotConvergedError
             If no path of the class is found near the gait.
         """
-        near, _ = path_through(self.problem, gait, self.mesh.edges)
-        laid = self.problem.gait.parameters(near)
-        v, fitted = laid[self.own], False
+        laid = self._laid(gait)
+        v, target, accuracy = laid[self.own], laid, _NEAR
         for _ in range(_ROUNDS):
             excess = self.move_checks(v)
             values = self.rows(v)
             outside = max((self.row_lower - values).max(), (values - self.row_upper).max(), excess)
-            if outside < _EXACT and (fitted or np.abs(self.full_parameters(v) - laid).max() < _EXACT):
+            if outside < _EXACT and (accuracy == _FITTED or np.abs(self.full_parameters(v) - laid).max() < _EXACT):
                 return v
-            v, fitted = minimised(_Nearest(self, laid), v, np.inf, _FITTED).v, True
+            # the first round goes near the gait, later ones the shortest way into the class, which moves with its checks
+            nearest = _Nearest(self, target)
+            v = minimised(nearest, v, np.inf, accuracy, curvature=nearest.curvature(v)).v
+            target, accuracy = self.full_parameters(v), _FITTED
         if outside < _SETTLED:
             return v
         bound = f"; allow more curvature than {self.problem.gait.curvature:g}" if self._arcs else ""
         raise NotConvergedError(f"found no {self.problem.gait.describe()} near the guess; try another guess{bound}.")
+
+    def _laid(self, gait: AnyGait) -> np.ndarray:
+        """Full parameters of a path through a gait; it need not keep every constraint."""
+        if self.knots is not None:
+            return self.problem.gait.parameters(arcs_through(gait, self.problem.gait, self.knots))
+        return self.problem.gait.parameters(path_through(self.problem, gait, self.mesh.edges)[0])
 
     def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
         """The mesh in phases of a member."""
         return self._fit.phase_mesh(gait)
 
     def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
-        """The class near a member on another mesh."""
-        return PathSpace(self.problem, gait, edges, scheme, self.far)
+        """The class near a member on another mesh; its intervals are arcs, unless those are too many."""
+        return PathSpace(self.problem, self.problem.gait.laid_on(gait, edges), edges, scheme, self.far)
 
     def with_far(self, far: Pairs) -> PathSpace:
         """The class with other pairs of links kept apart."""
@@ -245,3 +254,9 @@ class _Nearest:
         """Of the objective."""
         p, frame = self.space.frame(v)
         return (p - self._target)[self._shapes] @ frame[self._shapes]
+
+    def curvature(self, v: np.ndarray) -> np.ndarray:
+        """Of the objective near the target (Gauss and Newton); lengths of tangents, which nothing depends on, keep a little."""
+        frame = self.space.frame(v)[1][self._shapes]
+        metric = frame.T @ frame
+        return metric + _LEAST_CURVATURE * metric.diagonal().max() * np.eye(v.size)

@@ -26,6 +26,8 @@ class SearchSpace(Shapes, Protocol):
     row_upper: np.ndarray
     watched: dict[str, np.ndarray]
     """The rows in order: of each kind, those of the full program's rows of that name that are among them."""
+    knots: np.ndarray | None
+    """Phases where the arcs of a free path meet; None for other gaits."""
     own: np.ndarray
     """``(n,)``: which of the full program's gait parameters are v."""
 

@@ -39,6 +39,8 @@ class Level:
     program : str
         What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
         formulation; "prescribed" where nothing is free.
+    knots : (n_arc + 1,), optional
+        Phases where the arcs of a free path meet; they are among the edges. By default they are the edges.
     """
 
     delta: float
@@ -59,6 +61,7 @@ class Level:
     evaluation_seconds: float
     scheme: str = ""
     program: str = REDUCED
+    knots: np.ndarray | None = None
 
     def __repr__(self) -> str:
         verdict = "" if self.optimal else f", {self.status}"

@@ -157,13 +157,14 @@ class Solution:
 
     @property
     def layout(self) -> Layout:
-        return problem_layout(self.problem, self.mesh)
+        return problem_layout(self.problem, self.mesh, self.last.knots)
 
     @property
     def gait(self) -> AnyGait:
         """The gait of the last level."""
         parameters = self.last.x[self.layout.parameters[:, 0]]
-        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.last.edges)
+        knots = self.last.edges if self.last.knots is None else self.last.knots
+        return self.problem.gait.member(parameters, self.problem.body.n_joint, knots)
 
     @property
     def delta_per_period(self) -> float:

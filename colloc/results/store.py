@@ -6,7 +6,7 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /gait/{mean,cos,sin}                                 /versions   JSON text
          or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
-    /levels/000/{edges,x,lam_x,lam_g}, attributes delta, efficiency, distance, work, kkt_error, iterations, ...
+    /levels/000/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, efficiency, distance, work, kkt_error, ...
     /certificate/{name,value,threshold,passed,meaning}, attributes efficiency, efficiency_error, ...
 """
 
@@ -51,6 +51,7 @@ _LEVEL_ARRAYS = {
     "lam_x": (_LAYOUT, "variable"),
     "lam_g": (_LAYOUT, "constraint"),
 }
+_KNOTS = "knots"
 
 _GAIT_ARRAYS = {
     "mean": ("rad", "joint"),
@@ -139,8 +140,10 @@ def _write(file: h5py.File, solution: Solution) -> None:
         group = file.create_group(f"levels/{index:03d}")
         for name, (units, dims) in _LEVEL_ARRAYS.items():
             put(group, name, getattr(level, name), units=units, dims=dims)
+        if level.knots is not None:
+            put(group, _KNOTS, level.knots, units="period", dims="knot")
         for field in dataclasses.fields(level):
-            if field.name not in _LEVEL_ARRAYS:
+            if field.name not in (*_LEVEL_ARRAYS, _KNOTS):
                 put_attribute(group, field.name, getattr(level, field.name))
     if solution.levels:
         _write_motion(file, solution)
@@ -191,7 +194,8 @@ def _read(file: h5py.File) -> Solution:
         arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
         there = [f.name for f in dataclasses.fields(Level) if f.default is dataclasses.MISSING or f.name in group.attrs]
         rest = {name: attribute(group, name) for name in there if name not in _LEVEL_ARRAYS}
-        levels.append(Level(**arrays, **rest))
+        knots = array(group, _KNOTS) if _KNOTS in group else None
+        levels.append(Level(**arrays, **rest, knots=knots))
     certificate = UNCERTIFIED
     if "certificate" in file:
         certificate = read_certificate(child(file, "certificate"))

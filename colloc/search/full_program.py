@@ -32,7 +32,7 @@ _ROUNDS, _ADMISSIBLE = 4, 1e-8
 def level_found(found: Found) -> Level:
     """What is kept of a level of the search: its gait with every other variable in balance."""
     space, problem = found.space, found.space.problem
-    mesh, layout = space.phase_mesh(found.gait), problem_layout(problem, space.mesh)
+    mesh, layout = space.phase_mesh(found.gait), problem_layout(problem, space.mesh, space.knots)
     x = balanced_variables(problem, layout, mesh, found.gait, space.full_parameters(found.v), found.delta)
     conditions, periods = found.conditions, 1.0 / problem.gait.fraction
     return Level(
@@ -53,6 +53,7 @@ def level_found(found: Found) -> Level:
         found.seconds,
         found.seconds,
         space.mesh.scheme.name,
+        knots=space.knots,
     )
 
 
@@ -79,6 +80,7 @@ def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -
         result.evaluation_seconds,
         program.mesh.scheme.name,
         name,
+        program.knots,
     )
 
 

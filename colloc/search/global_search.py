@@ -45,8 +45,11 @@ _FEWEST = 12
 _LEVELS = (1.0, 0.2)
 """Deltas at which starts are compared, in units of the problem's first one."""
 _SAME_EFFICIENCY, _SAME_GAIT = 1e-3, 0.05
-_FOLLOWED, _PROMISING = 3, 0.8
-"""How many gaits are followed to the final delta, and the share of the best efficiency that they need at the coarse one."""
+_FOLLOWED, _PROMISING, _CLOSE = 3, 0.8, 0.01
+"""How many gaits are followed to the final delta, the share of the best efficiency that they need at the coarse one, and how
+far they may be from the best at the final one to be optimised as exactly."""
+_ROUNDS = 2
+"""Of moving the checks, in that: refinement goes on from there."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction."""
 _HARMONICS = 8
@@ -187,14 +190,17 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     for candidate in (*queue, *spare):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(levels[-1]) for _, levels in ends)):
             break
-        levels: list[Found] = []
         with suppress(CollocError):
-            space, v = space_near(problem, candidate.found.gait)
-            levels.append(settled_apart(space, v, candidate.found.delta, NEXT_RADIUS, ROUGH))
-            descended(levels[0], problem, levels.append)
-            ends.append((candidate, levels))
+            ends.append((candidate, _followed(problem, candidate.found)))
     if not ends:
         raise NotConvergedError("no gait could be followed to the final delta; start at a larger delta or give another guess.")
+    close = (1 - _CLOSE) * min(levels[-1].objective for _, levels in ends)
+    finite_close = (1 - _CLOSE) * min((levels[-1].objective for _, levels in ends if is_finite(levels[-1])), default=0.0)
+    for _, levels in ends:
+        last = levels[-1]
+        if last.objective <= close or (is_finite(last) and last.objective <= finite_close):
+            with suppress(CollocError):
+                levels.append(settled_apart(*space_near(problem, last.gait), last.delta, NEXT_RADIUS, ROUGH, rounds=_ROUNDS))
     ends.sort(key=lambda end: end[1][-1].objective)
     distinct: list[tuple[Found, list[int]]] = []
     for candidate, levels in ends:
@@ -208,6 +214,16 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     best = ends[0][1]
     finite = [] if is_finite(best[-1]) else next((levels for _, levels in ends if is_finite(levels[-1])), [])
     return Chosen(best[-1], best, tried, (*followed, *dropped), finite)
+
+
+def _followed(problem: Problem, found: Found) -> list[Found]:
+    """Levels down to the final delta, with a free path's few arcs, on a mesh that resolves more."""
+    edges = found.space.phase_mesh(found.gait).edges
+    finer = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
+    space, v = space_near(problem, found.gait, finer)
+    levels = [settled_apart(space, v, found.delta, NEXT_RADIUS, VERY_ROUGH)]
+    descended(levels[0], problem, levels.append, VERY_ROUGH)
+    return levels
 
 
 def _alternative(problem: Problem, found: Found, starts: list[int]) -> Alternative:
