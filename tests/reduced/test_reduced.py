@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc import Chain, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse, load, replay, save
 from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
+from colloc.results.solution import Solution
+from colloc.search.full_program import level_found
 from colloc.search.optimise import optimum
+from colloc.search.reduced_search import Found
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}
@@ -22,6 +25,8 @@ CASES = {
     "bilateral path of three joints": {"gait": FreePath(6.0, "bilateral"), **FOUR},
     "path of three joints": {"gait": FreePath(6.0, "none"), **WAVE},
     "antipodal path of three joints": {"gait": FreePath(6.0, "antipodal"), **WAVE},
+    "path with two intervals an arc": {"gait": FreePath(4.0, "none"), "halved": True},
+    "path of three joints with two intervals an arc": {"gait": FreePath(6.0, "bilateral"), "halved": True, **FOUR},
     "polygon": {"gait": Polygon(4, "none"), "friction": Friction(3, 1, 2)},
     "bilateral polygon": {"gait": Polygon(5, "bilateral")},
 }
@@ -29,8 +34,13 @@ DELTA = 0.05
 
 
 def near_start(case, shake=1e-2):
-    problem = Problem("p", **({"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10} | CASES[case]))
+    stated = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10} | CASES[case]
+    halved = stated.pop("halved", False)
+    problem = Problem("p", **stated)
     space, v = space_near(problem, problem.guess)
+    if halved:
+        edges = space.mesh.edges
+        space, v = space_near(problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))]))
     v = v + shake * np.random.default_rng(0).normal(size=v.size)
     space.move_checks(v)
     return space, v, ReducedProgram(space, DELTA)
@@ -65,6 +75,26 @@ def test_the_full_program_measures_the_same_efficiency_and_rotation(case):
     if "rotation" in full.groups and space.problem.gait.symmetry == "none":
         turned = x[layout.theta[0, -1]] - x[layout.theta[0, 0]]
         assert turned == pytest.approx(program.rows(v)[0], abs=1e-9)
+
+
+def test_a_finer_mesh_on_the_same_arcs_has_the_same_parameters_and_a_smaller_error():
+    coarse, v, program = near_start("free path", shake=0.0)
+    fine, w, finer = near_start("path with two intervals an arc", shake=0.0)
+    np.testing.assert_allclose(w, v, atol=1e-12)
+    assert (fine.mesh.n, fine.n) == (2 * coarse.mesh.n, coarse.n)
+    exact = replay(coarse.problem.body, coarse.problem.friction, coarse.member(v), DELTA * coarse.member(v).delta_unit).efficiency
+    assert abs(-finer.objective(w) - exact) < 0.2 * abs(-program.objective(v) - exact)
+
+
+def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
+    problem = Problem("p", ellipse(1.0, 0.7, 1.1), gait=FreePath(2.0, "bilateral"), intervals=16, delta=1e-2, mesh_tolerance=0)
+    space, v = space_near(problem, problem.guess)
+    edges = space.mesh.edges
+    space, v = space_near(problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))]))
+    solution = Solution(problem, [level_found(Found.at(space, v, problem.delta))])
+    again = load(save(solution, tmp_path / "path.h5"))
+    np.testing.assert_array_equal(again.last.knots, edges)
+    np.testing.assert_array_equal(again.gait.shapes, solution.gait.shapes)
 
 
 @pytest.mark.parametrize(
