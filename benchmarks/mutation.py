@@ -7,7 +7,8 @@ Faults are drawn from the packages that results rest on: an operator, a comparis
 functions (`benchmarks.reach`). For a fault those that call its function run, of the folder that mirrors its package first,
 until one fails; as many as fit in 40 s of processor time. What takes far longer than without a fault counts as caught (it
 hangs). Those that survive are printed with their line: they are a gap of the tests, or a change without consequences.
-What the record has is not done again, so that the same command goes on with a run that was ended.
+What the record has is not done again, so that the same command goes on with a run that was ended. Which tests call what is kept
+beside it; remove that when tests change.
 """
 
 from __future__ import annotations
@@ -34,26 +35,21 @@ import pytest
 import scipy.optimize  # noqa: F401
 
 from benchmarks.faults import faults_of
-from benchmarks.reach import Test, load
+from benchmarks.reach import Test, load, save
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("colloc", "tests", "benchmarks", "problems", "studies", "scripts", "docs", "results", "pyproject.toml", "README.md")
-MUTATED = ("mechanics", "smooth", "bounds", "verification", "results", "system")
 _NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "argument_names")
 """What no result rests on."""
-TESTS = tuple(
-    f"tests/{name}"
-    for name in (
-        *MUTATED,
-        "hard",
-        "numerics",
-        "reduced",
-        "gaits",
-        "studies",
-        "collocation",
-        "commands/test_verify_and_compare.py",
-    )
-)
+TESTS = {
+    "mechanics": ("tests/mechanics", "tests/hard", "tests/verification"),
+    "smooth": ("tests/smooth",),
+    "bounds": ("tests/bounds",),
+    "verification": ("tests/verification", "tests/results"),
+    "results": ("tests/results", "tests/commands/test_verify_and_compare.py"),
+    "system": ("tests/system", "tests/results"),
+}
+"""What mirrors a package comes first; the rest of the suite is for those that survive it."""
 _OF_THE_KERNEL = "colloc/mechanics/native_kernel.py::address"
 """Called by whatever calls compiled code."""
 _MOST = 40.0
@@ -69,10 +65,9 @@ class Mutant(NamedTuple):
     new: str
 
     @property
-    def mirror(self) -> tuple[str, ...]:
+    def tests(self) -> tuple[str, ...]:
         """Folders of the tests that are about its package."""
-        package = self.file.split("/")[1]
-        return (f"tests/{package}/", "tests/hard/") if package == "mechanics" else (f"tests/{package}/",)
+        return TESTS[self.file.split("/")[1]]
 
     def described(self, copy: Path) -> str:
         text = (copy / self.file).read_text(encoding="utf-8")
@@ -102,28 +97,28 @@ def _function_at(node: ast.AST, number: int, outer: str = "") -> str:
     return ""
 
 
-def tests_of(mutant: Mutant, known: list[Test]) -> list[str]:
+def tests_of(mutant: Mutant, known: dict[str, list[Test]]) -> list[str]:
     """Names of the tests that call its function, or anything of its file where none does: file by file, the cheapest first."""
     function = mutant.function()
-    calling = [test for test in known if function in test.calls]
-    if not calling:
-        calling = [test for test in known if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
-    by_file: dict[str, list[Test]] = {}
-    for test in sorted(calling, key=lambda test: test.seconds):
-        by_file.setdefault(test.name.partition("::")[0], []).append(test)
-    files = sorted(by_file.items(), key=lambda f: (not f[0].startswith(mutant.mirror), sum(t.seconds for t in f[1])))
     chosen, spent = [], 0.0
-    for _, tests in files:
-        for test in tests:
-            if spent + test.seconds < _MOST:
-                chosen.append(test.name)
-                spent += test.seconds
+    for folder in mutant.tests:
+        calling = [test for test in known[folder] if function in test.calls]
+        if not calling:
+            calling = [test for test in known[folder] if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
+        by_file: dict[str, list[Test]] = {}
+        for test in sorted(calling, key=lambda test: test.seconds):
+            by_file.setdefault(test.name.partition("::")[0], []).append(test)
+        for tests in sorted(by_file.values(), key=lambda tests: sum(test.seconds for test in tests)):
+            for test in tests:
+                if spent + test.seconds < _MOST:
+                    chosen.append(test.name)
+                    spent += test.seconds
     return chosen
 
 
 def mutants() -> Iterator[Mutant]:
     """Every fault that can be put in."""
-    for package in MUTATED:
+    for package in TESTS:
         for path in sorted((ROOT / "colloc" / package).rglob("*")):
             if path.suffix in (".py", ".c", ".h") and path.stem not in _NOT_MUTATED:
                 file, text = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
@@ -177,19 +172,20 @@ def _tests_in(copy: Path, cache: Path, tests: list[str]) -> int:
     return int(pytest.main(["-x", "-n", "0", "-p", "no:cacheprovider", *tests]))
 
 
-def _reached(copy: Path, cache: Path) -> list[Test]:
-    """The tests and what they call, from a run without any fault."""
+def _reached(copy: Path, cache: Path, folder: str) -> list[Test]:
+    """The tests of a folder and what they call, from a run without any fault."""
 
     def work() -> int:
         os.environ |= {"PYTHONPATH": str(copy), "COLLOC_CODE": str(cache)}
         import benchmarks.reach as reach
 
-        found, code = reach.recorded(TESTS)
+        found, code = reach.recorded((folder,))
         reach.save(found, copy.parent / "reach.json")
         return code
 
     if _in_child(copy, work):
-        raise SystemExit(f"tests fail without any fault:\n{(copy.parent / 'said.txt').read_text(encoding='utf-8')[-3000:]}")
+        said = (copy.parent / "said.txt").read_text(encoding="utf-8")
+        raise SystemExit(f"the tests of {folder} fail without any fault:\n{said[-3000:]}")
     return load(copy.parent / "reach.json")
 
 
@@ -221,8 +217,14 @@ def main() -> None:
             source = ROOT / name
             (shutil.copytree if source.is_dir() else shutil.copy2)(source, copy / name)
         cache.mkdir(mode=0o700)
-        known = _reached(copy, cache)
-        print(f"{len(known)} tests in {_processor_seconds():.0f} s of processor time", flush=True)
+        known: dict[str, list[Test]] = {}
+        for package in dict.fromkeys(mutant.file.split("/")[1] for mutant in chosen):
+            for tests_folder in TESTS[package]:
+                kept = options.record.with_name(f"reach-{tests_folder.replace('/', '-')}.json")
+                if not kept.exists():
+                    save(_reached(copy, cache, tests_folder), kept)
+                known[tests_folder] = load(kept)
+                print(f"{tests_folder}: {len(known[tests_folder])} tests, {_processor_seconds():.0f} s", flush=True)
         for index, mutant in enumerate(chosen):
             if index in done or _processor_seconds() > options.seconds:
                 continue
