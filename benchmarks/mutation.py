@@ -42,11 +42,11 @@ COPIED = ("colloc", "tests", "benchmarks", "problems", "studies", "scripts", "do
 _NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "argument_names")
 """What no result rests on."""
 TESTS = {
-    "mechanics": ("tests/mechanics", "tests/hard", "tests/verification"),
-    "smooth": ("tests/smooth",),
     "bounds": ("tests/bounds",),
-    "verification": ("tests/verification", "tests/results"),
+    "smooth": ("tests/smooth",),
+    "mechanics": ("tests/mechanics", "tests/hard"),
     "results": ("tests/results", "tests/commands/test_verify_and_compare.py"),
+    "verification": ("tests/verification", "tests/results"),
     "system": ("tests/system", "tests/results"),
 }
 """What mirrors a package comes first; the rest of the suite is for those that survive it."""
@@ -65,9 +65,8 @@ class Mutant(NamedTuple):
     new: str
 
     @property
-    def tests(self) -> tuple[str, ...]:
-        """Folders of the tests that are about its package."""
-        return TESTS[self.file.split("/")[1]]
+    def package(self) -> str:
+        return self.file.split("/")[1]
 
     def described(self, copy: Path) -> str:
         text = (copy / self.file).read_text(encoding="utf-8")
@@ -101,7 +100,7 @@ def tests_of(mutant: Mutant, known: dict[str, list[Test]]) -> list[str]:
     """Names of the tests that call its function, or anything of its file where none does: file by file, the cheapest first."""
     function = mutant.function()
     chosen, spent = [], 0.0
-    for folder in mutant.tests:
+    for folder in TESTS[mutant.package]:
         calling = [test for test in known[folder] if function in test.calls]
         if not calling:
             calling = [test for test in known[folder] if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
@@ -218,16 +217,16 @@ def main() -> None:
             (shutil.copytree if source.is_dir() else shutil.copy2)(source, copy / name)
         cache.mkdir(mode=0o700)
         known: dict[str, list[Test]] = {}
-        for package in dict.fromkeys(mutant.file.split("/")[1] for mutant in chosen):
-            for tests_folder in TESTS[package]:
+        for index, mutant in sorted(enumerate(chosen), key=lambda each: list(TESTS).index(each[1].package)):
+            if index in done or _processor_seconds() > options.seconds:
+                continue
+            for tests_folder in TESTS[mutant.package]:
                 kept = options.record.with_name(f"reach-{tests_folder.replace('/', '-')}.json")
                 if not kept.exists():
                     save(_reached(copy, cache, tests_folder), kept)
-                known[tests_folder] = load(kept)
-                print(f"{tests_folder}: {len(known[tests_folder])} tests, {_processor_seconds():.0f} s", flush=True)
-        for index, mutant in enumerate(chosen):
-            if index in done or _processor_seconds() > options.seconds:
-                continue
+                    print(f"{tests_folder} without a fault: {_processor_seconds():.0f} s", flush=True)
+                if tests_folder not in known:
+                    known[tests_folder] = load(kept)
             before, tests = _processor_seconds(), tests_of(mutant, known)
             what, described = outcome(mutant, copy, cache, tests), mutant.described(copy)
             done[index] = what
