@@ -99,13 +99,11 @@ def main() -> None:
                     time.sleep(0.2)
                 run.wait()
                 new, after = rows(journal) - before, used(scheduler)
-                print(
-                    f"{'killed' if kill_at else 'ended'} with code {run.returncode}: {new} cells ({before} known before) in "
-                    f"{time.monotonic() - begin:.0f} s; processor time of the run {own[0]:.1f} s, {first:.1f} s of it before the "
-                    f"first new row, {own[0] / max(new, 1) * 1e3:.2f} ms a cell; its memory {own[1]:.0f} MB; of the scheduler "
-                    f"{(after[0] - seen[0]) / max(new, 1) * 1e3:.2f} ms a cell, {after[1]:.0f} MB ({empty[1]:.0f} MB before)",
-                    flush=True,
-                )
+                print(f"{'killed' if kill_at else 'ended'} with code {run.returncode} after {time.monotonic() - begin:.0f} s:")
+                print(f"  {new} cells, {before} known before; {first:.1f} s of processor time before the first new row")
+                print(f"  the run: {own[0] / max(new, 1) * 1e3:.2f} ms a cell, {own[0]:.1f} s, {own[1]:.0f} MB")
+                spent = (after[0] - seen[0]) / max(new, 1) * 1e3
+                print(f"  the scheduler: {spent:.2f} ms a cell, {after[1]:.0f} MB ({empty[1]:.0f} MB at first)", flush=True)
         found = read_rows(journal, KIND)
         problems = {entry["problem"] for entry in found.values.values()}
         print(f"{len(found.values)} rows, {len(problems)} problems of {options.cells}, {found.damaged} damaged")

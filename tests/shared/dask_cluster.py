@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import resource
 import subprocess
 import sys
 
@@ -35,21 +34,17 @@ class DaskProcesses(contextlib.ExitStack):
         self.environment = {**os.environ, **{f"DASK_DISTRIBUTED__{key}": value for key, value in settings.items()}}
         self.scheduler, self.address = self._started("scheduler", "")
 
-    def worker(self, largest_file=None, **environment):
-        """A new worker process; it can write no more than `largest_file` bytes to any file."""
-        limits = (
-            None if largest_file is None else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
-        )
-        return self._started("worker", self.address, limits, environment)[0]
+    def worker(self, **environment):
+        """A new worker process."""
+        return self._started("worker", self.address, environment)[0]
 
-    def _started(self, kind, address, limits=None, environment=()):
+    def _started(self, kind, address, environment=()):
         process = subprocess.Popen(
             [sys.executable, "-c", PROGRAM, kind, address],
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
             env={**self.environment, **dict(environment)},
-            preexec_fn=limits,
         )
         self.callback(process.communicate)
         self.callback(process.kill)

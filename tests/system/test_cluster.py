@@ -1,6 +1,7 @@
 """A study on a Dask cluster of which a process is killed, stopped or cannot write: nothing finished is lost, nothing hangs."""
 
 import json
+import resource
 import signal
 import subprocess
 import sys
@@ -71,13 +72,14 @@ def study_file(folder, cells):
     return [sys.executable, "-m", "colloc", "sweep", str(folder / "s.py"), "--output", str(folder / "out")]
 
 
-def test_a_worker_that_can_write_nothing_finds_what_others_find(tmp_path):
+def test_a_worker_on_a_full_disk_finds_what_others_find(tmp_path):
     """It cannot keep compiled code either, and does everything in NumPy."""
     plain = subprocess.run([*study_file(tmp_path, 3), "--json"], capture_output=True, text=True)
     assert plain.returncode == 0, plain.stderr
     expected = load_study(tmp_path / "out" / "tiny.nc").variables["efficiency"]
     with DaskProcesses() as dask:
-        dask.worker(largest_file=0, COLLOC_CODE=str(tmp_path / "code"))
+        worker = dask.worker(COLLOC_CODE=str(tmp_path / "code"))
+        resource.prlimit(worker.pid, resource.RLIMIT_FSIZE, (0, 0))  # from now on
         other = [*study_file(tmp_path, 3)[:-1], str(tmp_path / "starved"), "--dask", dask.address, "--json"]
         done = subprocess.run(other, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
