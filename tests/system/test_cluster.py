@@ -1,12 +1,15 @@
 """A study on a Dask cluster of which a process is killed, stopped or cannot write: nothing finished is lost, nothing hangs."""
 
 import json
+import os
+import re
 import resource
 import signal
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -122,3 +125,55 @@ def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
     assert json.loads(done.stdout)["counts"] == {"solved": cells}
     keys = [(record.problem_hash, attempt.key) for record in read_journal(journal).records for attempt in record.attempts]
     assert len(keys) == len(set(keys))  # nothing was solved twice
+
+
+SBATCH = """#!/bin/sh
+cp "$1" "$0.job"  # as SLURM does
+setsid sh "$0.job" > "$0.log" 2>&1 &
+echo $! > "$0.pid"
+echo Submitted batch job 7
+"""
+SCANCEL = """#!/bin/sh
+kill -- -$(cat "$(dirname "$0")/sbatch.pid")
+"""
+
+
+def test_the_recipe_for_slurm_runs_with_a_stand_in_for_its_commands(tmp_path):
+    pytest.importorskip("dask_jobqueue")
+    page = (Path(__file__).resolve().parents[2] / "docs" / "cluster.md").read_text(encoding="utf-8")
+    (recipe,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    for stated, here in (
+        ('"64GB"', '"4GB"'),
+        ("cores=32", "cores=2"),
+        ("processes=32", "processes=2"),
+        ('interface="ib0"', 'interface="lo"'),
+        ("jobs=10", "jobs=1"),
+        ("source ~/colloc/.venv/bin/activate", "true"),
+    ):
+        assert stated in recipe
+        recipe = recipe.replace(stated, here)
+    (tmp_path / "workers.py").write_text(recipe, encoding="utf-8")
+    for name, program in (("sbatch", SBATCH), ("scancel", SCANCEL)):
+        (tmp_path / name).write_text(program)
+        (tmp_path / name).chmod(0o755)
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "DASK_DISTRIBUTED__DASHBOARD__LINK": ""}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": environment}
+    with subprocess.Popen([sys.executable, str(tmp_path / "workers.py")], **pipes) as workers:
+        try:
+            address = workers.stdout.readline().strip()
+            assert address.startswith("tcp://127.0.0.1:")
+            done = subprocess.run([*study_file(tmp_path, 4), "--dask", address, "--json"], capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+            assert json.loads(done.stdout)["counts"] == {"solved": 4}
+            workers.communicate(timeout=60)  # the end of its input
+            assert workers.returncode == 0
+        finally:
+            subprocess.run([str(tmp_path / "scancel")], capture_output=True, check=False)
+            workers.kill()
+    job = int((tmp_path / "sbatch.pid").read_text())
+    for _ in range(100):
+        if not Path(f"/proc/{job}").exists():
+            break
+        time.sleep(0.1)
+    else:
+        pytest.fail("the job goes on")
