@@ -200,6 +200,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
+    parser.add_argument("--part", type=int, nargs=2, default=(0, 1), metavar=("K", "N"), help="part K of N, run at once")
     parser.add_argument("--only", default="", metavar="TEXT", help="files whose path holds this")
     options = parser.parse_args()
     found = [mutant for mutant in mutants() if options.only in mutant.file]
@@ -217,8 +218,11 @@ def main() -> None:
             (shutil.copytree if source.is_dir() else shutil.copy2)(source, copy / name)
         cache.mkdir(mode=0o700)
         known: dict[str, list[Test]] = {}
-        for index, mutant in sorted(enumerate(chosen), key=lambda each: list(TESTS).index(each[1].package)):
-            if index in done or _processor_seconds() > options.seconds:
+        (part, parts), packages = options.part, list(TESTS)
+        for index, mutant in sorted(
+            enumerate(chosen), key=lambda each: (packages.index(each[1].package) - 2 * part) % len(packages)
+        ):
+            if index in done or index % parts != part or _processor_seconds() > options.seconds:
                 continue
             for tests_folder in TESTS[mutant.package]:
                 kept = options.record.with_name(f"reach-{tests_folder.replace('/', '-')}.json")

@@ -5,6 +5,7 @@ import pytest
 from scipy import sparse
 from scipy.optimize import linprog
 
+from colloc import solve_balance
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
@@ -180,3 +181,23 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
 def test_impossible_requests_are_refused(body, limit, match):
     with pytest.raises(ProblemError, match=match):
         efficiency_bound(body, Friction(), limit)
+
+
+@pytest.mark.parametrize("lengths", [(0.4, 0.6), (0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
+def test_a_motion_is_that_of_the_midpoint_of_the_middle_link_in_its_own_axes(lengths):
+    """Of link n // 2, from positions a moment later."""
+    body, rng, h = Chain(lengths), np.random.default_rng(41), 1e-6
+    n = body.n_link
+    angles, rates = rng.uniform(-1, 1, (n - 1, 20)), rng.normal(size=(n - 1, 20))
+    z = solve_balance(body, Friction(), angles, rates, 1e-8).require().z
+    motion = balanced_motion(body, Friction(), angles, rates, 1e-8)
+
+    def midpoint(t):
+        heading = z[2] * t + np.concatenate([[np.zeros(20)], np.cumsum(angles + rates * t, axis=0)])
+        along = np.array(lengths)[:, None] * np.exp(1j * heading)
+        return (z[0] + 1j * z[1]) * t + along[: n // 2].sum(axis=0) + along[n // 2] / 2, heading[n // 2]
+
+    (before, _), (after, _), (_, heading) = midpoint(-h), midpoint(h), midpoint(0.0)
+    velocity = (after - before) / (2 * h) * np.exp(-1j * heading)
+    np.testing.assert_allclose(motion.velocity[0] + 1j * motion.velocity[1], velocity, atol=1e-6)
+    np.testing.assert_allclose(motion.spin, z[2] + rates[: n // 2].sum(axis=0), atol=1e-6)
