@@ -158,6 +158,7 @@ def summary(rows: list[dict[str, Any]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--problems", type=int, default=1000, metavar="N")
+    parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
     parser.add_argument("--record", type=Path, default=Path("results/audit.jsonl"), help="what it has is not done again")
     parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     options = parser.parse_args()
@@ -165,7 +166,7 @@ def main() -> None:
     if options.record.exists():
         rows = {row["number"]: row for row in map(json.loads, options.record.read_text(encoding="utf-8").splitlines())}
     options.record.parent.mkdir(parents=True, exist_ok=True)
-    todo = [number for number in range(options.problems) if number not in rows]
+    todo = [number for number in range(options.first, options.problems) if number not in rows]
     while todo and time.process_time() < options.seconds:
         now, todo = [solved(number) for number in todo[:BATCH]], todo[BATCH:]
         judged([row for row in now if row["status"] == SOLVED])

@@ -100,9 +100,9 @@ def tests_of(mutant: Mutant, known: dict[str, list[Test]]) -> list[str]:
     """Names of the tests that call its function, or anything of its file where none does: file by file, the cheapest first."""
     function = mutant.function()
     chosen, spent = [], 0.0
-    for folder in TESTS[mutant.package]:
+    for folder in dict.fromkeys((*TESTS[mutant.package], *known)):
         calling = [test for test in known[folder] if function in test.calls]
-        if not calling:
+        if not calling and folder in TESTS[mutant.package]:
             calling = [test for test in known[folder] if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
         by_file: dict[str, list[Test]] = {}
         for test in sorted(calling, key=lambda test: test.seconds):
@@ -180,10 +180,13 @@ def _reached(copy: Path, cache: Path, folder: str) -> list[Test]:
 
         found, code = reach.recorded((folder,))
         reach.save(found, copy.parent / "reach.json")
+        sys.stdout.flush()
         return code
 
-    if _in_child(copy, work):
-        said = (copy.parent / "said.txt").read_text(encoding="utf-8")
+    failed = _in_child(copy, work)
+    said = (copy.parent / "said.txt").read_text(encoding="utf-8")
+    print("\n".join(line for line in said.splitlines() if line.startswith("not used")))
+    if failed:
         raise SystemExit(f"the tests of {folder} fail without any fault:\n{said[-3000:]}")
     return load(copy.parent / "reach.json")
 
@@ -201,14 +204,16 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
     parser.add_argument("--part", type=int, nargs=2, default=(0, 1), metavar=("K", "N"), help="part K of N, run at once")
+    parser.add_argument("--again", action="store_true", help="those that survived meet the tests of all folders")
     parser.add_argument("--only", default="", metavar="TEXT", help="files whose path holds this")
     options = parser.parse_args()
     found = [mutant for mutant in mutants() if options.only in mutant.file]
     chosen = random.Random(options.seed).sample(found, min(options.mutants, len(found)))
-    done: dict[int, str] = {}
+    done, again = dict[int, str](), set[int]()
     if options.record.exists():
         rows = map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
         done = {row["index"]: row["outcome"] for row in rows if row["seed"] == options.seed}
+        again = {index for index, what in done.items() if options.again and what in ("survived", "not reached")}
     options.record.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         copy, cache = Path(folder) / "colloc", Path(folder) / "cache"
@@ -222,14 +227,14 @@ def main() -> None:
         for index, mutant in sorted(
             enumerate(chosen), key=lambda each: (packages.index(each[1].package) - 2 * part) % len(packages)
         ):
-            if index in done or index % parts != part or _processor_seconds() > options.seconds:
+            if (index in done) != (index in again) or index % parts != part or _processor_seconds() > options.seconds:
                 continue
-            for tests_folder in TESTS[mutant.package]:
+            for tests_folder in dict.fromkeys(folder for folders in TESTS.values() for folder in folders):
                 kept = options.record.with_name(f"reach-{tests_folder.replace('/', '-')}.json")
-                if not kept.exists():
+                if not kept.exists() and tests_folder in TESTS[mutant.package]:
                     save(_reached(copy, cache, tests_folder), kept)
                     print(f"{tests_folder} without a fault: {_processor_seconds():.0f} s", flush=True)
-                if tests_folder not in known:
+                if tests_folder not in known and kept.exists():
                     known[tests_folder] = load(kept)
             before, tests = _processor_seconds(), tests_of(mutant, known)
             what, described = outcome(mutant, copy, cache, tests), mutant.described(copy)

@@ -177,6 +177,11 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
 
 
+def test_four_links_are_not_too_many(monkeypatch):
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda domain, budget: domain.body.n_link)
+    assert efficiency_bound(Chain((0.25,) * 4), Friction()) == 4
+
+
 @pytest.mark.parametrize(("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((0.2,) * 5), 2.0, "four links")])
 def test_impossible_requests_are_refused(body, limit, match):
     with pytest.raises(ProblemError, match=match):
