@@ -203,11 +203,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
-    parser.add_argument("--part", type=int, nargs=2, default=(0, 1), metavar=("K", "N"), help="part K of N, run at once")
     parser.add_argument("--again", action="store_true", help="those that survived meet the tests of all folders")
-    parser.add_argument("--only", default="", metavar="TEXT", help="files whose path holds this")
+    parser.add_argument("--only", default="", metavar="TEXT", help="of the sample those in files whose path holds this")
     options = parser.parse_args()
-    found = [mutant for mutant in mutants() if options.only in mutant.file]
+    found = list(mutants())
     chosen = random.Random(options.seed).sample(found, min(options.mutants, len(found)))
     done, again = dict[int, str](), set[int]()
     if options.record.exists():
@@ -223,11 +222,9 @@ def main() -> None:
             (shutil.copytree if source.is_dir() else shutil.copy2)(source, copy / name)
         cache.mkdir(mode=0o700)
         known: dict[str, list[Test]] = {}
-        (part, parts), packages = options.part, list(TESTS)
-        for index, mutant in sorted(
-            enumerate(chosen), key=lambda each: (packages.index(each[1].package) - 2 * part) % len(packages)
-        ):
-            if (index in done) != (index in again) or index % parts != part or _processor_seconds() > options.seconds:
+        for index, mutant in sorted(enumerate(chosen), key=lambda each: list(TESTS).index(each[1].package)):
+            left_out = (index in done) != (index in again) or options.only not in mutant.file
+            if left_out or _processor_seconds() > options.seconds:
                 continue
             for tests_folder in dict.fromkeys(folder for folders in TESTS.values() for folder in folders):
                 kept = options.record.with_name(f"reach-{tests_folder.replace('/', '-')}.json")
