@@ -112,6 +112,12 @@ def test_two_links_with_reversible_friction_cannot_move():
     assert values[2] < 0.01
 
 
+def test_a_bound_says_whether_the_last_climbs_still_found_more():
+    few, enough = (efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, n)) for n in (1, 24))
+    assert (few.converged, enough.converged) == (False, True)
+    assert few.sampled > 1.05 * enough.sampled
+
+
 @pytest.mark.slow
 def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
     bound = efficiency_bound(Chain((0.5, 0.5)), Friction(1.0, 1.0, 3.0), budget=Budget(8, (0, 1), 32, 2, 3, 20))
