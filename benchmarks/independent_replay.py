@@ -19,6 +19,7 @@ _TO_NODES = np.array([[np.polyval(np.polyint(np.poly1d(row)), t) for row in np.l
 """Integrals from 0 to each node of the polynomials that are 1 at one node and 0 at the others."""
 _SLENDER = 0.1
 _NARROWEST = 1e-9
+_MOST_PANELS = 8000
 
 
 class Played(NamedTuple):
@@ -51,10 +52,19 @@ def _moments(vs: np.ndarray, vn: np.ndarray, w: np.ndarray, length: float, delta
 
 
 class Crawler(NamedTuple):
-    """A chain of links on a plane with Coulomb friction (mu_t, mu_f, mu_b)."""
+    """A chain of links on a plane with Coulomb friction (mu_t, mu_f, mu_b); or one for each of many instants.
 
-    lengths: Sequence[float]
-    coefficients: Sequence[float]
+    Lengths are then ``(link, n)`` and coefficients ``(3, n)``.
+    """
+
+    lengths: Sequence[float] | np.ndarray
+    coefficients: Sequence[float] | np.ndarray
+
+    def of(self, chosen: np.ndarray) -> Crawler:
+        """Those of some instants."""
+        if np.ndim(self.lengths) == 1:
+            return self
+        return Crawler(np.asarray(self.lengths)[:, chosen], np.asarray(self.coefficients)[:, chosen])
 
     def forces(
         self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray
@@ -80,73 +90,189 @@ class Crawler(NamedTuple):
         return total, power, centre
 
     def _newton(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray, steps: int) -> np.ndarray:
-        """Steps of Newton that are halved until the force falls; delta is ``(n,)``."""
+        """Steps of Newton that are halved until the force falls, at every instant by itself; delta is ``(n,)``."""
         z, scale = z.copy(), np.maximum(np.abs(rates).max(axis=0), 1e-300)
         force = self.forces(angles, rates, z, delta)[0]
+        live = np.arange(z.shape[1])
         for _ in range(steps):
-            size = 1e-7 * np.maximum(delta, 1e-4 * np.abs(z).max(axis=0))
-            columns = [(self.forces(angles, rates, z + size * e[:, None], delta)[0] - force) / size for e in np.eye(3)]
-            jacobian = np.stack(columns, axis=1).transpose(2, 0, 1)
-            jacobian = jacobian + 1e-14 * np.abs(jacobian).max(axis=(1, 2))[:, None, None] * np.eye(3)
-            step = np.linalg.solve(jacobian, -force.T[:, :, None])[:, :, 0].T
-            norm, left = np.linalg.norm(force, axis=0), np.ones(z.shape[1], dtype=bool)
-            factor = np.ones(z.shape[1])
-            for _ in range(12):
-                trial = z + factor * step
-                new = self.forces(angles, rates, trial, delta)[0]
-                left = np.linalg.norm(new, axis=0) > (1 - 1e-4 * factor) * norm
-                if not left.any():
-                    break
-                factor[left] *= 0.4
-            z, force = np.where(left, z, trial), np.where(left, force, new)
-            if (left | (np.abs(factor * step).max(axis=0) < 1e-13 * scale)).all():
+            if not live.size:
                 break
+            at = self.of(live), angles[:, live], rates[:, live], delta[live]
+            step = _newton_step(*at, z[:, live], force[:, live])
+            factor, todo = np.ones(live.size), np.arange(live.size)
+            norm = np.linalg.norm(force[:, live], axis=0)
+            for _ in range(12):
+                here = live[todo]
+                trial = z[:, here] + factor[todo] * step[:, todo]
+                new = at[0].of(todo).forces(at[1][:, todo], at[2][:, todo], trial, at[3][todo])[0]
+                falls = np.linalg.norm(new, axis=0) <= (1 - 1e-4 * factor[todo]) * norm[todo]
+                z[:, here[falls]], force[:, here[falls]] = trial[:, falls], new[:, falls]
+                todo = todo[~falls]
+                if not todo.size:
+                    break
+                factor[todo] *= 0.4
+            moves = np.abs(factor * step).max(axis=0) >= 1e-13 * scale[live]
+            moves[todo] = False
+            live = live[moves]
         return z
 
-    def velocity(self, angles: np.ndarray, rates: np.ndarray, delta: float, near: np.ndarray | None = None) -> np.ndarray:
+    def velocity(
+        self, angles: np.ndarray, rates: np.ndarray, delta: np.ndarray, near: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """A tail velocity that balances the body at every instant, ``(3, n)``, from one nearby or from large delta down.
 
-        Raises
-        ------
-        ArithmeticError
-            If there is an instant where none was found.
+        And the instants where none was found. Delta is ``(n,)``.
         """
         n, speed = angles.shape[1], np.maximum(np.abs(rates).max(axis=0), 1e-300)
-        z = np.zeros((3, n)) if near is None else self._newton(angles, rates, near, np.full(n, delta), 12)
+        z = np.zeros((3, n)) if near is None else self._newton(angles, rates, near, delta, 12)
         bad = np.arange(n) if near is None else np.flatnonzero(~self._balanced(angles, rates, z, delta))
         for factor in (0.3, 0.7, 0.9):
             if not bad.size:
                 break
-            z[:, bad], level = 0.0, 3.0 * speed[bad]
-            while (level > delta).any():
-                level = np.maximum(factor * level, delta)
-                z[:, bad] = self._newton(angles[:, bad], rates[:, bad], z[:, bad], level, 15)
-            z[:, bad] = self._newton(angles[:, bad], rates[:, bad], z[:, bad], level, 40)
-            bad = bad[~self._balanced(angles[:, bad], rates[:, bad], z[:, bad], delta)]
-        if bad.size:
-            raise ArithmeticError(f"{bad.size} of {n} instants are not balanced")
-        return z
+            body, at = self.of(bad), (angles[:, bad], rates[:, bad])
+            found, level = np.zeros((3, bad.size)), 3.0 * speed[bad]
+            while (level > delta[bad]).any():
+                level = np.maximum(factor * level, delta[bad])
+                found = body._newton(*at, found, level, 15)
+            z[:, bad] = found = body._newton(*at, found, level, 40)
+            bad = bad[~body._balanced(*at, found, level)]
+        return z, bad
 
-    def _balanced(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
+    def _balanced(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray) -> np.ndarray:
         """Whether the force vanishes, as far as the rounding of z lets it."""
-        force = self.forces(angles, rates, z, np.full(z.shape[1], delta))[0]
+        force = self.forces(angles, rates, z, delta)[0]
         rounding = 1e-14 * np.abs(rates).max(axis=0) / delta
-        return np.abs(force).max(axis=0) < max(self.coefficients) * (1e-9 + rounding)
+        return np.abs(force).max(axis=0) < np.max(self.coefficients, axis=0) * (1e-9 + rounding)
 
 
-def _panel_values(
-    body: Crawler, path: Path, delta: float, left: np.ndarray, width: np.ndarray, near: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Turn, displacement in the axes of the panel's begin and work of panels ``(n,)``, and velocities ``(3, n, node)``."""
-    t = (left[:, None] + width[:, None] * _TIME).ravel()
-    angles, rates = path(t)
-    z = body.velocity(angles, rates, delta, None if near is None else near.reshape(3, -1))
-    _, power, centre = body.forces(angles, rates, z, np.full(t.size, delta))
-    shape = (left.size, _TIME.size)
-    omega, along = z[2].reshape(shape), (centre[0] + 1j * centre[1]).reshape(shape)
-    turned = np.exp(1j * width[:, None] * (omega @ _TO_NODES.T)) * along
-    turn, move, work = (values @ _TIME_WEIGHTS * width for values in (omega, turned, power.reshape(shape)))
-    return turn, move, work, z.reshape(3, *shape)
+def _newton_step(
+    body: Crawler, angles: np.ndarray, rates: np.ndarray, delta: np.ndarray, z: np.ndarray, force: np.ndarray
+) -> np.ndarray:
+    """By difference quotients, ``(3, n)``."""
+    size = 1e-7 * np.maximum(delta, 1e-4 * np.abs(z).max(axis=0))
+    columns = [(body.forces(angles, rates, z + size * e[:, None], delta)[0] - force) / size for e in np.eye(3)]
+    jacobian = np.stack(columns, axis=1).transpose(2, 0, 1)
+    jacobian = jacobian + 1e-14 * np.abs(jacobian).max(axis=(1, 2))[:, None, None] * np.eye(3)
+    return np.linalg.solve(jacobian, -force.T[:, :, None])[:, :, 0].T
+
+
+class Gait(NamedTuple):
+    """What is played: a body, its path, the regularisation speed, and phases where the rates jump."""
+
+    body: Crawler
+    path: Path
+    delta: float
+    breaks: np.ndarray | Sequence[float] = ()
+
+
+class _Panels(NamedTuple):
+    """Pieces of the periods of many gaits: whose, where, and what happens in them; the last axis is that of panels."""
+
+    owner: np.ndarray
+    left: np.ndarray
+    width: np.ndarray
+    turn: np.ndarray
+    move: np.ndarray
+    """Displacement in the axes of the panel's begin."""
+    work: np.ndarray
+    z: np.ndarray
+    """``(3, node, n)``."""
+    gap: np.ndarray
+    """What halving changed, relative."""
+    balanced: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> _Panels:
+        return _Panels(*(part[..., chosen] for part in self))
+
+    def and_(self, more: _Panels) -> _Panels:
+        return _Panels(*(np.concatenate(pair, axis=-1) for pair in zip(self, more, strict=True)))
+
+
+def _panels(gaits: Sequence[Gait], owner: np.ndarray, left: np.ndarray, width: np.ndarray, near: np.ndarray | None) -> _Panels:
+    """Panels, from velocities nearby ``(3, node, n)`` if there are any."""
+    t = left + width * _TIME[:, None]
+    angles = np.empty((len(gaits[0].body.lengths) - 1, *t.shape))
+    rates = np.empty_like(angles)
+    for k in np.unique(owner):
+        own = owner == k
+        there = gaits[k].path(t[:, own].ravel())
+        angles[..., own], rates[..., own] = (each.reshape(angles.shape[0], _TIME.size, -1) for each in there)
+    angles, rates = angles.reshape(angles.shape[0], -1), rates.reshape(angles.shape[0], -1)
+    whose = np.tile(owner, _TIME.size)
+    body = Crawler(*(np.array([gait.body[k] for gait in gaits])[whose].T for k in (0, 1)))
+    delta = np.array([gait.delta for gait in gaits])[whose]
+    z, bad = body.velocity(angles, rates, delta, None if near is None else near.reshape(3, -1))
+    _, power, centre = body.forces(angles, rates, z, delta)
+    omega, along = z[2].reshape(t.shape), (centre[0] + 1j * centre[1]).reshape(t.shape)
+    turned = np.exp(1j * width * (_TO_NODES @ omega)) * along
+    turn, move, work = (_TIME_WEIGHTS @ values * width for values in (omega, turned, power.reshape(t.shape)))
+    balanced = np.ones(t.size, dtype=bool)
+    balanced[bad] = False
+    gap = np.full(left.size, np.inf)
+    return _Panels(
+        owner, left, width, turn, move, work, z.reshape(3, *t.shape), gap, np.asarray(balanced.reshape(t.shape).all(axis=0))
+    )
+
+
+def _halved(gaits: Sequence[Gait], whole: _Panels, size: np.ndarray) -> _Panels:
+    """Both halves of panels; `size` is ``(3, n)``: what their displacement, work and turn are measured by."""
+    half = np.repeat(0.5 * whole.width, 2)
+    begin = np.repeat(whole.left, 2) + np.tile([0.0, 1.0], whole.left.size) * half
+    # from the nearest node of the panel before
+    nodes = np.abs(0.5 * (np.concatenate([_TIME, _TIME + 1]))[:, None] - _TIME).argmin(axis=1).reshape(2, -1)
+    near = np.stack([whole.z[:, nodes[0]], whole.z[:, nodes[1]]], axis=-1).reshape(3, _TIME.size, -1)
+    new = _panels(gaits, np.repeat(whole.owner, 2), begin, half, near)
+    first, second = new.of(np.arange(0, half.size, 2)), new.of(np.arange(1, half.size, 2))
+    moved = first.move + np.exp(1j * first.turn) * second.move
+    change = np.abs(moved - whole.move) / size[0] + np.abs(first.work + second.work - whole.work) / size[1]
+    change = change + np.abs(first.turn + second.turn - whole.turn) / size[2]
+    return new._replace(gap=np.repeat(0.5 * change, 2))
+
+
+def _summed(panels: _Panels) -> tuple[Played, np.ndarray]:
+    """One gait, and what displacement, work and turn of its panels are measured by."""
+    order = np.argsort(panels.left)
+    heading = np.concatenate([[0.0], np.cumsum(panels.turn[order])])
+    place = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * panels.move[order])])
+    distance, work = float(abs(place[-1])), float(panels.work.sum())
+    size = np.array([max(distance, 1e-300), work, max(distance, 1e-300) / np.abs(place - place[-1]).max()])
+    return Played(distance / work, distance, work, float(heading[-1]), 7 * panels.left.size, float(panels.gap.sum())), size
+
+
+def played_together(gaits: Sequence[Gait], tolerance: float = 1e-8, panels: int = 40) -> list[Played | None]:
+    """Efficiency, distance of the centre of mass, work and rotation of every gait over its period.
+
+    Parameters
+    ----------
+    gaits : sequence of Gait
+        Of bodies with the same number of links: their instants are solved together.
+    tolerance : float
+        Relative, of the efficiency.
+    panels : int
+        To begin with.
+
+    Returns
+    -------
+    list of Played or None
+        None for a gait with instants at which no balance was found.
+    """
+    edges = [np.union1d(np.linspace(0, 1, panels + 1), np.asarray(gait.breaks, dtype=float)) for gait in gaits]
+    owner = np.repeat(np.arange(len(gaits)), [each.size - 1 for each in edges])
+    left, width = np.concatenate([each[:-1] for each in edges]), np.concatenate([np.diff(each) for each in edges])
+    now, found = _panels(gaits, owner, left, width, None), list[Played | None]([None] * len(gaits))
+    while True:
+        sizes, open_ = np.empty((3, len(gaits))), np.zeros(now.owner.size, dtype=bool)
+        for k in range(len(gaits)):
+            own = np.flatnonzero(now.owner == k)
+            if not now.balanced[own].all():
+                found[k] = None
+                continue
+            found[k], sizes[:, k] = _summed(now.of(own))
+            open_[own] = (own.size <= _MOST_PANELS) & (now.gap[own] > tolerance / 300) & (now.width[own] > _NARROWEST)
+        if not open_.any():
+            return found
+        whole = now.of(open_)
+        now = now.of(~open_).and_(_halved(gaits, whole, sizes[:, whole.owner]))
 
 
 def played(
@@ -157,45 +283,14 @@ def played(
     breaks: np.ndarray | Sequence[float] = (),
     panels: int = 40,
 ) -> Played:
-    """Efficiency, distance of the centre of mass, work and rotation of a path over one period.
+    """One gait; see `played_together`.
 
-    Parameters
-    ----------
-    body : Crawler
-    path : callable
-        Joint angles and rates ``(n_joint, n)`` at phases ``(n,)``.
-    delta : float
-        Regularisation speed.
-    tolerance : float
-        Relative, of the efficiency.
-    breaks : (n,), optional
-        Phases where the rates jump.
-    panels : int
-        To begin with.
+    Raises
+    ------
+    ArithmeticError
+        If there is an instant where no balance was found.
     """
-    edges = np.unique(np.concatenate([np.linspace(0, 1, panels + 1), np.asarray(breaks, dtype=float)]))
-    left, width = edges[:-1], np.diff(edges)
-    turn, move, work, z = _panel_values(body, path, delta, left, width, None)
-    gap = np.full(left.size, np.inf)
-    while True:
-        order = np.argsort(left)
-        heading = np.concatenate([[0.0], np.cumsum(turn[order])])
-        place = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move[order])])
-        distance, spent = abs(place[-1]), work.sum()
-        chosen = np.flatnonzero((gap > tolerance / 300) & (width > _NARROWEST))
-        if not chosen.size or left.size > 8000:
-            return Played(distance / spent, distance, spent, float(heading[-1]), 7 * left.size, float(gap.sum()))
-        half = np.repeat(0.5 * width[chosen], 2)
-        begin = np.repeat(left[chosen], 2) + np.tile([0.0, 1.0], chosen.size) * half
-        # from the nearest node of the panel before
-        nodes = np.abs(0.5 * (np.concatenate([_TIME, _TIME + 1]))[:, None] - _TIME).argmin(axis=1)
-        near = z[:, chosen][:, :, nodes].reshape(3, begin.size, -1)
-        new = _panel_values(body, path, delta, begin, half, near)
-        first, second = ([part[k::2] for part in new[:3]] for k in (0, 1))
-        moved = first[1] + np.exp(1j * first[0]) * second[1]
-        change = np.abs(moved - move[chosen]) / max(distance, 1e-300) + np.abs(first[2] + second[2] - work[chosen]) / spent
-        change = change + np.abs(first[0] + second[0] - turn[chosen]) * np.abs(place - place[-1]).max() / max(distance, 1e-300)
-        kept = np.setdiff1d(np.arange(left.size), chosen)
-        left, width = np.concatenate([left[kept], begin]), np.concatenate([width[kept], half])
-        turn, move, work = (np.concatenate([a[kept], b]) for a, b in zip((turn, move, work), new[:3], strict=True))
-        z, gap = np.concatenate([z[:, kept], new[3]], axis=1), np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])
+    found = played_together([Gait(body, path, delta, breaks)], tolerance, panels)[0]
+    if found is None:
+        raise ArithmeticError("there are instants that are not balanced")
+    return found

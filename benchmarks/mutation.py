@@ -1,88 +1,72 @@
 """Does the suite catch a wrong program? One small fault at a time is put into a copy of colloc, and its tests are run.
 
-    python -m benchmarks.mutation --mutants 200 [--seed 0] [--first K]
+    python -m benchmarks.mutation --mutants 200 [--seed 0] [--seconds 600]
 
 Faults are drawn from the packages that results rest on: an operator, a comparison, a constant, a sign, a condition or an
-`abs`, `min`, `max` is changed, in Python and in the C of the kernel. For each the default tests of the folders that mirror
-the package run until one fails. A mutant that takes ten times as long as they do counts as caught (it hangs). Those that
-survive are printed with their line: they are a gap of the tests, or a change without consequences.
+`abs`, `min`, `max` is changed, in Python and in the C of the kernel. One run without any fault records which tests call which
+functions (`benchmarks.reach`). For a fault those that call its function run, of the folder that mirrors its package first,
+until one fails; as many as fit in 40 s of processor time. What takes far longer than without a fault counts as caught (it
+hangs). Those that survive are printed with their line: they are a gap of the tests, or a change without consequences.
+What the record has is not done again, so that the same command goes on with a run that was ended. Which tests call what is kept
+beside it; remove that when tests change.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
-import io
 import json
 import os
 import random
-import re
 import resource
 import shutil
 import sys
 import tempfile
-import time
-import tokenize
 import traceback
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import h5py  # noqa: F401  (what all children need)
+import casadi  # noqa: F401  (what all children need)
+import h5py  # noqa: F401
 import numpy  # noqa: F401
 import pytest
 import scipy.optimize  # noqa: F401
 
+from benchmarks.faults import faults_of
+from benchmarks.reach import Test, load, save
+
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("colloc", "tests", "benchmarks", "problems", "studies", "scripts", "docs", "results", "pyproject.toml", "README.md")
+_NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "argument_names")
+"""What no result rests on."""
 TESTS = {
-    "colloc/mechanics": ("tests/mechanics", "tests/hard", "tests/verification"),
-    "colloc/bounds": ("tests/bounds",),
-    "colloc/verification": ("tests/verification", "tests/results"),
-    "colloc/results": ("tests/results", "tests/commands/test_verify_and_compare.py"),
-    "colloc/system": ("tests/system", "tests/results", "tests/studies"),
+    "bounds": ("tests/bounds",),
+    "smooth": ("tests/smooth",),
+    "mechanics": ("tests/mechanics", "tests/hard"),
+    "results": ("tests/results", "tests/commands/test_verify_and_compare.py"),
+    "verification": ("tests/verification", "tests/results"),
+    "system": ("tests/system", "tests/results"),
 }
-_SWAPS = {
-    "+": "-",
-    "-": "+",
-    "*": "/",
-    "/": "*",
-    "<": "<=",
-    "<=": "<",
-    ">": ">=",
-    ">=": ">",
-    "==": "!=",
-    "!=": "==",
-    "and": "or",
-    "or": "and",
-    "not": "",
-    "True": "False",
-    "False": "True",
-    "min": "max",
-    "max": "min",
-    "minimum": "maximum",
-    "maximum": "minimum",
-    "abs": "float",
-    "fmin": "fmax",
-    "fmax": "fmin",
-    "fabs": "",
-    "cumsum": "cumprod",
-    "argmin": "argmax",
-    "argmax": "argmin",
-    "break": "continue",
-}
-_SECONDS = 200
-"""Processor time of one mutant's tests."""
+"""What mirrors a package comes first; the rest of the suite is for those that survive it."""
+_OF_THE_KERNEL = "colloc/mechanics/native_kernel.py::address"
+"""Called by whatever calls compiled code."""
+_MOST = 40.0
+"""Recorded processor seconds of the tests that one fault is met with."""
 
 
 class Mutant(NamedTuple):
     """One fault: a span of a file and what it is replaced by."""
 
-    package: str
     file: str
     start: int
     end: int
     new: str
+
+    @property
+    def package(self) -> str:
+        return self.file.split("/")[1]
 
     def described(self, copy: Path) -> str:
         text = (copy / self.file).read_text(encoding="utf-8")
@@ -90,148 +74,173 @@ class Mutant(NamedTuple):
         line = text.splitlines()[number - 1].strip()
         return f"{self.file}:{number}: {text[self.start : self.end]!r} -> {self.new!r} in: {line}"
 
+    def function(self) -> str:
+        """``file::function`` it is in, as `benchmarks.reach` names it; ``file::`` outside all functions."""
+        if not self.file.endswith(".py"):
+            return _OF_THE_KERNEL
+        text = (ROOT / self.file).read_text(encoding="utf-8")
+        number = text.count("\n", 0, self.start) + 1
+        return f"{self.file}::{_function_at(ast.parse(text), number)}"
+
+
+def _function_at(node: ast.AST, number: int, outer: str = "") -> str:
+    """Qualified name of the innermost function that holds a line."""
+    for inner in ast.iter_child_nodes(node):
+        if getattr(inner, "lineno", number) <= number <= (getattr(inner, "end_lineno", number) or number):
+            if isinstance(inner, ast.ClassDef):
+                return _function_at(inner, number, f"{outer}{inner.name}.")
+            if isinstance(inner, ast.FunctionDef):
+                return _function_at(inner, number, f"{outer}{inner.name}.<locals>.") or outer + inner.name
+            if found := _function_at(inner, number, outer):
+                return found
+    return ""
+
+
+def tests_of(mutant: Mutant, known: dict[str, list[Test]]) -> list[str]:
+    """Names of the tests that call its function, or anything of its file where none does: file by file, the cheapest first."""
+    function = mutant.function()
+    chosen, spent = [], 0.0
+    for folder in dict.fromkeys((*TESTS[mutant.package], *known)):
+        calling = [test for test in known[folder] if function in test.calls]
+        if not calling and folder in TESTS[mutant.package]:
+            calling = [test for test in known[folder] if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
+        by_file: dict[str, list[Test]] = {}
+        for test in sorted(calling, key=lambda test: test.seconds):
+            by_file.setdefault(test.name.partition("::")[0], []).append(test)
+        for tests in sorted(by_file.values(), key=lambda tests: sum(test.seconds for test in tests)):
+            for test in tests:
+                if spent + test.seconds < _MOST:
+                    chosen.append(test.name)
+                    spent += test.seconds
+    return chosen
+
 
 def mutants() -> Iterator[Mutant]:
     """Every fault that can be put in."""
     for package in TESTS:
-        for path in sorted((ROOT / package).rglob("*")):
-            if path.suffix in (".py", ".c", ".h"):
+        for path in sorted((ROOT / "colloc" / package).rglob("*")):
+            if path.suffix in (".py", ".c", ".h") and path.stem not in _NOT_MUTATED:
                 file, text = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
-                for start, end, new in _python_faults(text) if path.suffix == ".py" else _c_faults(text):
-                    yield Mutant(package, file, start, end, new)
+                for start, end, new in faults_of(text, python=path.suffix == ".py"):
+                    yield Mutant(file, start, end, new)
 
 
-def _faulty(word: str) -> str | None:
-    """What a token becomes; None if it is left alone."""
-    if word in _SWAPS:
-        return _SWAPS[word]
-    if re.fullmatch(r"\d+", word):
-        return str(int(word) + 1)
-    if re.fullmatch(r"(\d+\.\d*|\.\d+)(e[-+]?\d+)?|\d+e[-+]?\d+", word):
-        return f"(1.5 * {word} + {0.1 if float(word) == 0 else 0})".replace(" + 0)", ")")
-    return None
-
-
-def _python_faults(text: str) -> Iterator[tuple[int, int, str]]:
-    """Of tokens outside annotations, imports, documentation and messages."""
-    lines = [0]
-    for line in text.splitlines(keepends=True):
-        lines.append(lines[-1] + len(line))
-    silent = list(_silent(ast.parse(text)))
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type not in (tokenize.OP, tokenize.NAME, tokenize.NUMBER):
-            continue
-        new = _faulty(token.string)
-        if token.string == "abs" and token.line[: token.start[1]].endswith("np."):
-            new = "positive"
-        (row, column), (_, end) = token.start, token.end
-        if new is None or any(first <= row <= last for first, last in silent):
-            continue
-        line = token.line
-        if token.string in "*/" and (line[column - 1] in "(, " and line[end : end + 1].strip() and line[end] != " "):
-            continue  # an unpacked argument, or a mark between arguments
-        if token.string in "*/" and re.match(r"\s*[,)]", line[end:]):
-            continue
-        yield lines[row - 1] + column, lines[row - 1] + end, new
-
-
-def _silent(tree: ast.AST) -> Iterator[tuple[int, int]]:
-    """First and last lines of what a fault would not change: imports, documentation, errors, signatures."""
-    for node in ast.walk(tree):
-        if isinstance(node, (ast.Import, ast.ImportFrom, ast.Raise, ast.Expr)) and (
-            not isinstance(node, ast.Expr) or isinstance(node.value, ast.Constant)
-        ):
-            yield node.lineno, node.end_lineno or node.lineno
-        elif isinstance(node, (ast.FunctionDef, ast.ClassDef)):
-            yield node.lineno, node.body[0].lineno - 1
-
-
-def _c_faults(text: str) -> Iterator[tuple[int, int, str]]:
-    code = re.sub(r"/\*.*?\*/|//[^\n]*|^\s*#[^\n]*", lambda m: " " * len(m.group()), text, flags=re.DOTALL | re.MULTILINE)
-    for match in re.finditer(r" ([-+*/]|<=?|>=?|==|!=) |\b(fabs|fmin|fmax|break|\d+\.\d+|\d+)\b", code):
-        word = match.group(1) or match.group(2)
-        start = match.start(1) if match.group(1) else match.start(2)
-        new = _faulty(word)
-        if new is not None:
-            yield start, start + len(word), new
-
-
-def outcome(mutant: Mutant | None, copy: Path, cache: Path, tests: tuple[str, ...]) -> str:
-    """ "caught", "survived" or "hangs": the tests in a child of this process, so that libraries are imported once."""
-    file = copy / mutant.file if mutant else None
-    text = file.read_text(encoding="utf-8") if file else ""
-    if mutant and file:
-        file.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding="utf-8")
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            code = _tests_in(copy, cache, tests)
-        except BaseException:  # whatever it is, it ends here
-            traceback.print_exc()
-        finally:  # never back into the parent's program
-            os._exit(code)
-    _, status = os.waitpid(child, 0)
-    if file:
+def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str]) -> str:
+    """ "caught", "survived", "hangs" or "not reached"; the tests in a child of this process: libraries are imported once."""
+    if not tests:
+        return "not reached"
+    file = copy / mutant.file
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding="utf-8")
+    try:
+        status = _in_child(copy, lambda: _tests_in(copy, cache, tests))
+    finally:
         file.write_text(text, encoding="utf-8")
     if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (24, 9):
         return "hangs"
     return "survived" if status == 0 else "caught"
 
 
-def _tests_in(copy: Path, cache: Path, tests: tuple[str, ...]) -> int:
-    """Exit code of pytest, told to stop at the first failure; what it says is in a file beside the copy."""
-    os.chdir(copy)
-    resource.setrlimit(resource.RLIMIT_CPU, (_SECONDS, _SECONDS + 5))
+def _in_child(copy: Path, work: Callable[[], int]) -> int:
+    """Status of a fork that does some work in the copy; what it says is in a file beside that."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            os.chdir(copy)
+            sys.path = [str(copy), *(entry for entry in sys.path if Path(entry or ".").resolve() != ROOT)]
+            for name in [name for name in sys.modules if name.split(".")[0] == "benchmarks"]:
+                del sys.modules[name]
+            said = os.open(copy.parent / "said.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            os.dup2(said, 1)
+            os.dup2(said, 2)
+            code = work()
+        except BaseException:  # whatever it is, it ends here
+            traceback.print_exc()
+        finally:  # never back into the parent's program
+            os._exit(code)
+    return os.waitpid(child, 0)[1]
+
+
+def _tests_in(copy: Path, cache: Path, tests: list[str]) -> int:
+    """Exit code of pytest, told to stop at the first failure."""
+    seconds = int(3 * _MOST)
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
     os.environ |= {"PYTHONPATH": str(copy), "COLLOC_CODE": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
     sys.dont_write_bytecode = True
-    sys.path = [str(copy), *(entry for entry in sys.path if Path(entry or ".").resolve() != ROOT)]
-    for name in [name for name in sys.modules if name.split(".")[0] == "benchmarks"]:
-        del sys.modules[name]
-    said = os.open(copy.parent / "said.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-    os.dup2(said, 1)
-    os.dup2(said, 2)
     return int(pytest.main(["-x", "-n", "0", "-p", "no:cacheprovider", *tests]))
+
+
+def _reached(copy: Path, cache: Path, folder: str) -> list[Test]:
+    """The tests of a folder and what they call, from a run without any fault."""
+
+    def work() -> int:
+        os.environ |= {"PYTHONPATH": str(copy), "COLLOC_CODE": str(cache)}
+        import benchmarks.reach as reach
+
+        found, code = reach.recorded((folder,))
+        reach.save(found, copy.parent / "reach.json")
+        sys.stdout.flush()
+        return code
+
+    failed = _in_child(copy, work)
+    said = (copy.parent / "said.txt").read_text(encoding="utf-8")
+    print("\n".join(line for line in said.splitlines() if line.startswith("not used")))
+    if failed:
+        raise SystemExit(f"the tests of {folder} fail without any fault:\n{said[-3000:]}")
+    return load(copy.parent / "reach.json")
+
+
+def _processor_seconds() -> float:
+    """Of all children so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--mutants", type=int, default=200, metavar="N")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--first", type=int, default=0, metavar="K", help="go on with this one")
-    parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="begin no other after so long")
+    parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
-    parser.add_argument("--only", default="", metavar="TEXT", help="files whose path holds this")
+    parser.add_argument("--again", action="store_true", help="those that survived meet the tests of all folders")
+    parser.add_argument("--only", default="", metavar="TEXT", help="of the sample those in files whose path holds this")
     options = parser.parse_args()
-    found = [mutant for mutant in mutants() if options.only in mutant.file]
-    chosen = random.Random(options.seed).sample(found, min(options.mutants, len(found)))[options.first :]
-    begin, counts = time.monotonic(), dict.fromkeys(("caught", "hangs", "survived"), 0)
+    found = list(mutants())
+    chosen = random.Random(options.seed).sample(found, min(options.mutants, len(found)))
+    done, again = dict[int, str](), set[int]()
+    if options.record.exists():
+        rows = map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
+        done = {row["index"]: row["outcome"] for row in rows if row["seed"] == options.seed}
+        again = {index for index, what in done.items() if options.again and what in ("survived", "not reached")}
     options.record.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         copy, cache = Path(folder) / "colloc", Path(folder) / "cache"
         copy.mkdir()
         for name in COPIED:
             source = ROOT / name
-            (shutil.copytree if source.is_dir() else shutil.copy)(source, copy / name)
-        cache.mkdir()
-        for package in () if options.first else dict.fromkeys(mutant.package for mutant in chosen):
-            if outcome(None, copy, cache, TESTS[package]) != "survived":
-                said = (copy.parent / "said.txt").read_text(encoding="utf-8")
-                raise SystemExit(f"the tests of {package} fail without any fault:\n{said[-3000:]}")
-        for index, mutant in enumerate(chosen, options.first):
-            if time.monotonic() - begin > options.seconds:
-                print(f"stopped before {index}; go on with --first {index}")
-                break
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            what = outcome(mutant, copy, cache, TESTS[mutant.package])
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            counts[what] += 1
+            (shutil.copytree if source.is_dir() else shutil.copy2)(source, copy / name)
+        cache.mkdir(mode=0o700)
+        known: dict[str, list[Test]] = {}
+        for index, mutant in sorted(enumerate(chosen), key=lambda each: list(TESTS).index(each[1].package)):
+            left_out = (index in done) != (index in again) or options.only not in mutant.file
+            if left_out or _processor_seconds() > options.seconds:
+                continue
+            for tests_folder in dict.fromkeys(folder for folders in TESTS.values() for folder in folders):
+                kept = options.record.with_name(f"reach-{tests_folder.replace('/', '-')}.json")
+                if not kept.exists() and tests_folder in TESTS[mutant.package]:
+                    save(_reached(copy, cache, tests_folder), kept)
+                    print(f"{tests_folder} without a fault: {_processor_seconds():.0f} s", flush=True)
+                if tests_folder not in known and kept.exists():
+                    known[tests_folder] = load(kept)
+            before, tests = _processor_seconds(), tests_of(mutant, known)
+            what, described = outcome(mutant, copy, cache, tests), mutant.described(copy)
+            done[index] = what
             with options.record.open("a", encoding="utf-8") as record:
-                line = {"seed": options.seed, "index": index, "outcome": what, "mutant": mutant.described(copy)}
+                line = {"seed": options.seed, "index": index, "outcome": what, "tests": len(tests), "mutant": described}
                 record.write(json.dumps(line) + "\n")
-            seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-            print(f"{index:4d} {what:9s} {seconds:6.1f} s  {mutant.described(copy)}", flush=True)
-    print(f"{sum(counts.values())} mutants: {counts}")
+            print(f"{index:4d} {what:11s} {_processor_seconds() - before:6.1f} s  {described}", flush=True)
+    print(f"{len(done)} of {len(chosen)} mutants: {dict(Counter(done.values()))}")
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ ORDER = (
         (
             *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "check", "starts")),
             "studies.md",
+            "cluster.md",
             "howto/paper.md",
         ),
     ),
@@ -41,6 +42,7 @@ ORDER = (
         (
             "theory.md",
             "convergence.md",
+            "reliability.md",
             "gait_classes.md",
             "relaxed.md",
             "bound.md",

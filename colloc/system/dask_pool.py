@@ -17,9 +17,9 @@ from colloc.system.errors import ProblemError
 from colloc.system.task_pool import EngineGone
 
 PATIENCE = 60.0
-"""Seconds for which a scheduler may be without workers."""
+"""Seconds for which a scheduler may be without workers, or give no answer."""
 _CONNECT = 20.0
-_LOOK = 1.0
+_LOOK, _ANSWER = 1.0, 10.0
 _HOW = "dask worker ADDRESS --nthreads 1"
 
 
@@ -115,18 +115,33 @@ class DaskExecutor(Executor):
 
     def _watch(self) -> None:
         """Look every second whether somebody works."""
-        seen = time.monotonic()
+        heard = worked = time.monotonic()
         while not self._over.wait(_LOOK):
-            alive, workers = self._scheduler_alive(), 0
-            with suppress(Exception):  # a scheduler that is about to die
-                workers = len(self._client.nthreads()) if alive else 0
-            if workers or not self._waiting:
-                seen = time.monotonic()
-            if alive and time.monotonic() - seen < self._patience:
+            workers, now = self._workers(), time.monotonic()
+            if workers is not None or not self._waiting:
+                heard = now
+            if workers != 0 or not self._waiting:
+                worked = now
+            if not self._scheduler_alive():
+                lost = self._gone()
+            elif now - heard > self._patience:
+                lost = EngineGone(
+                    f"the Dask scheduler at {self._address} gave no answer for {self._patience:.0f} s. What is done is kept; "
+                    "look at the scheduler and the network, and give the same command again."
+                )
+            elif now - worked > self._patience:
+                lost = EngineGone(f"{_without_workers(self._address, self._patience)}. What is done is kept.")
+            else:
                 continue
-            lost = EngineGone(f"{_without_workers(self._address, self._patience)}. What is done is kept.")
             for told in list(self._waiting):
-                self._end(told, lost if alive else self._gone())
+                self._end(told, lost)
+
+    def _workers(self) -> int | None:
+        """How many there are; None if the scheduler does not say so in time."""
+        try:
+            return len(self._client.sync(self._client.scheduler.ncores, callback_timeout=min(_ANSWER, self._patience)))
+        except Exception:  # stopped, cut off, or about to die
+            return None
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         self._over.set()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import os
 import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -134,7 +135,11 @@ def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
     filled = [(key, _sum(key.encode(), text.encode()).decode(), text) for key, text in texts]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with _opened(path, "rwc") as connection:
+        with contextlib.suppress(
+            FileExistsError
+        ):  # with 0o666 less the umask, where SQLite would take 0o644: a group may share it
+            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        with _opened(path, "rw") as connection:
             connection.execute("BEGIN IMMEDIATE")
             if _is_empty(connection, path, kind):
                 connection.execute(_table(kind))

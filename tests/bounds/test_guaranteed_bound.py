@@ -1,16 +1,19 @@
 """The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities are what they claim."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from colloc.bounds import guaranteed as bound_margin
 from colloc.bounds.coulomb_motion import balanced_motion
-from colloc.bounds.guaranteed import _KAPPA, _cell_bounds, _Reference, certify, with_guarantee
+from colloc.bounds.guaranteed import _KAPPA, _cell_bounds, _Reference, _solve_corners, certify, with_guarantee
 from colloc.bounds.loaded_balance import loaded_balance
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
+from colloc.numerics.spline import DEGREE
 from colloc.system.errors import ProblemError
 
 BODY = Chain()
@@ -112,6 +115,91 @@ def test_cell_bounds_hold_for_whatever_the_loaded_solver_returns(bound, some_cel
     monkeypatch.setattr(bound_margin, "loaded_balance", wild)
     value, _ = _cell_bounds(BODY, _Reference(bound, BODY), low, size, 8.0, 1e-7)
     assert np.all(ratio.max(axis=1) <= value)
+
+
+def bound_of_one_cell(reference, low, size, multiplier, delta):
+    """The inequality at the end of docs/bound.md, section 3, corner by corner and load by load; equal links."""
+    length, kappa, allowed = 1 / 3, np.sqrt(2) - 1, 1e-9
+    steps = list(itertools.product((0, 1), repeat=3))
+    corners = np.array([low + size * np.array(step) for step in steps]).T
+    solved = _solve_corners(BODY, reference, corners, multiplier, delta)
+    x, y, w = solved.free.velocity
+    joints = {0: (x, y - length / 2 * w), 1: (x, y + length / 2 * w)}  # behind the middle link, and before it
+
+    def change(vectors, axis):
+        """Largest change along an axis of the cell, from corner to corner."""
+        pairs = [
+            (a, b)
+            for a, s in enumerate(steps)
+            for b, t in enumerate(steps)
+            if (t[axis], s[axis]) == (1, 0) and all(s[k] == t[k] for k in range(3) if k != axis)
+        ]
+        return max(np.hypot(*(v[b] - v[a] for v in vectors)) for a, b in pairs)
+
+    power = solved.free.potential + allowed
+    for axis, speeds in joints.items():
+        power = power + length * (size[axis] ** 2 / 8 * np.hypot(*speeds).max() + size[axis] / 4 * change(speeds, axis))
+    centre = (low + size / 2)[:2, None]
+    off = sum(size[k] ** 2 / 8 * reference.largest(centre, tuple(2 * np.eye(2, dtype=int)[k]))[:, 0] for k in (0, 1))
+    slope_off = sum(
+        size[k] ** 2 / 8 * reference.largest(centre, tuple(2 * np.eye(2, dtype=int)[k] + np.eye(2, dtype=int)[j]))[:, 0]
+        for k in (0, 1)
+        for j in (0, 1)
+    )
+    fastest_turn = (4 * power.max() + 2 * length**2) / (3 * length**2)
+    sides = {}
+    for k, (component, sign) in enumerate([(0, 1), (0, -1), (1, 1), (1, -1)]):
+        state = solved.loaded[k]
+        t = state.residual[0].max() / length + 4 * state.residual[1].max() / length**2 + allowed
+        for link, axis in ((0, 0), (2, 1)):
+            force = state.forces[link, :2]
+            t += (size[axis] ** 2 / 8 * length + size[axis] / 4 * change(force, axis)) / (kappa * 2 * length)
+        moment = state.forces[2, 1] * length / 2 + state.forces[2, 2]
+        a = (
+            multiplier * size[2] / 4 * change((moment, 0 * moment), 2)
+            + slope_off[component]
+            + fastest_turn * off[1 - component]
+        )
+        numerator = multiplier * (state.power + state.leftover_power) - solved.gain[k] - a
+        side = multiplier * (1 + t) - numerator / power
+        sides[component, sign] = np.full(8, np.inf) if numerator.min() < 0 else np.maximum(side, 0)
+    return max(np.hypot(sides[0, i], sides[1, j]).max() for i in (1, -1) for j in (1, -1)) + allowed
+
+
+def test_the_bound_of_a_cell_is_the_inequality_of_the_documentation(bound):
+    """Margins are far above what motions reach, so that sampled motions do not tell when one is too small."""
+    rng, reference, finite = np.random.default_rng(38), _Reference(bound, BODY), 0
+    for n, multiplier in ((64, 8.0), (512, 30.0)):
+        size = np.array([2 * np.pi / n, 2 * np.pi / n, 4 / n])
+        for _ in range(6):
+            low = rng.integers([n // 2, 0, 0], [n, n, n // 2]) * size - np.array([np.pi, np.pi, 1.0])
+            value, _ = _cell_bounds(BODY, reference, low[:, None], size, multiplier, 1e-7)
+            assert value[0] == pytest.approx(bound_of_one_cell(reference, low, size, multiplier, 1e-7), rel=1e-12)
+            finite += np.isfinite(value[0])
+    assert finite > 8
+
+
+@pytest.mark.parametrize("order", [(2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
+def test_derivatives_of_the_reference_point_stay_below_their_bound_which_is_met_where_they_are_constant(bound, order):
+    reference, rng = _Reference(bound, BODY), np.random.default_rng(39)
+    centres = rng.uniform(-3, 3, (2, 30))
+    largest = reference.largest(centres, order)
+    spline = reference.spline
+    cell = spline.cell(centres)
+    knots = [spline.extended[DEGREE + cell[a]] for a in (0, 1)], [spline.extended[DEGREE + 1 + cell[a]] for a in (0, 1)]
+    inside = np.array(knots[0])[:, :, None] + (np.array(knots[1]) - np.array(knots[0]))[:, :, None] * rng.uniform(
+        0.001, 0.999, (2, 30, 200)
+    )
+    found = np.abs((spline.matrix(inside.reshape(2, -1), order) @ reference.c.T).T).reshape(2, 30, 200).max(axis=2)
+    assert np.all(found <= largest * (1 + 1e-9) + 1e-12)
+    assert np.median(largest / found) < 3
+
+
+def test_the_spin_of_a_balanced_motion_is_bounded_by_its_dissipation():
+    """Of the middle link: |omega| <= (4 P + l1^2 + l3^2) / (l1^2 + l2^2 + l3^2) for rates of at most 1."""
+    rng = np.random.default_rng(40)
+    motion = balanced_motion(BODY, Friction(), rng.uniform(-3, 3, (2, 400)), np.stack([np.ones(400), rng.uniform(-1, 1, 400)]))
+    assert np.all(np.abs(motion.spin) <= (4 * motion.power + 2 / 9) / (3 / 9))
 
 
 def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, some_cells, monkeypatch):

@@ -5,6 +5,7 @@ import pytest
 from scipy import sparse
 from scipy.optimize import linprog
 
+from colloc import solve_balance
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
@@ -111,6 +112,12 @@ def test_two_links_with_reversible_friction_cannot_move():
     assert values[2] < 0.01
 
 
+def test_a_bound_says_whether_the_last_climbs_still_found_more():
+    few, enough = (efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, n)) for n in (1, 24))
+    assert (few.converged, enough.converged) == (False, True)
+    assert few.sampled > 1.05 * enough.sampled
+
+
 @pytest.mark.slow
 def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
     bound = efficiency_bound(Chain((0.5, 0.5)), Friction(1.0, 1.0, 3.0), budget=Budget(8, (0, 1), 32, 2, 3, 20))
@@ -176,7 +183,32 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
 
 
+def test_four_links_are_not_too_many(monkeypatch):
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda domain, budget: domain.body.n_link)
+    assert efficiency_bound(Chain((0.25,) * 4), Friction()) == 4
+
+
 @pytest.mark.parametrize(("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((0.2,) * 5), 2.0, "four links")])
 def test_impossible_requests_are_refused(body, limit, match):
     with pytest.raises(ProblemError, match=match):
         efficiency_bound(body, Friction(), limit)
+
+
+@pytest.mark.parametrize("lengths", [(0.4, 0.6), (0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
+def test_a_motion_is_that_of_the_midpoint_of_the_middle_link_in_its_own_axes(lengths):
+    """Of link n // 2, from positions a moment later."""
+    body, rng, h = Chain(lengths), np.random.default_rng(41), 1e-6
+    n = body.n_link
+    angles, rates = rng.uniform(-1, 1, (n - 1, 20)), rng.normal(size=(n - 1, 20))
+    z = solve_balance(body, Friction(), angles, rates, 1e-8).require().z
+    motion = balanced_motion(body, Friction(), angles, rates, 1e-8)
+
+    def midpoint(t):
+        heading = z[2] * t + np.concatenate([[np.zeros(20)], np.cumsum(angles + rates * t, axis=0)])
+        along = np.array(lengths)[:, None] * np.exp(1j * heading)
+        return (z[0] + 1j * z[1]) * t + along[: n // 2].sum(axis=0) + along[n // 2] / 2, heading[n // 2]
+
+    (before, _), (after, _), (_, heading) = midpoint(-h), midpoint(h), midpoint(0.0)
+    velocity = (after - before) / (2 * h) * np.exp(-1j * heading)
+    np.testing.assert_allclose(motion.velocity[0] + 1j * motion.velocity[1], velocity, atol=1e-6)
+    np.testing.assert_allclose(motion.spin, z[2] + rates[: n // 2].sum(axis=0), atol=1e-6)

@@ -209,9 +209,11 @@ def test_files_have_the_permissions_that_the_user_asked_for(mask, three_link, tm
     before = os.umask(mask)
     try:
         path = save(three_link, tmp_path / "x.h5")
+        put_rows(tmp_path / "x.sqlite", CACHE, {"a": 1})
     finally:
         os.umask(before)
-    assert path.stat().st_mode & 0o777 == 0o666 & ~mask
+    for written in (path, tmp_path / "x.sqlite"):
+        assert written.stat().st_mode & 0o777 == 0o666 & ~mask
 
 
 def test_a_result_that_another_program_opened_is_read_and_verify_decides(result, capsys):

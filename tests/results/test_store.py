@@ -1,5 +1,8 @@
 """Results files: round trip, plain h5py, and damage."""
 
+import gzip
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -88,3 +91,17 @@ def test_xarray_opens_every_group_of_a_solution_with_named_dimensions(three_link
                 np.testing.assert_array_equal(data.centre, three_link.sample(data.t.values).centre)
     assert (sizes["joint"], sizes["axis"], sizes["velocity"]) == (2, 2, 3)
     assert sizes["check"] == len(three_link.certificate.checks)
+
+
+def test_a_file_of_an_earlier_colloc_is_read_and_verified(tmp_path, capsys):
+    """Written on 21 November 2026, when this format was new: without other optima, without errors of distance and work."""
+    from colloc.commands.main import main as colloc
+
+    path = tmp_path / "earlier.h5"
+    path.write_bytes(gzip.decompress(Path(__file__).with_name("solution_of_november_2026.h5.gz").read_bytes()))
+    solution = load(path)
+    assert (solution.status, solution.others) == ("solved", ())
+    assert solution.certificate.efficiency == pytest.approx(0.25967706, abs=1e-8)
+    assert np.isnan(solution.certificate.distance_error)
+    assert colloc(["verify", str(path)]) == 0
+    assert "certified" in capsys.readouterr().out

@@ -40,6 +40,15 @@ def test_the_paper_s_wave_is_certified_and_agrees_with_its_own_period(wave):
     assert wave.last.program == "prescribed"
 
 
+@pytest.mark.parametrize("body", BODIES[:3], ids=str)
+def test_the_largest_angle_at_an_instant_is_that_of_the_steepest_point(body):
+    phases = np.linspace(0, 1, 7)
+    angles = np.stack([np.cos(2 * np.pi * phases), np.sin(2 * np.pi * phases)])
+    places = np.linspace(0, 1, 4001)[:, None]
+    steepest = [np.abs(body.tangent(places, angles[:, [k]])).max() for k in range(7)]
+    np.testing.assert_allclose(body.largest_angles(angles), steepest, rtol=1e-3, atol=1e-3)
+
+
 def test_it_is_read_as_it_was_written(wave, tmp_path):
     read = load(save(wave, tmp_path / "wave.h5"))
     assert (read.problem.hash, read.problem.body, read.problem.gait) == (wave.problem.hash, Wave(), wave.problem.gait)

@@ -10,6 +10,8 @@ from shared.store_samples import HDF5_KINDS, Samples
 from colloc.system.errors import StoreError
 from colloc.system.sealed_file import SEAL_SIZE, write_sealed
 from colloc.system.store_file import (
+    LARGEST_ARRAY,
+    LARGEST_FILE,
     LONGEST_IN_ARRAY,
     LONGEST_TEXT,
     array,
@@ -82,6 +84,25 @@ def test_a_long_text_does_not_make_an_array_of_texts_unreadable(tmp_path):
             write(file, "value", longest + "x")
         with pytest.raises(TypeError, match="neither"), new_file(tmp_path / "x.h5") as file:
             write(file, "value", ["text", None])
+
+
+def test_limits_of_size_are_to_the_byte_and_those_of_the_documentation(tmp_path):
+    assert (LARGEST_FILE, LONGEST_TEXT, LONGEST_IN_ARRAY) == (256 * 2**20, 2**20, 2000)  # docs/studies.md
+    assert LARGEST_ARRAY == LARGEST_FILE / 2
+    path = tmp_path / "x.h5"
+    with new_file(path) as file:
+        mark(file, "test", 1)
+        put(file, "numbers", np.arange(5.0))
+        put(file, "texts", ["abc", "de"])
+    size = path.stat().st_size
+    with sealed_file(path, "test", 1, largest=size) as file:
+        assert array(file, "numbers", largest=40).size == 5
+        assert array(file, "texts", largest=2 * 3 * 4).tolist() == ["abc", "de"]  # NumPy takes four bytes a character
+        for name, needed in (("numbers", 40), ("texts", 24)):
+            with pytest.raises(StoreError, match="too large"):
+                array(file, name, largest=needed - 1)
+    with pytest.raises(StoreError, match="too large"), sealed_file(path, "test", 1, largest=size - 1):
+        pass
 
 
 def test_a_number_is_no_text(tmp_path):

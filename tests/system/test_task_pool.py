@@ -1,9 +1,8 @@
 """The pool: nothing is lost with a worker, order may depend on results, one BLAS thread a process."""
 
+import asyncio
 import os
 import signal
-import subprocess
-import sys
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from shared.dask_cluster import DaskProcesses
 
 from colloc.system.dask_pool import connected
 from colloc.system.errors import ProblemError
@@ -38,30 +38,6 @@ def dying_once(x, folder):
 def slowly_doubled(x):
     time.sleep(x)
     return 2 * x
-
-
-def dask_processes(folder):
-    """A scheduler and a worker in processes of their own, and the address in a file."""
-    program = (
-        "import asyncio, sys, distributed\n"
-        "async def main():\n"
-        "    kind, address = sys.argv[1:]\n"
-        "    node = distributed.Scheduler(port=0, dashboard_address=':0') if kind == 'scheduler' else "
-        "distributed.Worker(address, nthreads=1)\n"
-        "    async with node:\n"
-        "        print(node.address, flush=True)\n"
-        "        await node.finished()\n"
-        "asyncio.run(main())\n"
-    )
-
-    def started(kind, address):
-        command = [sys.executable, "-c", program, kind, address]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        return process, process.stdout.readline().strip()
-
-    scheduler, address = started("scheduler", "")
-    (folder / "address").write_text(address)
-    return scheduler, started("worker", address)[0]
 
 
 def threads_in_use(n):
@@ -200,18 +176,24 @@ def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_ta
         list(run)
 
 
-def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task(tmp_path):
+def test_a_dask_scheduler_that_gives_no_answer_ends_the_run_and_blames_no_task(cluster):
+    cluster.scale(1)
+    executor, _ = connected(cluster.scheduler_address, 1, patience=1.0)
+    run = completed(slowly_doubled, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor)
+    assert next(run)[1] == 0.0
+    cluster.scheduler.handlers["ncores"] = lambda **_: asyncio.sleep(60)
+    with pytest.raises(EngineGone, match="gave no answer for 1 s"):
+        list(run)
+
+
+def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task():
     pytest.importorskip("distributed")
-    scheduler, worker = dask_processes(tmp_path)
-    try:
-        executor, _ = connected((tmp_path / "address").read_text(), 1)
+    with DaskProcesses() as dask:
+        dask.worker()
+        executor, _ = connected(dask.address, 1)
         # a function that other processes know as well
         run = completed(time.sleep, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor)
         assert next(run)[1] is None
-        scheduler.kill()
+        dask.scheduler.kill()
         with pytest.raises(EngineGone, match="is gone; what is done is kept"):
             list(run)
-    finally:
-        for process in (scheduler, worker):
-            process.kill()
-            process.communicate()

@@ -1,0 +1,113 @@
+"""Which tests run which functions of colloc, and how long they take: a plugin of pytest, for `benchmarks.mutation`.
+
+    python -m benchmarks.reach results/reach.json tests/mechanics tests/bounds ...
+
+A fixture of a module or session is set up in its first test only; what it calls is ascribed to every test that asks for it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any, NamedTuple
+
+import pytest
+
+_INSIDE = f"{os.sep}colloc{os.sep}"
+
+
+class Test(NamedTuple):
+    """A test: its name for pytest, processor seconds, and ``file::function`` of everything it calls."""
+
+    name: str
+    seconds: float
+    calls: frozenset[str]
+
+
+def _named(frame: FrameType) -> str | None:
+    """``colloc/bounds/guaranteed.py::certify`` of a frame; None outside the library."""
+    head, inside, file = frame.f_code.co_filename.rpartition(_INSIDE)
+    return f"colloc/{file}::{frame.f_code.co_qualname}" if inside and head.endswith(str(Path.cwd())) else None
+
+
+class Recorder:
+    """Writes down what every test calls."""
+
+    def __init__(self) -> None:
+        self.tests: list[Test] = []
+        self.failed: set[str] = set()
+        self._by_fixture: dict[Any, set[str]] = {}
+        self._names: dict[Any, str | None] = {}
+
+    @contextmanager
+    def _calls(self) -> Iterator[set[str]]:
+        """The set of what is called in the block, complete at its end."""
+        codes: set[Any] = set()
+
+        def called(frame: FrameType, event: str, argument: Any) -> None:
+            code = frame.f_code
+            if code not in codes:
+                codes.add(code)
+                if code not in self._names:
+                    self._names[code] = _named(frame)
+
+        found: set[str] = set()
+        before = sys.gettrace()
+        sys.settrace(called)
+        try:
+            yield found
+        finally:
+            sys.settrace(before)
+            found |= {name for code in codes if (name := self._names[code])}
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_fixture_setup(self, fixturedef: Any, request: Any) -> Iterator[None]:
+        with self._calls() as calls:
+            yield
+        self._by_fixture.setdefault(fixturedef, set()).update(calls)
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_runtest_protocol(self, item: Any, nextitem: Any) -> Iterator[None]:
+        begin = time.process_time()
+        with self._calls() as calls:
+            yield
+        for fixtures in item._fixtureinfo.name2fixturedefs.values():
+            calls |= self._by_fixture.get(fixtures[-1], set())
+        self.tests.append(Test(item.nodeid, time.process_time() - begin, frozenset(calls)))
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        if report.failed:
+            self.failed.add(report.nodeid)
+
+
+def recorded(folders: tuple[str, ...]) -> tuple[list[Test], int]:
+    """The default tests of some folders, run once, and pytest's exit code; without those that fail when they are traced."""
+    recorder = Recorder()
+    # Dask ends a process that is traced, and signals that are sent to traced code come too late
+    options = ["-n", "0", "-p", "no:cacheprovider", "-k", "not dask", "--ignore=tests/system/test_interruption.py"]
+    code = pytest.main([*options, *folders], plugins=[recorder])
+    if code == pytest.ExitCode.TESTS_FAILED:
+        print("not used, as they fail when traced:", *sorted(recorder.failed))
+        code = 0
+    return [test for test in recorder.tests if test.name not in recorder.failed], int(code)
+
+
+def save(tests: list[Test], path: Path) -> None:
+    path.write_text(json.dumps([[test.name, test.seconds, sorted(test.calls)] for test in tests]), encoding="utf-8")
+
+
+def load(path: Path) -> list[Test]:
+    rows = json.loads(path.read_text(encoding="utf-8"))
+    return [Test(name, seconds, frozenset(calls)) for name, seconds, calls in rows]
+
+
+if __name__ == "__main__":
+    found, ended = recorded(tuple(sys.argv[2:]))
+    save(found, Path(sys.argv[1]))
+    sys.exit(ended)

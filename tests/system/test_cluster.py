@@ -1,0 +1,179 @@
+"""A study on a Dask cluster of which a process is killed, stopped or cannot write: nothing finished is lost, nothing hangs."""
+
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shared.dask_cluster import DaskProcesses
+
+from colloc.studies.journal import read_journal
+from colloc.studies.store import load_study
+from colloc.system.dask_pool import connected
+from colloc.system.task_pool import EngineGone, Task, completed
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and limits")]
+pytest.importorskip("distributed")
+STUDY = """
+from colloc import *
+from colloc.studies.study import Axis, Study
+def problem(mu_t):
+    return Problem("tiny", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t, 1, 1),
+                   delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=1e-4)
+STUDY = Study("tiny", (Axis("mu_t", tuple(1 + k / 50 for k in range(CELLS)), travels=False),), problem, cold_starts=0)
+"""
+
+
+def naps(dask, times, workers=2):
+    """Tasks that sleep, by number, on a cluster; and a list that grows as they end."""
+    executor, _ = connected(dask.address, workers, patience=20.0)
+    waiting = iter([Task(k, (seconds,)) for k, seconds in enumerate(times)])
+    return completed(time.sleep, lambda: next(waiting, None), workers=workers, executor=executor)
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGSTOP])
+def test_the_task_of_a_worker_that_is_killed_or_does_not_answer_goes_to_another(sent):
+    with DaskProcesses(SCHEDULER__WORKER_TTL="3s") as dask:
+        victim = dask.worker()
+        dask.worker()
+        run = naps(dask, [0.1, 0.1, 2.0, 2.0, 0.1, 0.1])
+        done = [next(run)[0].key]
+        threading.Timer(0.5, lambda: victim.send_signal(sent)).start()
+        begin = time.monotonic()
+        done += [task.key for task, result in run if result is None]
+        assert sorted(done) == [0, 1, 2, 3, 4, 5]
+        assert time.monotonic() - begin < 60
+        if sent == signal.SIGSTOP:  # and back again
+            victim.send_signal(signal.SIGCONT)
+            assert [task.key for task, result in naps(dask, [0.1, 0.1]) if result is None] == [0, 1]
+
+
+def test_a_scheduler_that_is_stopped_ends_the_run():
+    with DaskProcesses() as dask:
+        dask.worker()
+        executor, _ = connected(dask.address, 1, patience=3.0)
+        waiting = iter([Task(0, (0.0,)), Task(1, (1.0,))])
+        run = completed(time.sleep, lambda: next(waiting, None), workers=1, executor=executor)
+        next(run)
+        dask.scheduler.send_signal(signal.SIGSTOP)
+        begin = time.monotonic()
+        with pytest.raises(EngineGone, match="gave no answer for 3 s"):
+            list(run)
+        assert time.monotonic() - begin < 30
+
+
+def study_file(folder, cells):
+    (folder / "s.py").write_text(f"CELLS = {cells}\n{STUDY}")
+    return [sys.executable, "-m", "colloc", "sweep", str(folder / "s.py"), "--output", str(folder / "out")]
+
+
+def test_a_worker_on_a_full_disk_finds_what_others_find(tmp_path):
+    """It cannot keep compiled code either, and does everything in NumPy."""
+    plain = subprocess.run([*study_file(tmp_path, 3), "--json"], capture_output=True, text=True)
+    assert plain.returncode == 0, plain.stderr
+    expected = load_study(tmp_path / "out" / "tiny.nc").variables["efficiency"]
+    with DaskProcesses() as dask:
+        worker = dask.worker(COLLOC_CODE=str(tmp_path / "code"))
+        resource.prlimit(worker.pid, resource.RLIMIT_FSIZE, (0, 0))  # from now on
+        other = [*study_file(tmp_path, 3)[:-1], str(tmp_path / "starved"), "--dask", dask.address, "--json"]
+        done = subprocess.run(other, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert not list((tmp_path / "code").glob("*.so"))
+    found = load_study(tmp_path / "starved" / "tiny.nc").variables["efficiency"]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_a_killed_scheduler_and_a_killed_run_cost_what_was_under_way(tmp_path):
+    command, cells = study_file(tmp_path, 14), 14
+    journal = tmp_path / "out" / "tiny.study"
+
+    def finished():
+        return len(read_journal(journal).records) if journal.exists() else 0
+
+    def until(number):
+        for _ in range(1200):
+            if finished() >= number:
+                return
+            time.sleep(0.05)
+        pytest.fail(f"{finished()} cells in a minute")
+
+    for victim, most in (("scheduler", 3), ("run", 7)):
+        with DaskProcesses() as dask:
+            dask.worker()
+            run = subprocess.Popen(
+                [*command, "--dask", dask.address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
+            until(most)
+            (dask.scheduler if victim == "scheduler" else run).kill()
+            said, errors = run.communicate(timeout=90)
+            assert run.returncode == (2 if victim == "scheduler" else -signal.SIGKILL)
+            if victim == "scheduler":
+                assert errors.count("\n") == 1
+                assert "is gone; what is done is kept" in errors
+            assert finished() >= said.count("round 0:")
+    kept = finished()
+    assert 7 <= kept < cells
+    done = subprocess.run([*command, "--json"], capture_output=True, text=True)
+    assert json.loads(done.stdout)["counts"] == {"solved": cells}
+    keys = [(record.problem_hash, attempt.key) for record in read_journal(journal).records for attempt in record.attempts]
+    assert len(keys) == len(set(keys))  # nothing was solved twice
+
+
+SBATCH = """#!/bin/sh
+cp "$1" "$0.job"  # as SLURM does
+setsid sh "$0.job" > "$0.log" 2>&1 &
+echo $! > "$0.pid"
+echo Submitted batch job 7
+"""
+SCANCEL = """#!/bin/sh
+kill -- -$(cat "$(dirname "$0")/sbatch.pid")
+"""
+
+
+def test_the_recipe_for_slurm_runs_with_a_stand_in_for_its_commands(tmp_path):
+    pytest.importorskip("dask_jobqueue")
+    page = (Path(__file__).resolve().parents[2] / "docs" / "cluster.md").read_text(encoding="utf-8")
+    (recipe,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    for stated, here in (
+        ('"64GB"', '"4GB"'),
+        ("cores=32", "cores=2"),
+        ("processes=32", "processes=2"),
+        ('interface="ib0"', 'interface="lo"'),
+        ("jobs=10", "jobs=1"),
+        ("source ~/colloc/.venv/bin/activate", "true"),
+    ):
+        assert stated in recipe
+        recipe = recipe.replace(stated, here)
+    (tmp_path / "workers.py").write_text(recipe, encoding="utf-8")
+    for name, program in (("sbatch", SBATCH), ("scancel", SCANCEL)):
+        (tmp_path / name).write_text(program)
+        (tmp_path / name).chmod(0o755)
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "DASK_DISTRIBUTED__DASHBOARD__LINK": ""}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": environment}
+    with subprocess.Popen([sys.executable, str(tmp_path / "workers.py")], **pipes) as workers:
+        try:
+            address = workers.stdout.readline().strip()
+            assert address.startswith("tcp://127.0.0.1:")
+            done = subprocess.run([*study_file(tmp_path, 4), "--dask", address, "--json"], capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+            assert json.loads(done.stdout)["counts"] == {"solved": 4}
+            workers.communicate(timeout=60)  # the end of its input
+            assert workers.returncode == 0
+        finally:
+            subprocess.run([str(tmp_path / "scancel")], capture_output=True, check=False)
+            workers.kill()
+    job = int((tmp_path / "sbatch.pid").read_text())
+    for _ in range(100):
+        if not Path(f"/proc/{job}").exists():
+            break
+        time.sleep(0.1)
+    else:
+        pytest.fail("the job goes on")
