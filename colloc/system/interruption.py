@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from types import FrameType
 
+from colloc.system.early_interruption import end_at_once
+
 
 @dataclass
 class _Heard:
@@ -49,7 +51,7 @@ def interruptible(*, polled: bool = True) -> Iterator[None]:
         False, for a whole command: every Ctrl-C raises at once, and the command may end well after it.
     """
     handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
-    if handler not in (signal.default_int_handler, _hear):
+    if handler not in (signal.default_int_handler, end_at_once, _hear):
         yield
         return
     outermost = handler is not _hear
@@ -68,6 +70,6 @@ def interruptible(*, polled: bool = True) -> Iterator[None]:
     finally:
         _heard.polled = outer
         if outermost:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGINT, handler)
     if _heard.asked and polled:
         raise KeyboardInterrupt
