@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import colloc
+from colloc.results.search_step import SearchStep
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")
@@ -57,6 +58,7 @@ def test_the_module_behind_python_m_is_also_the_function():
         (lambda: colloc.FreePath(colour=1), "it takes curvature, symmetry, winding"),
         (lambda: colloc.solve(5), "problem must be a Problem or the path of a problem file, not int"),
         (lambda: colloc.solve(colloc.Problem("x"), starts=0), "starts must be at least 1"),
+        (lambda: colloc.solve(colloc.Problem("x"), seconds=np.nan), "seconds must be positive, not nan"),
     ],
 )
 def test_a_wrong_argument_is_named_with_what_is_right(made, said):
@@ -111,6 +113,23 @@ def test_progress_is_told_and_printed_only_if_asked(capsys):
     assert capsys.readouterr().out == ""
     colloc.solve(problem, starts=1, verbose=True)
     assert capsys.readouterr().out.count("<Level at delta") == len(levels)
+
+
+def test_a_search_over_many_starts_tells_of_every_one_in_units_of_the_friction_stated(capsys):
+    problem = colloc.Problem("quick", friction=colloc.Friction(10, 10, 10), gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    told = []
+    solution = colloc.solve(problem, starts=4, progress=told.append, verbose=True)
+    steps = [news for news in told if isinstance(news, SearchStep)]
+    tried, followed = ([s for s in steps if s.what == what] for what in ("starts", "gaits"))
+    assert [s.done for s in tried] == [1, 2, 3, 4]
+    assert {s.count for s in tried} == {4}
+    assert [s.done for s in followed] == list(range(1, len(followed) + 1))
+    assert len(followed) >= 1
+    assert told[len(steps) :] == list(solution.levels)
+    assert followed[-1].efficiency == pytest.approx(solution.efficiency, rel=1e-2)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[3].startswith("4 of 4 starts; best d/W = 0.02")
+    assert len(printed) == len(told)
 
 
 def test_an_archive_is_gone_on_with_and_its_starts_are_opened(tmp_path, capsys):

@@ -147,7 +147,8 @@ class Solution:
         lines = [f"local optimum, best of {self.starts} starts; {best.starts} led here"]
         for other in others[:_MOST_OTHERS]:
             size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
-            lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
+            where = f"on a coarse mesh at delta {other.delta:.0e}"
+            lines.append(f"also met, {where}: {other.efficiency:.4f} from {other.starts}{size}")
         return lines
 
     @property
@@ -292,6 +293,7 @@ class Solution:
             ("distance d", f"{certificate.distance:.5f}"),
             ("work W", f"{certificate.work:.5f}"),
             ("δ", f"{self.last.delta:.0e}"),
+            ("search", self.standing[0]),
         ]
 
     def _checks(self) -> list[tuple[str, bool, str]]:
