@@ -172,6 +172,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
+    if options.starts is not None and options.starts < 1:
+        raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
+    if not options.seconds > 0:
+        raise ProblemError(f"--seconds must be positive, not {options.seconds:g}.")
     stated = read_problem_file(options.problem)
     problem = changed(stated.problem, options)
     path = output_path(options.output, Path("results") / f"{problem.name}.h5")
@@ -184,10 +188,6 @@ def _solve(options: argparse.Namespace) -> int:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
-    if options.starts is not None and options.starts < 1:
-        raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
-    if not options.seconds > 0:
-        raise ProblemError(f"--seconds must be positive, not {options.seconds:g}.")
     if isinstance(problem.gait, Relaxed):
         from colloc.commands.solve_relaxed import solve_relaxed
 
