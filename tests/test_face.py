@@ -82,6 +82,7 @@ def test_a_gait_stands_where_a_path_is_asked_for(three_link):
 
 def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_path):
     assert len(three_link.plot().axes) == 5
+    assert three_link.plot()._repr_png_().startswith(b"\x89PNG")  # by which a notebook shows it
     assert three_link.report(tmp_path / "x.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
     with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):

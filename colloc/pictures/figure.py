@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import lab_outline
-from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours, styled
+from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, Picture, snapshot_colours, styled
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import SOLVED, Solution
 
@@ -209,7 +209,7 @@ def solution_figure(solution: Solution) -> Figure:
     t = np.linspace(0.0, 1.0, 1201)
     angles = solution.gait.angles(t)
     with styled():
-        figure = Figure(figsize=(11, 8.2))
+        figure = Picture(figsize=(11, 8.2))
         figure.set_layout_engine("none")  # the places are known
         colour = INK if solution.status == SOLVED else VERMILION
         figure.text(0.015, 0.985, _headline(solution), fontsize=11, va="top", color=colour)
