@@ -189,6 +189,32 @@ def test_efficiencies_are_those_of_the_curated_tables(page):
     assert checked >= 8
 
 
+def class_row(name):
+    """A row of the page's table of classes as the curated tables call it; both axes of a polygon where the better is shown."""
+    name = name.replace("at most", "<=")
+    if name.endswith("no symmetry"):
+        return [name]
+    stem = f"{name.removesuffix(', better axis')}, bilateral"
+    return [f"{stem}, axis through a {axis}" for axis in ("corner", "side")] if name.endswith("better axis") else [stem]
+
+
+def test_the_table_of_classes_is_that_of_the_curated_tables():
+    curated = {}
+    for links, name in ((3, "gait_classes.md"), (4, "gait_classes_4.md"), (5, "gait_classes_5.md")):
+        for header, cells in rows_of(ROOT / "results/curated" / name):
+            value = re.match(r"0\.\d+", cells[header.index("efficiency")])  # else none is certified
+            curated.setdefault((links, cells[0]), float(value[0]) if value else None)  # the first table is the isotropic one
+    checked = 0
+    for header, (name, *cells) in rows_of(ROOT / "docs/gait_classes.md"):
+        if header[1:] == ["three links", "four", "five"] and header[0].startswith("class"):
+            for links, cell in zip((3, 4, 5), cells, strict=True):
+                known = [value for row in class_row(name) if (value := curated.get((links, row))) is not None]
+                assert bool(cell) == bool(known), (name, links)
+                assert not known or abs(float(cell) - max(known)) < 5.6e-4, (name, links)  # both are rounded
+                checked += 1
+    assert checked == 48
+
+
 @pytest.mark.slow
 def test_the_example_of_the_readme_prints_what_the_readme_says(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
