@@ -145,10 +145,8 @@ class Solution:
             return ["local optimum, from one start"]
         best, *others = self.others
         lines = [f"local optimum, best of {self.starts} starts; {best.starts} led here"]
-        for other in others[:_MOST_OTHERS]:
-            size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
-            where = f"on a coarse mesh at delta {other.delta:.0e}"
-            lines.append(f"also met, {where}: {other.efficiency:.4f} from {other.starts}{size}")
+        if others:
+            lines.append("also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS])))
         return lines
 
     @property
