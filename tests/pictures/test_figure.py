@@ -17,6 +17,7 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure
 from colloc.pictures.publication import panels
 from colloc.pictures.style import save
+from scripts.gallery import picture
 
 
 def crawler(n_link, size=0.6):
@@ -88,3 +89,8 @@ def test_drawing_loads_neither_pyplot_nor_what_writes_pdf():
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert "matplotlib.figure" in loaded
     assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "scipy.stats", "jinja2"} & set(loaded)
+
+
+@pytest.mark.parametrize(("n_link", "size"), [(2, 1.5), (3, 0.3), (5, 0.6)])
+def test_pictures_of_the_gallery_can_be_read(n_link, size, unsolved):
+    assert_readable(picture(unsolved(crawler(n_link, size))))
