@@ -32,4 +32,4 @@ class Alternative:
 
     def __str__(self) -> str:
         size = ", as small as its bound allows" if self.on_speed_floor else ""
-        return f"{self.efficiency:.4f} at delta {self.delta:.0e} from {self.starts}{size}"
+        return f"{self.efficiency:.4f} at delta {self.delta:.0e} ({self.starts} start{'s' * (self.starts > 1)}{size})"
