@@ -29,10 +29,8 @@ from colloc.search.optimise import best_gait
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
 SHEET = ROOT / "results/curated/gallery.png"
-_SIZE, _LOW, _RESOLUTION, _COLOURS = (9.0, 3.7), 2.0, 110, 256
+_SIZE, _RESOLUTION, _COLOURS = (9.0, 3.7), 110, 256
 _COLUMNS, _THUMBNAIL = 2, 620
-_FLAT, _TALLEST = 0.25, 20.0
-"""A body that is flatter than this part of its width is drawn higher, at most so many times."""
 
 
 @dataclass(frozen=True)

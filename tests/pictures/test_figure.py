@@ -94,3 +94,15 @@ def test_drawing_loads_neither_pyplot_nor_what_writes_pdf():
 @pytest.mark.parametrize(("n_link", "size"), [(2, 1.5), (3, 0.3), (5, 0.6)])
 def test_pictures_of_the_gallery_can_be_read(n_link, size, unsolved):
     assert_readable(picture(unsolved(crawler(n_link, size))))
+
+
+@pytest.mark.parametrize(("size", "times"), [(0.02, 21), (0.6, 1)])
+def test_a_flat_motion_is_drawn_higher_and_says_so(size, times, unsolved):
+    body, gait = Chain((0.25,) * 4), Fourier(np.zeros(3), size * np.ones((3, 1)), size * np.array([[1.0], [0.0], [-1.0]]))
+    axes = Figure().add_subplot()
+    problem = Problem("flat", gait, body, gait=Harmonic(1), delta=1e-2, intervals=8, smallest_shape_speed=1e-3)
+    draw_filmstrip(axes, unsolved(problem))
+    said = [text.get_text() for text in axes.texts if "heights" in text.get_text()]
+    drawn = np.ptp(np.concatenate([line.get_ydata() for line in axes.lines if line.get_linestyle() == "-"]))
+    assert drawn > 0.2
+    assert said == ([] if times == 1 else [f"heights drawn {times} times as large"])
