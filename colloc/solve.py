@@ -5,26 +5,19 @@ called, and is that function.
 """
 
 import sys
-from collections.abc import Sequence
 from types import ModuleType
-from typing import Any
 
-from colloc.commands.main import main as colloc
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``colloc solve``; returns the exit code."""
-    return colloc(["solve", *(sys.argv[1:] if arguments is None else arguments)])
+from colloc.__main__ import start
 
 
 class _Callable(ModuleType):
-    def __call__(self, *given: Any, **named: Any) -> Any:
+    def __call__(self, *given: object, **named: object) -> object:
         from colloc.studies.calls import solve
 
-        return solve(*given, **named)
+        return solve(*given, **named)  # type: ignore[arg-type]
 
 
 sys.modules[__name__].__class__ = _Callable
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(["solve", *sys.argv[1:]])

@@ -16,9 +16,10 @@ from colloc import Chain, Friction
 from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.sampled import QUICK, known_bound
 from colloc.gaits.gait_fields import gait_from
+from colloc.pictures.style import save
 from scripts.bound_table import BUDGET
 from scripts.class_rows import equal_links, known_small_gait
-from scripts.figures_classes import GaitPanel, save_body_strips, save_gait_panels
+from scripts.figures_classes import GaitPanel, gait_figure
 from scripts.link_gaps import LYING, gaps
 
 CURATED = Path("results/curated")
@@ -162,22 +163,18 @@ def write(links: int, known: dict) -> None:
 
 
 def draw(links: int, known: dict) -> None:
-    """The figure: paths and bodies of some rows, or bodies alone where paths lie in no plane."""
-    panels = []
+    """The figure: bodies and joint angles of some rows."""
+    body, panels = equal_links(links), []
     for row in SHOWN if links == 3 else SHOWN_CHAINS:
         found = best(known.get("1,1,1", {}).get(row, {}))
         if found is not None:
             gait = gait_from(found["gait"])
-            _, lying = gaps(equal_links(links), gait)
-            title = (
-                f"{class_words(row).replace(', bilateral', '')}\nd/W = {found['efficiency']:.4f}, d = {found['distance']:.3f}"
-            )
-            title += f", lying {lying:.0%}" if lying > 0 else ""
-            panels.append(GaitPanel(title if links == 3 else title.replace("\n", ": "), gait))
-    if panels and links == 3:
-        save_gait_panels(panels, CURATED / "gait_classes.png")
-    elif panels:
-        save_body_strips(panels, equal_links(links), CURATED / f"gait_classes{suffix(links)}.png")
+            _, lying = gaps(body, gait)
+            name = class_words(row).replace(", bilateral", "").replace("<=", "≤")
+            title = f"{name}: d/W = {found['efficiency']:.4f}, d = {found['distance']:.3f}"
+            panels.append(GaitPanel(f"{title}, lying {lying:.0%}" if lying > 0 else title, gait))
+    if panels:
+        save(gait_figure(panels, body), CURATED / f"gait_classes{suffix(links)}")
 
 
 def main() -> None:

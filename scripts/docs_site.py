@@ -1,7 +1,8 @@
 """Hooks of the documentation (mkdocs.yml): the order of pages, generated pages, formulas, links out of docs/.
 
 - Pages that `ORDER` does not name are appended under "Measurements and notes", so a new file in docs/ needs no other change.
-- Generated: the gallery (problems/ with results/curated/gallery.json), the commands (their own --help), the API.
+- Generated: the notebook with what it showed, the gallery (problems/ with results/curated/gallery.json), the commands (what
+  --help says), the API.
 - Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
 - Links to files of the repository outside docs/ become their names; pictures and tables of results/curated are copied.
 
@@ -27,7 +28,7 @@ from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (
-    ("Start", ("index.md", "tutorial.md", "gallery.md", "known.md", "limits.md", "troubleshooting.md")),
+    ("Start", ("index.md", "tutorial.md", "notebook.md", "gallery.md", "known.md", "limits.md", "troubleshooting.md")),
     (
         "How to",
         (
@@ -193,7 +194,32 @@ def modules_page() -> str:
     return "# Modules\n\n" + text + "\n\n" + "\n".join(rows) + "\n"
 
 
+def notebook_page() -> str:
+    """docs/notebook.ipynb as it was run last (`scripts.notebook`): texts, code, and what it printed and showed."""
+    parts = []
+    for cell in json.loads((ROOT / "docs/notebook.ipynb").read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        parts += [shown(output) for output in cell.get("outputs", ())]
+        if len(parts) == 1:
+            parts.append("[This page as a notebook](notebook.ipynb)")
+    return "\n\n".join(parts) + "\n"
+
+
+def shown(output: dict[str, Any]) -> str:
+    """What a cell of a notebook shows, in the richest form there is."""
+    forms = {kind: "".join(content) for kind, content in output.get("data", {}).items()}
+    for kind in ("image/gif", "image/png"):
+        if kind in forms:
+            return f'<img alt="what the cell shows" src="data:{kind};base64,{forms[kind].strip()}">'
+    if "text/html" in forms:
+        return forms["text/html"]
+    text = "".join(output.get("text", "")) or forms.get("text/plain", "")
+    return f"```text\n{text.rstrip()}\n```"
+
+
 GENERATED = {
+    "notebook.md": notebook_page,
     "gallery.md": gallery_page,
     "commands.md": commands_page,
     "api.md": api_page,

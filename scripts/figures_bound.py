@@ -15,7 +15,6 @@ def save_small_gait_map(path: Path, axis: np.ndarray, efficiency: np.ndarray, ti
         figure, axes = subplots(figsize=(5.6, 4.6))
         image = axes.pcolormesh(axis, axis, efficiency.T, cmap="viridis", shading="nearest", rasterized=True)
         lines = axes.contour(axis, axis, efficiency.T, levels=np.arange(0.05, 1.0, 0.05), colors="white", linewidths=0.6)
-        axes.clabel(lines, fontsize=7, fmt="%.2f")
-        figure.colorbar(image, label="efficiency d/W of the best small gait")
+        figure.colorbar(image, label="efficiency d/W of the best small gait").add_lines(lines)
         axes.set(xlabel="joint angle 1 [rad]", ylabel="joint angle 2 [rad]", title=title, aspect="equal")
     save(figure, path.with_suffix(""))

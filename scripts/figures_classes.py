@@ -1,18 +1,18 @@
-"""Gaits of several classes side by side: each path in the plane of the joint angles, and the body along it."""
+"""Gaits of several classes, one below the other: the body over a period, and its joint angles."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
 from colloc.gaits.path_samples import Gait
+from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
-from colloc.pictures.figure import draw_allowed
-from colloc.pictures.style import GREY, VERMILION, save, styled
+from colloc.pictures.figure import draw_angles, draw_body, draw_shape_path
+from colloc.pictures.motion_frames import turned
+from colloc.pictures.style import INK, snapshot_colours, styled
 
 
 class GaitPanel(NamedTuple):
@@ -22,89 +22,69 @@ class GaitPanel(NamedTuple):
     gait: Gait
 
 
-_SNAPSHOTS = 6
+_SNAPSHOTS = 7
+_SMALL, _SEEN = 0.3, 0.6
+"""Bends [rad] that are too small to be seen, and how large the largest of them is drawn."""
+_NEAR = 1.0
+"""Gaits that keep so near [rad] to a straight or folded shape are shown by their angles from it."""
+_PALE, _GAP, _BAR = "#d9dde0", 0.12, 0.1
 
 
-def _draw_path(axes: Any, gait: Gait, limits: tuple[np.ndarray, float]) -> None:
-    angles = gait.angles(np.linspace(0.0, 1.0, 2001))
-    axes.plot(*angles, color=GREY, lw=1.5, zorder=1)
-    t = np.arange(_SNAPSHOTS) / _SNAPSHOTS
-    axes.scatter(*gait.angles(t), c=t, cmap="viridis", s=18, zorder=2)
-    centre, half = limits
-    axes.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] - half, centre[1] + half), aspect="equal")
+def nearest_rest(angles: np.ndarray) -> np.ndarray:
+    """The straight or folded shape nearest to the mean of some shapes, ``(n_joint, 1)``."""
+    mean = angles.mean(axis=1, keepdims=True)
+    return np.where(np.abs(mean) > 0.5 * np.pi, np.sign(mean) * np.pi, 0.0)
 
 
-def _draw_bodies(axes: Any, body: Chain, gait: Gait, bar: bool = False) -> None:
-    """Bodies side by side, each over the first one in grey, so that small motions show; with a bar of 0.1 body lengths."""
-    t = np.arange(_SNAPSHOTS) / _SNAPSHOTS
-    x, y = body.joints(gait.angles(t))
-    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-    apart = 1.15 * float(np.ptp(x, axis=0).max()) + 0.05
-    if bar:
-        low = y.min() - 0.12 * apart
-        axes.plot(x.min() + np.array([0.0, 0.1]), [low, low], color="black", lw=1.0, clip_on=False)
-    for k, colour in enumerate(matplotlib.colormaps["viridis"](0.9 * t)):
-        axes.plot(x[:, 0] + apart * k, y[:, 0], color="#d5dade", lw=1.6, solid_capstyle="round", clip_on=False)
-        axes.plot(x[:, k] + apart * k, y[:, k], color=colour, lw=2.0, solid_capstyle="round", clip_on=False)
-        axes.plot(x[-1:, k] + apart * k, y[-1:, k], "o", color=colour, ms=3.5, clip_on=False)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
+def magnified(angles: np.ndarray) -> tuple[np.ndarray, int]:
+    """Joint angles that can be seen, and by what their distance from the nearest straight or folded shape was multiplied.
 
-
-def gait_panels(panels: list[GaitPanel], body: Chain | None = None) -> Figure:
-    """A figure of paths over the admissible shapes; where a path is small, an inset of it; bodies below."""
-    body = body or Chain()
-    columns = min(4, len(panels))
-    rows = -(-len(panels) // columns)
-    with styled():
-        figure = Figure(figsize=(3.1 * columns, 4.2 * rows))
-        grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3.0, 0.9] * rows)
-        for k, panel in enumerate(panels):
-            row, column = divmod(k, columns)
-            axes = figure.add_subplot(grid[2 * row, column])
-            draw_allowed(axes, body, np.pi)
-            _draw_path(axes, panel.gait, (np.zeros(2), 1.02 * np.pi))
-            axes.set_title(panel.title, fontsize=8)
-            axes.set_xticks(np.pi * np.array([-1, 0, 1]), ["-π", "0", "π"])
-            axes.set_yticks(np.pi * np.array([-1, 0, 1]), ["-π", "0", "π"])
-            if row == rows - 1 or k + columns >= len(panels):
-                axes.set_xlabel("joint angle 1")
-            if column == 0:
-                axes.set_ylabel("joint angle 2")
-            angles = panel.gait.angles(np.linspace(0.0, 1.0, 401))
-            low, high = angles.min(axis=1), angles.max(axis=1)
-            if (high - low).max() < 1.5:
-                inset = axes.inset_axes((0.16, 0.5, 0.44, 0.44))
-                _draw_path(inset, panel.gait, (0.5 * (low + high), 0.6 * float((high - low).max())))
-                inset.tick_params(labelsize=5)
-                for spine in inset.spines.values():
-                    spine.set_visible(True)
-                    spine.set_color(VERMILION)
-            _draw_bodies(figure.add_subplot(grid[2 * row + 1, column]), body, panel.gait)
-    return figure
-
-
-def body_strips(panels: list[GaitPanel], body: Chain) -> Figure:
-    """A figure of bodies of any number of links along their gaits, equal steps in phase, two gaits a row.
-
-    Every gait has its own scale, which a bar of 0.1 body lengths shows.
+    Parameters
+    ----------
+    angles : (n_joint, n_time)
     """
-    columns = min(2, len(panels))
-    rows = -(-len(panels) // columns)
+    rest = nearest_rest(angles)
+    largest = float(np.abs(angles - rest).max())
+    factor = 1 if largest > _SMALL else round(_SEEN / largest)
+    return rest + factor * (angles - rest), factor
+
+
+def draw_bodies(axes: Any, body: Chain, gait: Gait) -> int:
+    """Bodies at equal steps of a period, each over the first one, their mean direction kept; what bends are multiplied by."""
+    angles, factor = magnified(gait.angles(np.linspace(0.0, 1.0, _SNAPSHOTS)))
+    tangents = np.concatenate([np.zeros((1, angles.shape[1])), np.cumsum(angles, axis=0)])
+    x, y = turned(np.stack(body.outline(angles)), -np.average(tangents, axis=0, weights=body.lengths))
+    x, y = x - 0.5 * (x.min(axis=0) + x.max(axis=0)), y - y.mean(axis=0)
+    apart = float(np.ptp(x, axis=0).max()) + _GAP
+    for k, colour in enumerate(snapshot_colours(_SNAPSHOTS)):
+        axes.plot(x[:, 0] + apart * k, y[:, 0], color=_PALE, lw=2.0, solid_capstyle="round")
+        draw_body(axes, np.stack([x[:, k] + apart * k, y[:, k]]), colour, body.hinges)
+    low, left = float(y.min()) - _GAP, float(x[:, 0].min())
+    axes.plot([left, left + _BAR], [low, low], color=INK, lw=1.2)
+    axes.set(aspect="equal", xlim=(-0.55 * apart, (_SNAPSHOTS - 0.45) * apart), ylim=(low - 0.04, float(y.max()) + 0.06))
+    axes.set_anchor("W")
+    axes.set_axis_off()
+    return factor
+
+
+def gait_figure(panels: list[GaitPanel], body: Chain) -> Figure:
+    """A row a gait: bodies light to dark, with a bar of 0.1 body lengths, and beside them the path or all joint angles."""
+    planar = body.n_joint == 2
     with styled():
-        figure = Figure(figsize=(5.6 * columns, 1.5 * rows))
-        for k, panel in enumerate(panels):
-            axes = figure.add_subplot(rows, columns, k + 1)
-            _draw_bodies(axes, body, panel.gait, bar=True)
-            axes.set_title(panel.title, fontsize=8)
+        figure = Figure(figsize=(11.0, (2.1 if planar else 1.75) * len(panels)))
+        grid = figure.add_gridspec(len(panels), 2, width_ratios=(3.4 if planar else 2.6, 1))
+        for row, panel in enumerate(panels):
+            bodies, beside = figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 1])
+            factor = draw_bodies(bodies, body, panel.gait)
+            bodies.set_title(panel.title + (f"; bends drawn {factor} times as large" if factor > 1 else ""))
+            t = np.linspace(0.0, 1.0, 1201)
+            angles = panel.gait.angles(t)
+            if planar:
+                draw_shape_path(beside, Problem("shown", body=body, joint_limit=np.pi), angles)
+                continue
+            rest = nearest_rest(angles)
+            near = rest.any() and np.abs(angles - rest).max() < _NEAR
+            draw_angles(beside, t, angles - rest if near else angles, body)
+            if near:
+                beside.set_ylabel("joint angle ∓ π  [rad]")
     return figure
-
-
-def save_body_strips(panels: list[GaitPanel], body: Chain, path: Path) -> None:
-    """Save `body_strips` as PNG and PDF."""
-    save(body_strips(panels, body), path.with_suffix(""))
-
-
-def save_gait_panels(panels: list[GaitPanel], path: Path) -> None:
-    """Save `gait_panels` as PNG and PDF."""
-    save(gait_panels(panels), path.with_suffix(""))

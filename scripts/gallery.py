@@ -29,10 +29,8 @@ from colloc.search.optimise import best_gait
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
 SHEET = ROOT / "results/curated/gallery.png"
-_SIZE, _LOW, _RESOLUTION, _COLOURS = (9.0, 3.7), 2.0, 110, 256
+_SIZE, _RESOLUTION, _COLOURS = (9.0, 3.7), 110, 256
 _COLUMNS, _THUMBNAIL = 2, 620
-_FLAT, _TALLEST = 0.25, 20.0
-"""A body that is flatter than this part of its width is drawn higher, at most so many times."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +70,8 @@ def solved_row(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _picture(example: Example, solution: Solution) -> None:
-    PICTURES.mkdir(parents=True, exist_ok=True)
+def picture(solution: Solution) -> Figure:
+    """A solution for the gallery: a period frame by frame, the paths in the lab, and the path or all angles beside them."""
     with styled():
         figure = Figure(figsize=_SIZE)
         grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
@@ -84,8 +82,14 @@ def _picture(example: Example, solution: Solution) -> None:
             draw_shape_path(beside, solution.problem, solution.gait.angles(t))
         else:
             draw_angles(beside, t, solution.gait.angles(t), solution.problem.body)
-        path = PICTURES / f"{example.name}.png"
-        figure.savefig(path, dpi=_RESOLUTION)
+    return figure
+
+
+def _save(example: Example, solution: Solution) -> None:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    path = PICTURES / f"{example.name}.png"
+    with styled():
+        picture(solution).savefig(path, dpi=_RESOLUTION)
     _quantised(Image.open(path)).save(path, optimize=True)
 
 
@@ -125,7 +129,7 @@ def main() -> None:
         row = solved_row(solution)
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row
-        _picture(example, solution)
+        _save(example, solution)
         print(f"{example.name:28} {row['status']:20} {row.get('efficiency', float('nan')):10.6f} {row['cpu_seconds']:7.1f} s")
     table["versions"] = versions()
     _sheet()

@@ -78,7 +78,8 @@ def photograph(browser: str, screen: Screen, target: Path, folder: Path) -> None
     image = image.crop((0, 0, image.width, min(int(used), len(pixels))))
     image = image.resize((screen.width, round(image.height * screen.width / image.width)), Image.Resampling.LANCZOS)
     target.parent.mkdir(exist_ok=True)
-    image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)
+    # kmeans: without it the palest grey becomes blue
+    image.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(target, optimize=True)
     print(f"saved {target.relative_to(ROOT)} ({target.stat().st_size / 1000:.0f} kB)")
 
 

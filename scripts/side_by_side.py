@@ -2,7 +2,7 @@
 
 Every body spends work at the same constant rate, so after the same time the better gait has come farther: how much farther is
 the ratio of the efficiencies. Writes results/curated/side_by_side.gif; by default three links with one harmonic (the paper's
-best gait), with two, and on a free path.
+best gait), with two, on a free path, and the best relaxed gait.
 """
 
 from __future__ import annotations
@@ -17,16 +17,22 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
+from colloc.commands.solve_relaxed import STARTS
+from colloc.gaits.problem_file import read_problem_file
+from colloc.gaits.relaxed import Relaxed
 from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
+from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
+from colloc.search.relaxed_search import best_relaxed_gait
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = {
     "three_link": "one harmonic (the paper's best)",
     "three_link_two_harmonics": "two harmonics",
     "three_link_free_path": "any path that bends no more than 8 per rad",
+    "three_link_relaxed": "directions mixed, joints within 2.5 rad",
 }
 WORK, PICTURES, FPS, REST = 5.0, 160, 12.5, 12
 """Work spent in all [weight x body length], pictures of it, pictures a second, and pictures that the end stays."""
@@ -45,7 +51,15 @@ class Crawl:
     centre: np.ndarray
 
 
-def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
+def solved(path: Path) -> Solution | RelaxedSolution:
+    """The best gait of a problem file."""
+    stated = read_problem_file(path)
+    if isinstance(stated.problem.gait, Relaxed):
+        return best_relaxed_gait(stated.problem, stated.starts or STARTS)
+    return colloc.solve(path)
+
+
+def phases(solution: Solution | RelaxedSolution, work: np.ndarray) -> np.ndarray:
     """The phase at which a gait has spent so much work: the inverse of the integral of its power."""
     t = np.linspace(0.0, 1.0, _GRAIN)
     power = solution.power(solution.sample(t))
@@ -54,7 +68,7 @@ def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
     return periods + np.interp(rest, spent, t)
 
 
-def crawl(solution: Solution) -> Crawl:
+def crawl(solution: Solution | RelaxedSolution) -> Crawl:
     """What a gait does with the work."""
     problem = solution.problem
     motion = solution.sample(phases(solution, np.linspace(0.0, WORK, PICTURES)))
@@ -104,10 +118,10 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("files", nargs="*", metavar="FILE.py", help="problem files, the best gait last")
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE.py", help="problem files, the best gait last")
     parser.add_argument("--output", type=Path, default=ROOT / "results/curated/side_by_side.gif")
     options = parser.parse_args()
-    solutions = [colloc.solve(file) for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]]
+    solutions = [solved(file) for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]]
     for solution in solutions:
         print(solution)
     write_gif(options.output, pictures([crawl(solution) for solution in solutions]), FPS)

@@ -127,12 +127,20 @@ def anchors(path):
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_links_lead_somewhere(page):
+    generated = {"notebook.md", "gallery.md", "commands.md", "api.md", "modules.md", "changelog.md"}  # see scripts/docs_site.py
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if "://" in target:
             continue
         name, _, anchor = target.partition("#")
-        generated = {"gallery.md", "commands.md", "api.md", "modules.md", "changelog.md"}  # see scripts/docs_site.py
+        generated = {
+            "notebook.md",
+            "gallery.md",
+            "commands.md",
+            "api.md",
+            "modules.md",
+            "changelog.md",
+        }  # see scripts/docs_site.py
         path = (page.parent / name).resolve() if name else page
         if path.parent == ROOT / "docs" and path.name in generated:
             continue
@@ -165,20 +173,50 @@ def efficiencies(name):
     return [value for cell in cells for value in numbers(cell)]
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/known.md"])
+@pytest.mark.parametrize("page", ["README.md", *(f"docs/{name}.md" for name in ("known", "gait_classes", "bound"))])
 def test_efficiencies_are_those_of_the_curated_tables(page):
     """Of the table that a row links to, if it does; else of gallery, gaits without contact or bounds."""
     general = [row["efficiency"] for row in GALLERY.values() if "efficiency" in row]
     general += efficiencies("without_contact.md") + efficiencies("bound_table.md")
+    general += [value for links in ("", "_4", "_5") for value in efficiencies(f"gait_classes{links}.md")]
     checked = 0
-    for _, cells in rows_of(ROOT / page):
+    for header, cells in rows_of(ROOT / page):
+        if header[0] == "potential":  # how a bound was computed, once
+            continue
         linked = [name for name in re.findall(r"results/curated/(\w+\.md)\)", " ".join(cells)) if efficiencies(name)]
         known = np.array([value for name in linked for value in efficiencies(name)] or general)
-        for value in [v for cell in cells if re.fullmatch(r"[\d./ ]+", cell) for v in re.findall(r"0\.\d{3,}", cell)]:
+        plain = [cell for name, cell in zip(header, cells, strict=True) if re.fullmatch(r"[\d./ ]+", cell) and name != "gap"]
+        for value in re.findall(r"0\.\d{3,}", " ".join(plain)):
             rounding = 0.51 * 10.0 ** -len(value.partition(".")[2])
             assert np.abs(known - float(value)).min() <= rounding, (cells, value)
             checked += 1
     assert checked >= 8
+
+
+def class_row(name):
+    """A row of the page's table of classes as the curated tables call it; both axes of a polygon where the better is shown."""
+    name = name.replace("at most", "<=")
+    if name.endswith("no symmetry"):
+        return [name]
+    stem = f"{name.removesuffix(', better axis')}, bilateral"
+    return [f"{stem}, axis through a {axis}" for axis in ("corner", "side")] if name.endswith("better axis") else [stem]
+
+
+def test_the_table_of_classes_is_that_of_the_curated_tables():
+    curated = {}
+    for links, name in ((3, "gait_classes.md"), (4, "gait_classes_4.md"), (5, "gait_classes_5.md")):
+        for header, cells in rows_of(ROOT / "results/curated" / name):
+            value = re.match(r"0\.\d+", cells[header.index("efficiency")])  # else none is certified
+            curated.setdefault((links, cells[0]), float(value[0]) if value else None)  # the first table is the isotropic one
+    checked = 0
+    for header, (name, *cells) in rows_of(ROOT / "docs/gait_classes.md"):
+        if header[1:] == ["three links", "four", "five"] and header[0].startswith("class"):
+            for links, cell in zip((3, 4, 5), cells, strict=True):
+                known = [value for row in class_row(name) if (value := curated.get((links, row))) is not None]
+                assert bool(cell) == bool(known), (name, links)
+                assert not known or abs(float(cell) - max(known)) < 5.6e-4, (name, links)  # both are rounded
+                checked += 1
+    assert checked == 48
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import colloc
+from colloc.results.search_step import SearchStep
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")
@@ -26,16 +27,28 @@ def test_every_public_name_has_one_home():
     assert all(getattr(colloc, name) is not None for name in named)
 
 
-@pytest.mark.parametrize("name", [n for n in colloc.__all__ if not n.endswith("Error")])
+@pytest.mark.parametrize("name", colloc.__all__)
 def test_every_public_docstring_has_an_example(name):
     assert ">>> " in (getattr(colloc, name).__doc__ or "")
 
 
-@pytest.mark.parametrize("module", [*colloc._HOME, "gaits.gait_function", "system.argument_names"])
+WITH_EXAMPLES = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for path in sorted((ROOT / "colloc").glob("*/*.py"))
+    if ">>> " in path.read_text(encoding="utf-8")
+]
+
+
+@pytest.mark.parametrize("module", WITH_EXAMPLES)
 def test_the_examples_of_the_docstrings_run(module, monkeypatch):
     monkeypatch.chdir(ROOT)
-    found = importlib.import_module(f"colloc.{module}")
-    assert doctest.testmod(found).failed == 0
+    ended = doctest.testmod(importlib.import_module(module))
+    assert ended.attempted > 0
+    assert ended.failed == 0
+
+
+def test_the_examples_of_all_public_names_are_among_those_that_run():
+    assert {f"colloc.{module}" for module in colloc._HOME} <= set(WITH_EXAMPLES)
 
 
 def test_the_module_behind_python_m_is_also_the_function():
@@ -57,6 +70,7 @@ def test_the_module_behind_python_m_is_also_the_function():
         (lambda: colloc.FreePath(colour=1), "it takes curvature, symmetry, winding"),
         (lambda: colloc.solve(5), "problem must be a Problem or the path of a problem file, not int"),
         (lambda: colloc.solve(colloc.Problem("x"), starts=0), "starts must be at least 1"),
+        (lambda: colloc.solve(colloc.Problem("x"), seconds=np.nan), "seconds must be positive, not nan"),
     ],
 )
 def test_a_wrong_argument_is_named_with_what_is_right(made, said):
@@ -80,6 +94,7 @@ def test_a_gait_stands_where_a_path_is_asked_for(three_link):
 
 def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_path):
     assert len(three_link.plot().axes) == 5
+    assert three_link.plot()._repr_png_().startswith(b"\x89PNG")  # by which a notebook shows it
     assert three_link.report(tmp_path / "x.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
     with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):
@@ -111,6 +126,23 @@ def test_progress_is_told_and_printed_only_if_asked(capsys):
     assert capsys.readouterr().out == ""
     colloc.solve(problem, starts=1, verbose=True)
     assert capsys.readouterr().out.count("<Level at delta") == len(levels)
+
+
+def test_a_search_over_many_starts_tells_of_every_one_in_units_of_the_friction_stated(capsys):
+    problem = colloc.Problem("quick", friction=colloc.Friction(10, 10, 10), gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    told = []
+    solution = colloc.solve(problem, starts=4, progress=told.append, verbose=True)
+    steps = [news for news in told if isinstance(news, SearchStep)]
+    tried, followed = ([s for s in steps if s.what == what] for what in ("starts", "gaits"))
+    assert [s.done for s in tried] == [1, 2, 3, 4]
+    assert {s.count for s in tried} == {4}
+    assert [s.done for s in followed] == list(range(1, len(followed) + 1))
+    assert len(followed) >= 1
+    assert told[len(steps) :] == list(solution.levels)
+    assert followed[-1].efficiency == pytest.approx(solution.efficiency, rel=1e-2)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[3].startswith("4 of 4 starts; best d/W = 0.02")
+    assert len(printed) == len(told)
 
 
 def test_an_archive_is_gone_on_with_and_its_starts_are_opened(tmp_path, capsys):

@@ -17,10 +17,11 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from colloc.system.early_interruption import INTERRUPTED
 from colloc.system.errors import ChangedFileWarning, CollocError
 from colloc.system.interruption import interruptible
 
-OK, BAD_PROBLEM, NONE_FOUND, FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+OK, BAD_PROBLEM, NONE_FOUND, FAILED = 0, 2, 3, 4
 _IN_WORDS = {"π": " pi ", "δ": "delta", "μ": "mu", "±": "+-", "→": "->", "·": "*", "…": "..."}
 
 

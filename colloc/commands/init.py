@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import new_parser
+from colloc.commands.options import add_printing, new_parser, tell
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.system.errors import ProblemError
@@ -43,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("init", "Write a commented problem file for a chain of equal links; it runs as it is.", _EPILOG)
     parser.add_argument("problem", type=Path, metavar="FILE.py", help="the file to write; an existing one is left alone")
     parser.add_argument("--links", type=int, default=_FEWEST, metavar="N", help=f"links of the chain (default: {_FEWEST})")
+    add_printing(parser)
     return parser
 
 
@@ -76,7 +77,8 @@ def _init(options: argparse.Namespace) -> int:
     except FileExistsError:
         raise ProblemError(f"{path} is there already; choose another name.") from None
     read_problem_file(path)
-    print(f"wrote {path}: a problem of {options.links} links. Change it, then: colloc solve {path}")
+    line = f"wrote {path}: a problem of {options.links} links. Change it, then: colloc solve {path}"
+    tell(options, {"status": "written", "file": str(path), "links": options.links}, [line])
     return OK
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -17,10 +18,20 @@ _LONGEST_NAME = 220
 """Bytes of the name of an output: systems allow 255, and files under way have longer names than finished ones."""
 
 
+_IN_WORDS = (
+    (r"^argument (\S+): invalid int value: (.*)", r"\1 must be a whole number, not \2"),
+    (r"^argument (\S+): invalid float value: (.*)", r"\1 must be a number, not \2"),
+    (r"^argument (\S+): invalid choice: (.*) \(choose from (.*)\)", r"\1 must be one of \3, not \2"),
+)
+"""What argparse says, and how a person would."""
+
+
 class Parser(argparse.ArgumentParser):
     """Refuses bad options in one sentence."""
 
     def error(self, message: str) -> NoReturn:
+        for argparses, ours in _IN_WORDS:
+            message = re.sub(argparses, ours, message)
         raise ProblemError(f"{message}; see {self.prog} --help.")
 
 

@@ -21,6 +21,7 @@ from colloc.gaits.problem import Problem, Reference
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.relaxed import Relaxed
 from colloc.results.level import PRESCRIBED, REDUCED, Level
+from colloc.results.search_step import SearchStep
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
@@ -171,6 +172,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
+    if options.starts is not None and options.starts < 1:
+        raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
+    if not options.seconds > 0:
+        raise ProblemError(f"--seconds must be positive, not {options.seconds:g}.")
     stated = read_problem_file(options.problem)
     problem = changed(stated.problem, options)
     path = output_path(options.output, Path("results") / f"{problem.name}.h5")
@@ -183,8 +188,6 @@ def _solve(options: argparse.Namespace) -> int:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
-    if options.starts is not None and options.starts < 1:
-        raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
     if isinstance(problem.gait, Relaxed):
         from colloc.commands.solve_relaxed import solve_relaxed
 
@@ -272,8 +275,11 @@ def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse
                 what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
                 line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
 
+            def tried(step: SearchStep) -> None:
+                line.say(f"{problem.name}: {step}")
+
             if options.search == SEARCHES[0]:
-                solution = best_gait(problem, starts, ended, options.seconds, before_levels)
+                solution = best_gait(problem, starts, ended, options.seconds, before_levels, tried)
             else:
                 solution = maximise_efficiency(problem, ended, literal=True)
     except KeyboardInterrupt:

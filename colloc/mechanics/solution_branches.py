@@ -53,7 +53,7 @@ def all_balanced_velocities(body: Links, friction: Friction, angles: np.ndarray,
     >>> at = np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
     >>> found = all_balanced_velocities(Links(), Friction(1, 0.01, 100), *at, 1e-4)
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
-    (array([3]), array([2.994, 2.96 , 2.987]), array([ 1.,  1., -1.]))
+    (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """
     at = (body, friction, angles, rates, delta)
     if friction.isotropic:

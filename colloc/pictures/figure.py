@@ -14,12 +14,14 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import lab_outline
-from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours, styled
+from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, Picture, snapshot_colours, styled
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import SOLVED, Solution
 
-_GAP, _NARROWEST = 0.12, 0.3
-"""Between snapshots, and the room for the words below one [body lengths]."""
+_GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08
+"""Between snapshots, the room for the words below one, and above and below [body lengths]."""
+_FLAT, _SEEN = 0.12, 0.3
+"""A motion that rises by less than the first [body lengths] is drawn higher, by the second."""
 _SMALL = 1.6
 """Extent [rad] below which a path in shape space is shown from closer than the whole plane."""
 _MOST_PERIODS = 3
@@ -31,25 +33,31 @@ def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int 
     t = np.linspace(0.0, 1.0, count)
     motion = solution.sample(t)
     x, y = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
+    rise = float(np.ptp(y))
+    higher = max(1, round(_SEEN / rise)) if 0 < rise < _FLAT else 1
+    y = higher * y
     width = np.ptp(x, axis=0)
     room = np.maximum(width, _NARROWEST) + _GAP
     middle = np.cumsum(room) - 0.5 * room
     shift = middle - 0.5 * (x.min(axis=0) + x.max(axis=0))
-    low = float(y.min()) - 0.04
+    low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
         draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body.hinges)
-        axes.plot(motion.centre[0, k] + shift[k], motion.centre[1, k], "+", color=VERMILION, ms=6)
+        axes.plot(motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
-        axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, 0), color=GREY, **below)
+        axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, -3), color=GREY, **below)
         axes.annotate(
             f"{round(float(motion.centre[0, k]), 2) + 0.0:.2f}".replace("-", "−"),
             (middle[k], low),
-            (0, -10),
+            (0, -13),
             color=VERMILION,
             **below,
         )
-    axes.set(xlim=(0, float(room.sum())), ylim=(low, float(y.max()) + 0.04), aspect="equal")
+    axes.set(xlim=(0, float(room.sum())), ylim=(low, float(y.max()) + _MARGIN), aspect="equal")
     axes.set_axis_off()
+    if higher > 1:
+        above: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "color": GREY, "fontsize": 7}
+        axes.annotate(f"heights drawn {higher} times as large", (0, 1), (4, 4), **above)
 
 
 def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, hinges: slice) -> None:
@@ -209,7 +217,7 @@ def solution_figure(solution: Solution) -> Figure:
     t = np.linspace(0.0, 1.0, 1201)
     angles = solution.gait.angles(t)
     with styled():
-        figure = Figure(figsize=(11, 8.2))
+        figure = Picture(figsize=(11, 8.2))
         figure.set_layout_engine("none")  # the places are known
         colour = INK if solution.status == SOLVED else VERMILION
         figure.text(0.015, 0.985, _headline(solution), fontsize=11, va="top", color=colour)

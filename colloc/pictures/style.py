@@ -5,6 +5,7 @@ Figures are made without pyplot, so that drawing one neither opens a window nor 
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -58,6 +59,16 @@ def styled(font_size: float = 9) -> Iterator[None]:
     """The common style, for figures made inside."""
     with matplotlib.rc_context({**_STYLE, "font.size": font_size, "axes.labelsize": font_size}):
         yield
+
+
+class Picture(Figure):
+    """A figure that notebooks show: they know by themselves only those of pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        with styled():
+            self.savefig(content, format="png")
+        return content.getvalue()
 
 
 def subplots(rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **options: Any) -> tuple[Figure, Any]:

@@ -14,7 +14,7 @@ class Alternative:
     Attributes
     ----------
     efficiency : float
-        As collocation sees it on a first mesh.
+        As collocation sees it on a coarse mesh, which may be a little more than a fine one would.
     delta : float
         To which it was followed.
     starts : int
@@ -29,3 +29,7 @@ class Alternative:
     starts: int
     on_speed_floor: bool
     gait: AnyGait
+
+    def __str__(self) -> str:
+        size = ", as small as its bound allows" if self.on_speed_floor else ""
+        return f"{self.efficiency:.4f} at delta {self.delta:.0e} ({self.starts} start{'s' * (self.starts > 1)}{size})"

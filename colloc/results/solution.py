@@ -145,9 +145,8 @@ class Solution:
             return ["local optimum, from one start"]
         best, *others = self.others
         lines = [f"local optimum, best of {self.starts} starts; {best.starts} led here"]
-        for other in others[:_MOST_OTHERS]:
-            size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
-            lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
+        if others:
+            lines.append("also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS])))
         return lines
 
     @property
@@ -293,6 +292,7 @@ class Solution:
             ("distance d", f"{certificate.distance:.5f}"),
             ("work W", f"{certificate.work:.5f}"),
             ("δ", f"{self.last.delta:.0e}"),
+            ("search", self.standing[0]),
         ]
 
     def _checks(self) -> list[tuple[str, bool, str]]:

@@ -8,7 +8,7 @@ the first few are followed to the final delta, and the best of those is refined,
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain, islice
@@ -27,6 +27,7 @@ from colloc.mechanics.body import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.spaces import space_near
 from colloc.results.alternative import Alternative
+from colloc.results.search_step import SearchStep
 from colloc.search.reduced_search import (
     FIRST_RADIUS,
     NEXT_RADIUS,
@@ -53,6 +54,9 @@ _ROUNDS = 2
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction."""
 _HARMONICS = 8
+
+
+Watch = Callable[[SearchStep], object]
 
 
 @dataclass(eq=False)
@@ -92,7 +96,7 @@ def same_gait(problem: Problem, a: Found, b: Found) -> bool:
     return distance(one, other, problem.body, problem.friction) < _SAME_GAIT
 
 
-def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
+def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch: Watch) -> tuple[list[Candidate], int]:
     """What the starts lead to on a coarse mesh, most efficient first, and how many were tried, at least one."""
     intervals = min(problem.intervals, max(problem.gait.intervals(problem.body.n_joint) // 2, _FEWEST))
     coarse = problem.with_(intervals=intervals)
@@ -106,7 +110,13 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tup
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
             _follow(coarse, gait, start, deltas, known)
+        watch(_step("starts", tried, count, [c.found for c in known[-1]]))
     return sorted(known[-1], key=lambda c: c.found.objective), tried
+
+
+def _step(what: str, done: int, count: int, found: Sequence[Found]) -> SearchStep:
+    best = min(found, key=lambda f: f.objective, default=None)
+    return SearchStep(what, done, count, np.nan if best is None else -best.objective, np.nan if best is None else best.delta)
 
 
 def _follow(problem: Problem, gait: AnyGait, start: int, deltas: list[float], known: list[list[Candidate]]) -> None:
@@ -155,7 +165,7 @@ class Chosen:
     finite: list[Found]
 
 
-def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
+def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch = lambda step: None) -> Chosen:
     """The most efficient gait that so many starts lead to.
 
     Parameters
@@ -164,6 +174,8 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     count : int
     seconds : float
         Wall time after which no other start is begun and no other gait is followed.
+    watch : callable
+        Called with a `colloc.results.search_step.SearchStep` after every start and every gait that was followed.
 
     Raises
     ------
@@ -175,7 +187,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     def goes_on() -> bool:
         return time.perf_counter() - begin < seconds
 
-    known, tried = candidates(problem, count, goes_on)
+    known, tried = candidates(problem, count, goes_on, watch)
     if not known:
         raise NotConvergedError("no start led to any gait of the class; give a guess.")
     ends: list[tuple[Candidate, list[Found]]] = []
@@ -187,11 +199,12 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     # gaits of finite size may shrink on the way, so they are followed until one has not
     queue = [c for c in known if -c.found.objective >= least][:_FOLLOWED]
     spare = [c for c in known if is_finite(c.found) and c not in queue][:_FOLLOWED]
-    for candidate in (*queue, *spare):
+    for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(levels[-1]) for _, levels in ends)):
             break
         with suppress(CollocError):
             ends.append((candidate, _followed(problem, candidate.found)))
+        watch(_step("gaits", number, len(queue) + len(spare), [levels[-1] for _, levels in ends]))
     if not ends:
         raise NotConvergedError("no gait could be followed to the final delta; start at a larger delta or give another guess.")
     close = (1 - _CLOSE) * min(levels[-1].objective for _, levels in ends)

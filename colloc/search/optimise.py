@@ -16,7 +16,7 @@ from colloc.results.level import Level
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import answer, level_found
-from colloc.search.global_search import STARTS, best_of
+from colloc.search.global_search import STARTS, Watch, best_of
 from colloc.search.literal_search import literal_optimum
 from colloc.search.prescribed import measured
 from colloc.search.reduced_search import Found, descended, refined, searched
@@ -132,6 +132,7 @@ def best_gait(
     on_level: Report | None = None,
     seconds: float = np.inf,
     before: Sequence[Level] = (),
+    watch: Watch = lambda step: None,
 ) -> Solution:
     """Maximise d/W over the whole class, as far as many starts can tell, and certify the result.
 
@@ -147,6 +148,8 @@ def best_gait(
         Wall time after which no other start is begun.
     before : sequence of Level
         Levels of an interrupted run; it goes on from the last one.
+    watch : callable
+        Called with every `colloc.results.search_step.SearchStep` before the first level.
 
     Returns
     -------
@@ -159,7 +162,7 @@ def best_gait(
     begin = time.perf_counter()
     scaled, unit = in_friction_units(problem)
     try:
-        chosen = best_of(scaled, starts, seconds)
+        chosen = best_of(scaled, starts, seconds, lambda step: watch(replace(step, efficiency=step.efficiency / unit)))
     except NotConvergedError:  # what fails with the guess alone is said in detail
         return maximise_efficiency(problem, on_level)
     levels = [restated(level_found(found), unit) for found in chosen.levels]

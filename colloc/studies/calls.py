@@ -17,6 +17,7 @@ from colloc.gaits.sampling import LATIN_HYPERCUBE
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, Outcome, basins, counts
 from colloc.results.level import Level
+from colloc.results.search_step import SearchStep
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait, maximise_efficiency
@@ -37,7 +38,7 @@ def solve(
     *,
     seconds: float = np.inf,
     verbose: bool = False,
-    progress: Callable[[Level], object] | None = None,
+    progress: Callable[[Level | SearchStep], object] | None = None,
 ) -> Solution:
     """The most efficient gait of a problem, certified: what ``colloc solve`` finds.
 
@@ -50,9 +51,10 @@ def solve(
     seconds : float
         Wall time after which no other start is begun.
     verbose : bool
-        Print a line for every level of delta as it ends.
+        Print a line for every start and every level of delta as it ends.
     progress : callable, optional
-        Called with every `colloc.results.level.Level` as it ends.
+        Called with a `colloc.results.search_step.SearchStep` after every start and every gait that is followed, then with every
+        `colloc.results.level.Level` of the best one.
 
     Returns
     -------
@@ -75,7 +77,10 @@ def solve(
     stated = _stated(problem)
     if starts is not None and starts < 1:
         raise ProblemError(f"starts must be at least 1, not {starts}.")
-    solution = best_gait(stated.problem, starts or stated.starts or STARTS, _told(verbose, progress), seconds)
+    if not seconds > 0:
+        raise ProblemError(f"seconds must be positive, not {seconds:g}.")
+    told = _told(verbose, progress)
+    solution = best_gait(stated.problem, starts or stated.starts or STARTS, told, seconds, watch=told)
     solution.source = stated.source
     return solution
 

@@ -2,19 +2,54 @@
 
 
 class CollocError(Exception):
-    """Base of the errors colloc raises on purpose; its text is one clear sentence with what to try."""
+    """Base of the errors colloc raises on purpose; its text is one clear sentence with what to try.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> try:
+    ...     colloc.load_problem("nowhere.py")
+    ... except colloc.CollocError as error:
+    ...     print(error)
+    there is no problem file nowhere.py.
+    """
 
 
 class ProblemError(CollocError, ValueError):
-    """The problem, an option or an input file cannot be used as stated."""
+    """The problem, an option or an input file cannot be used as stated.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> colloc.Problem("x", joint_limit=4)
+    Traceback (most recent call last):
+    colloc.system.errors.ProblemError: joint_limit must lie in (0, pi], not 4.
+    """
 
 
 class NotConvergedError(CollocError, RuntimeError):
-    """A numerical method stopped without an answer."""
+    """A numerical method stopped without an answer. Solves do not raise it: their status says so.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("x")
+    >>> colloc.Starts(problem, ()).solution()
+    Traceback (most recent call last):
+    colloc.system.errors.NotConvergedError: none of 0 starts of x was certified.
+    """
 
 
 class StoreError(CollocError, OSError):
-    """A results file cannot be read or written."""
+    """A results file cannot be read or written.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> colloc.load("nothing.h5")
+    Traceback (most recent call last):
+    colloc.system.errors.StoreError: there is no file nothing.h5.
+    """
 
 
 class ChangedFileWarning(UserWarning):

@@ -6,12 +6,17 @@ had failed. So a solve is not interrupted by an exception: it asks between itera
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FrameType
+from typing import Any
+
+from colloc.system.early_interruption import end_at_once
 
 
 @dataclass
@@ -36,6 +41,35 @@ def _hear(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
 
+_MOMENT = 0.01
+
+
+def _again() -> None:
+    if signal.getsignal(signal.SIGINT) is not _hear:
+        return  # what was to be interrupted has ended
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:  # a main thread that sleeps hears this when it wakes up
+        _thread.interrupt_main()
+
+
+def _hushed(before: Callable[[Any], object]) -> Callable[[Any], object]:
+    """What to do with exceptions that Python cannot raise, as in a weak reference's callback, where Ctrl-C may fall too.
+
+    Python would print it and go on; so it comes again a moment later, without a word.
+    """
+
+    def hook(unraisable: Any) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            before(unraisable)
+            return
+        timer = threading.Timer(_MOMENT, _again)
+        timer.daemon = True
+        timer.start()
+
+    return hook
+
+
 @contextlib.contextmanager
 def interruptible(*, polled: bool = True) -> Iterator[None]:
     """A block that ends in KeyboardInterrupt if Ctrl-C came inside it and became an error there, or nothing at all.
@@ -49,12 +83,13 @@ def interruptible(*, polled: bool = True) -> Iterator[None]:
         False, for a whole command: every Ctrl-C raises at once, and the command may end well after it.
     """
     handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
-    if handler not in (signal.default_int_handler, _hear):
+    if handler not in (signal.default_int_handler, end_at_once, _hear):
         yield
         return
     outermost = handler is not _hear
     if outermost:
         _heard.asked = False
+        unraisable, sys.unraisablehook = sys.unraisablehook, _hushed(sys.unraisablehook)
         signal.signal(signal.SIGINT, _hear)
     elif _heard.asked:  # swallowed before the block began
         raise KeyboardInterrupt
@@ -68,6 +103,7 @@ def interruptible(*, polled: bool = True) -> Iterator[None]:
     finally:
         _heard.polled = outer
         if outermost:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGINT, handler)
+            sys.unraisablehook = unraisable
     if _heard.asked and polled:
         raise KeyboardInterrupt

@@ -57,6 +57,43 @@ def test_ctrl_c_while_libraries_are_imported_ends_without_a_traceback(module, qu
     assert done.stderr.decode() == "colloc: interrupted; nothing was written.\n"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("words", [["colloc", "solve"], ["colloc.solve"], ["colloc", "verify", "--json"]])
+@pytest.mark.parametrize("module", ["argparse", "dataclasses"])
+def test_ctrl_c_before_the_command_is_known_ends_without_a_traceback(module, words, tmp_path):
+    """These are what the modules that every command begins with import first."""
+    (tmp_path / f"{module}.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-m", *words, "x"], capture_output=True, check=False, env=environment)
+    assert done.returncode == 130
+    assert done.stderr.decode() == "colloc: interrupted; nothing was written.\n"
+    if "--json" in words:
+        assert json.loads(done.stdout)["exit_code"] == 130
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_ctrl_c_inside_text_that_is_executed_is_an_exit_code_too(quick, tmp_path):
+    """As in a dataclass that is made: Python would end the process by the signal, whatever the command returned."""
+    (tmp_path / "library").mkdir()
+    text = "exec('import signal; signal.raise_signal(signal.SIGINT)')"
+    (tmp_path / "library" / "numpy.py").write_text(text)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "library")}
+    done = command("solve", quick, "--output", f"{tmp_path}/", env=environment)
+    assert (done.returncode, done.stderr.decode()) == (130, "colloc: interrupted; nothing was written.\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_ctrl_c_after_the_end_does_not_change_it(tmp_path):
+    code = (
+        "import atexit, signal, sys\nfrom colloc.__main__ import start\n"
+        "atexit.register(lambda: signal.raise_signal(signal.SIGINT))\nstart(['init', sys.argv[1]])"
+    )
+    words = [sys.executable, "-c", code, str(tmp_path / "x.py")]
+    done = subprocess.run(words, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert (tmp_path / "x.py").exists()
+
+
 @needs_full
 @pytest.mark.parametrize("words", [["verify"], ["compare"]])
 @pytest.mark.parametrize("buffered", [True, False])

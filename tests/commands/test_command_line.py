@@ -104,7 +104,10 @@ def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(problem, 
 
 
 def test_help_is_quick_and_does_not_need_casadi():
-    code = "import sys; from colloc.solve import main\ntry: main(['--help'])\nexcept SystemExit: print('casadi' in sys.modules)"
+    code = (
+        "import sys; from colloc.__main__ import start\ntry: start(['solve', '--help'])\n"
+        "except SystemExit: print('casadi' in sys.modules)"
+    )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.rstrip().endswith("False")
     assert "Exit codes" in result.stdout

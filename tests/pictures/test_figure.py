@@ -2,14 +2,13 @@
 
 import subprocess
 import sys
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+from shared.readable import assert_readable
 
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
@@ -18,6 +17,7 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure
 from colloc.pictures.publication import panels
 from colloc.pictures.style import save
+from scripts.gallery import picture
 
 
 def crawler(n_link, size=0.6):
@@ -25,35 +25,6 @@ def crawler(n_link, size=0.6):
     guess = Fourier(np.zeros(n_link - 1), size * np.cos(0.9 * j)[:, None], size * np.sin(0.9 * j)[:, None] + 0.1)
     lengths = (1 / n_link,) * n_link
     return Problem("crawler", guess, Chain(lengths), Friction(1.5, 1.0, 1.2), gait=Harmonic(1), delta=1e-2, intervals=8)
-
-
-def words(figure):
-    """What is written and where [pixels]; labels of ticks beyond an axis' limits are not drawn."""
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    figure.draw(renderer)
-    unseen = set()
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            low, high = sorted(axis.get_view_interval())
-            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
-                room = 1e-9 * (high - low)
-                if not axes.axison or not low - room <= tick.get_loc() <= high + room:
-                    unseen |= {tick.label1, tick.label2}
-            if not axes.axison:
-                unseen |= {axis.label, axis.offsetText}
-    shown = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip() and text not in unseen]
-    return [(text.get_text(), text.get_window_extent(renderer)) for text in shown]
-
-
-def assert_readable(figure):
-    found = words(figure)
-    for text, box in found:
-        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, f"{text!r} leaves the canvas"
-        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1, f"{text!r} leaves the canvas"
-    for (one, a), (other, b) in combinations(found, 2):
-        across, along = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
-        assert min(across, along) < 1.0, f"{one!r} lies on {other!r}"
-    return [text for text, _ in found]
 
 
 @pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (8, 0.3)])
@@ -118,3 +89,20 @@ def test_drawing_loads_neither_pyplot_nor_what_writes_pdf():
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert "matplotlib.figure" in loaded
     assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "scipy.stats", "jinja2"} & set(loaded)
+
+
+@pytest.mark.parametrize(("n_link", "size"), [(2, 1.5), (3, 0.3), (5, 0.6)])
+def test_pictures_of_the_gallery_can_be_read(n_link, size, unsolved):
+    assert_readable(picture(unsolved(crawler(n_link, size))))
+
+
+@pytest.mark.parametrize(("size", "times"), [(0.02, 21), (0.6, 1)])
+def test_a_flat_motion_is_drawn_higher_and_says_so(size, times, unsolved):
+    body, gait = Chain((0.25,) * 4), Fourier(np.zeros(3), size * np.ones((3, 1)), size * np.array([[1.0], [0.0], [-1.0]]))
+    axes = Figure().add_subplot()
+    problem = Problem("flat", gait, body, gait=Harmonic(1), delta=1e-2, intervals=8, smallest_shape_speed=1e-3)
+    draw_filmstrip(axes, unsolved(problem))
+    said = [text.get_text() for text in axes.texts if "heights" in text.get_text()]
+    drawn = np.ptp(np.concatenate([line.get_ydata() for line in axes.lines if line.get_linestyle() == "-"]))
+    assert drawn > 0.2
+    assert said == ([] if times == 1 else [f"heights drawn {times} times as large"])

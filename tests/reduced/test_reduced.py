@@ -82,7 +82,9 @@ def test_a_finer_mesh_on_the_same_arcs_has_the_same_parameters_and_a_smaller_err
     fine, w, finer = near_start("path with two intervals an arc", shake=0.0)
     np.testing.assert_allclose(w, v, atol=1e-12)
     assert (fine.mesh.n, fine.n) == (2 * coarse.mesh.n, coarse.n)
-    exact = replay(coarse.problem.body, coarse.problem.friction, coarse.member(v), DELTA * coarse.member(v).delta_unit).efficiency
+    exact = replay(
+        coarse.problem.body, coarse.problem.friction, coarse.member(v), DELTA * coarse.member(v).delta_unit
+    ).efficiency
     assert abs(-finer.objective(w) - exact) < 0.2 * abs(-program.objective(v) - exact)
 
 

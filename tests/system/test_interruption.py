@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -96,6 +97,29 @@ def test_a_second_ctrl_c_is_raised_at_once():
 
 def test_in_a_command_every_ctrl_c_is_raised_at_once():
     assert press(times=3, polled=False) == (1, False)
+
+
+def press_in_a_callback():
+    class Thing:
+        pass
+
+    with interruptible(polled=False):
+        thing = Thing()
+        reference = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+        del thing
+        assert reference() is None
+        time.sleep(10)
+
+
+def test_where_python_would_swallow_ctrl_c_it_comes_again_and_nothing_is_printed(capfd):
+    """As in the callbacks of weak references that run while modules are imported."""
+    begin, hook = time.monotonic(), sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt):
+        press_in_a_callback()
+    assert time.monotonic() - begin < 5
+    assert sys.unraisablehook is hook
+    printed = capfd.readouterr()
+    assert printed.out + printed.err == ""
 
 
 def fail(*, after_ctrl_c):

@@ -1,0 +1,115 @@
+"""What holds for every command alike: options, refusals in one sentence or one JSON object, completion in a shell."""
+
+import importlib
+import json
+import shutil
+import subprocess
+
+import pytest
+
+from colloc.commands.completion import completion_script
+from colloc.commands.main import SUBCOMMANDS
+from colloc.commands.main import main as colloc
+from colloc.results.store import save
+
+PARSERS = {name: importlib.import_module(f"colloc.commands.{module}")._parser() for name, (module, _) in SUBCOMMANDS.items()}
+PROBLEM = "from colloc import *\nPROBLEM = Problem('quick', gait=Harmonic(1, 'bilateral'))\n"
+STUDY = """from colloc import *
+STUDY = Study("quick", (Axis("mu_t", (1, 2)),), lambda mu_t: Problem("q", friction=Friction(mu_t)))
+"""
+
+
+@pytest.fixture
+def place(three_link, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save(three_link, tmp_path / "good.h5")
+    (tmp_path / "text.h5").write_text("hello")
+    (tmp_path / "fails.py").write_text("1 / 0\n")
+    (tmp_path / "empty.py").write_text("x = 1\n")
+    (tmp_path / "folder.py").mkdir()
+    (tmp_path / "problem.py").write_text(PROBLEM)
+    (tmp_path / "study.py").write_text(STUDY)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", SUBCOMMANDS)
+def test_every_command_has_the_same_options_for_printing(name):
+    assert {"--help", "--json", "--quiet"} <= set(PARSERS[name]._option_string_actions)
+
+
+REFUSED = {
+    "init": ["", "x.txt", "problem.py", "nowhere/below.py", "a,b.py", "new.py --links 2", "new.py --links x"],
+    "solve": ["", "nope.py", "folder.py", "fails.py", "empty.py", "good.h5", "text.h5"]
+    + [f"problem.py --{option}" for option in ("delta nan", "delta x", "mesh 1.5", "scheme no", "start nope.h5", "starts 0")]
+    + [f"problem.py --{option}" for option in ("seconds 0", "seconds nan", "search no", "output x.txt", "no-such")],
+    "multistart": ["", "nope.py", "fails.py", "good.h5"]
+    + [f"problem.py --{option}" for option in ("starts 0", "workers 0", "seed -1", "sampler no", "time-limit nan")],
+    "open": ["", "nope.h5", "text.h5", "good.h5", "good.h5 --start 1"],
+    "sweep": ["", "nope.py", "fails.py", "problem.py", "study.py --workers 0", "study.py --chunk 0", "study.py --workers x"],
+    "verify": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --tolerance 0", "good.h5 --tolerance nan"],
+    "compare": ["", "good.h5", "good.h5 nope.h5", "text.h5 good.h5"],
+    "report": ["", "nope.h5", "text.h5", "good.h5 --problem nope.py", "good.h5 --output x.txt"],
+    "animate": ["", "nope.h5", "text.h5"]
+    + [f"good.h5 --{option}" for option in ("periods 0", "seconds nan", "fps 0", "width 0", "format avi", "output x.avi")],
+    "export": ["", "nope.h5", "text.h5", "good.h5"]
+    + [f"good.h5 --period 4 --{option}" for option in ("rate nan", "max-speed 0", "max-speed 1 2 3", "periods 0", "format x")],
+    "completion": ["--no-such", "x"],
+}
+
+
+@pytest.mark.parametrize("name", SUBCOMMANDS)
+def test_bad_input_is_refused_in_one_sentence_and_as_one_json_object(name, place, capsys):
+    before = sorted(place.iterdir())
+    for words in REFUSED[name]:
+        said = []
+        for more in ([], ["--json"]):
+            assert colloc([name, *words.split(), *more]) == 2, words
+            printed = capsys.readouterr()
+            assert printed.err.startswith("colloc: "), words
+            assert printed.err.count("\n") == 1, words
+            said.append(printed)
+        assert said[0].out == "", words
+        told = json.loads(said[1].out)
+        assert told == {"status": "error", "message": said[0].err.removeprefix("colloc: ").rstrip("\n"), "exit_code": 2}, words
+    assert sorted(place.iterdir()) == before
+
+
+def test_a_wrong_value_of_an_option_is_named_without_words_of_programmers(place, capsys):
+    for words, message in (
+        ("solve problem.py --mesh x", "--mesh must be a whole number, not 'x'"),
+        ("solve problem.py --delta x", "--delta must be a number, not 'x'"),
+        ("export good.h5 --format x", "--format must be one of 'csv', 'json', not 'x'"),
+    ):
+        assert colloc(words.split()) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_a_new_problem_file_is_told_as_json(tmp_path, capsys):
+    assert colloc(["init", str(tmp_path / "mine.py"), "--links", "4", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told == {"status": "written", "file": str(tmp_path / "mine.py"), "links": 4}
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (["colloc", ""], set(SUBCOMMANDS)),
+        (["colloc", "com"], {"compare", "completion"}),
+        (["colloc", "solve", "--st"], {"--start", "--starts"}),
+        (["colloc", "solve", "p.py", "--search", ""], {"reduced", "full"}),
+        (["colloc", "animate", "x.h5", "--format", "m"], {"mp4"}),
+        (["colloc", "solve", "problems/thr"], set()),
+        (["colloc", "nonsense", "--"], set()),
+    ],
+)
+def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path):
+    """An empty set leaves files to bash."""
+    (tmp_path / "completion").write_text(completion_script(PARSERS))
+    words = " ".join(f"'{word}'" for word in typed)
+    program = (
+        f"source {tmp_path}/completion; COMP_WORDS=({words}); COMP_CWORD={len(typed) - 1}; _colloc; echo ${{COMPREPLY[@]}}"
+    )
+    done = subprocess.run(["bash", "-u", "-c", program], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == offered
+    assert done.stderr == ""
