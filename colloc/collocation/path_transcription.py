@@ -199,7 +199,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     for name, (parts, group) in period_rows(problem, layout, mesh, pace, 1.0).items():
         geometry.blocks[name] = parts
         groups.append(group)
-    implicit = {} if full else {"point": balanced}
+    implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]] = {} if full else {"point": balanced}
     return _assembled(problem, mesh, layout, geometry, groups, objective_block(problem, layout), implicit, velocity)
 
 

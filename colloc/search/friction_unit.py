@@ -24,11 +24,11 @@ def friction_unit(friction: Friction) -> float:
 
 def in_friction_units(problem: Problem) -> tuple[Problem, float]:
     """The problem with its coefficients in units of `friction_unit`, and that unit."""
-    unit, degrees = friction_unit(problem.friction), [aim.degree for aim in problem.aims]
-    if unit == 1.0 or None in degrees:
+    unit = friction_unit(problem.friction)
+    if unit == 1.0 or any(aim.degree is None for aim in problem.aims):
         return problem, 1.0
     friction = Friction(*(mu / unit for mu in (problem.friction.mu_t, problem.friction.mu_f, problem.friction.mu_b)))
-    least = tuple((aim, value * unit**-aim.degree) for aim, value in problem.at_least)
+    least = tuple((aim, in_unit(value, 1 / unit, aim)) for aim, value in problem.at_least)
     return problem.with_(friction=friction, at_least=least), unit
 
 
@@ -42,4 +42,4 @@ def restated(level: Level, unit: float, objective: Objective) -> Level:
 
 def in_unit(value: float, unit: float, objective: Objective) -> float:
     """The value of an objective for coefficients `unit` times as large."""
-    return value if unit == 1.0 else value * unit**objective.degree
+    return value * unit ** (objective.degree or 0.0)

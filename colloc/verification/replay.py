@@ -263,7 +263,7 @@ def replay(
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
         new = _evaluated(body, friction, path, delta, between, start, sense, whole=False)
         panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new))
-    several, *others = _others(panels, reach)
+    several, other_distance, other_work, other_rotation = _others(panels, reach)
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
     return Replay(
         distance,
@@ -280,7 +280,9 @@ def replay(
         float(turn_error.sum()) + residual,
         float(length_error.sum()),
         several,
-        *others,
+        other_distance,
+        other_work,
+        other_rotation,
         4 * panels.left.size,
         (known, panels.z[:, :4].reshape(-1, 3).T),
         objective,
