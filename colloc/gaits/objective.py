@@ -110,8 +110,8 @@ class Objective:
     Examples
     --------
     >>> thrifty = Objective("distance / (work + 0.1 * length)", name="thrift")
-    >>> thrifty({"distance": 0.3, "work": 0.9, "length": 6.0})
-    0.2
+    >>> thrifty({"distance": 0.75, "work": 2.0, "length": 10.0})
+    0.25
     >>> Objective("distance/work").name
     'efficiency'
     """

@@ -41,7 +41,7 @@ class Replay:
 
     Attributes
     ----------
-    distance, work, efficiency : float
+    distance, work : float
         The distance is that of the centre of mass.
     rotation : float
         Net rotation over the period [rad].
@@ -70,7 +70,6 @@ class Replay:
 
     distance: float
     work: float
-    efficiency: float
     rotation: float
     length: float
     lever: float
@@ -93,6 +92,11 @@ class Replay:
         """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
         known, z = self.tail
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
+
+    @property
+    def efficiency(self) -> float:
+        """Distance over work."""
+        return self.distance / self.work
 
     @property
     def period(self) -> dict[str, float]:
@@ -268,7 +272,6 @@ def replay(
     return Replay(
         distance,
         work,
-        distance / work,
         float(heading[-1]),
         period["length"],
         float(panels.lever.max()),
