@@ -6,6 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from colloc.gaits.objective import QUANTITIES
+
 
 @dataclass(frozen=True)
 class Check:
@@ -92,6 +94,11 @@ class Certificate:
 
     def __str__(self) -> str:
         return "\n".join(check.line() for check in self.checks)
+
+    @property
+    def period(self) -> dict[str, float]:
+        """What the replayed period comes to, by the names of `colloc.gaits.objective.QUANTITIES`."""
+        return {name: getattr(self, name) for name in QUANTITIES}
 
     @property
     def replayed(self) -> bool:
