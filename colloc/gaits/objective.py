@@ -22,14 +22,15 @@ QUANTITIES = {
     "work": "work against friction over a period",
     "rotation": "net rotation over a period, counter-clockwise [rad]",
     "length": "length of the path in shape space [rad]",
+    "driven_work": "work of the actuators where none takes energy back",
 }
 """What an expression may speak of."""
 _SAMPLES = (
-    {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0},
-    {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0},
+    {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0, "driven_work": 1.9},
+    {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0, "driven_work": 3.3},
 )
 """Periods at which an expression is tried when it is stated."""
-_PROPORTIONAL_TO_FRICTION = ("work",)
+_PROPORTIONAL_TO_FRICTION = ("work", "driven_work")
 _LONGEST = 300
 """Characters of an expression; it is evaluated by recursion."""
 _OPERATIONS: dict[type, Callable] = {
@@ -252,11 +253,13 @@ NAMED = {
     "efficiency": "distance / work",
     "speed": "distance / length",
     "turning": "rotation / work",
+    "driven efficiency": "distance / driven_work",
 }
 """Objectives that a problem may name: distance per work; per path in shape space, which is the speed of a body whose shape
-changes at unit rate; rotation per work."""
-_SHORT = {"efficiency": "d/W", "speed": "d/L", "turning": "θ/W"}
-EFFICIENCY, SPEED, TURNING = (Objective(name) for name in NAMED)
+changes at unit rate; rotation per work; distance per work where no actuator recovers energy from being driven backwards
+(`colloc.mechanics.driven_power`)."""
+_SHORT = {"efficiency": "d/W", "speed": "d/L", "turning": "θ/W", "driven efficiency": "d/W+"}
+EFFICIENCY, SPEED, TURNING, DRIVEN = (Objective(name) for name in NAMED)
 
 
 def objective_from(stated: object) -> Objective:

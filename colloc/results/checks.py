@@ -59,8 +59,9 @@ class Certificate:
         The same of distance and work; NaN if an older file does not state it.
     value, value_error, value_at_zero_delta, value_error_at_zero_delta : float
         The same as of the efficiency, of the problem's objective; by default the efficiency's.
-    rotation, length : float
-        Net rotation, and length of the path in shape space, of the period [rad]; NaN if an older file does not state it.
+    rotation, length, driven_work : float
+        Net rotation, and length of the path in shape space, of the period [rad]; work of the actuators where none takes energy
+        back. NaN if an older file does not state it, or nobody asked.
     """
 
     checks: tuple[Check, ...]
@@ -79,6 +80,7 @@ class Certificate:
     value_error_at_zero_delta: float = float("nan")
     rotation: float = float("nan")
     length: float = float("nan")
+    driven_work: float = float("nan")
 
     def __post_init__(self) -> None:
         for name, usual in _USUAL.items():

@@ -20,6 +20,7 @@ from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait, maximise_efficiency
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
+from colloc.verification.replay import replay
 
 POINTS = 9
 _SAME = 1e-6
@@ -48,7 +49,7 @@ class ParetoFront:
     @property
     def values(self) -> np.ndarray:
         """Both objectives of every point, replayed, ``(n, 2)``."""
-        return np.array([[aim(point.certificate.period) for aim in self.objectives] for point in self.points])
+        return np.array([[_value(point, aim) for aim in self.objectives] for point in self.points])
 
     @property
     def certified(self) -> bool:
@@ -123,7 +124,7 @@ def pareto_front(
         put(k, best_gait(problem.with_(objective=aim), starts))
         if not found[k].success:
             raise ProblemError(f"the gait of best {aim.name} is not certified, so there is no front: {found[k].message}")
-    least, most = (aims[1](found[k].certificate.period) for k in (0, last))
+    least, most = (_value(found[k], aims[1]) for k in (0, last))
     if most - least < _SAME * abs(most):
         return ParetoFront(problem, aims, (found[0], found[last]))
     levels = np.linspace(least, most, points)
@@ -138,6 +139,16 @@ def pareto_front(
     for k in range(1, last):
         put(k, begun_at(k, k - 1))
     for k in range(last - 1, -1, -1):  # what reaches more of the second objective and of the first is better here, too
-        if k > 0 and aims[0](found[k + 1].certificate.period) > aims[0](found[k].certificate.period):
+        if k > 0 and _value(found[k + 1], aims[0]) > _value(found[k], aims[0]):
             put(k, begun_at(k, k + 1))
     return ParetoFront(problem, aims, tuple(found[k] for k in range(points)))
+
+
+def _value(solution: Solution, aim: Objective) -> float:
+    """An objective of a solution, of its certificate or, where that does not hold what it takes, of a replay."""
+    value = aim(solution.certificate.period)
+    if not np.isnan(value):
+        return value
+    problem, gait = solution.problem, solution.gait
+    at = (problem.body, problem.friction, gait, solution.delta_per_period)
+    return replay(*at, breaks=gait.corner_phases, objective=aim).value

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from colloc import Harmonic, Objective, Problem, ProblemError
-from colloc.gaits.objective import EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
+from colloc.gaits.objective import DRIVEN, EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
 from colloc.gaits.problem import statement_hash
 
-PERIOD = {"distance": 0.31, "work": 1.3, "rotation": 0.7, "length": 8.0}
+PERIOD = {"distance": 0.31, "work": 1.3, "rotation": 0.7, "length": 8.0, "driven_work": 1.5}
 EXPRESSIONS = [
     *NAMED,
     "distance / (work + 0.1 * length)",
@@ -60,7 +60,7 @@ def test_an_expression_that_is_known_has_its_name():
 
 
 def test_the_power_of_friction_that_an_objective_is_proportional_to():
-    assert (EFFICIENCY.degree, SPEED.degree, TURNING.degree) == (-1, 0, -1)
+    assert (EFFICIENCY.degree, SPEED.degree, TURNING.degree, DRIVEN.degree) == (-1, 0, -1, -1)
     assert Objective("distance / work**0.5").degree == -0.5
     assert Objective("distance / (work + length)").degree is None
 

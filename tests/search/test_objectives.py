@@ -4,10 +4,25 @@ import numpy as np
 import pytest
 from shared.differences import assert_derivatives_are_differences
 
-from colloc import Fourier, FreePath, Friction, Harmonic, Objective, Polygon, Problem, ellipse, load, replay, save
+from colloc import (
+    Chain,
+    Fourier,
+    FreePath,
+    Friction,
+    Harmonic,
+    Objective,
+    Polygon,
+    Problem,
+    ProblemError,
+    ellipse,
+    load,
+    replay,
+    save,
+)
 from colloc.collocation.warm_start import feasible_point
 from colloc.commands import verify
 from colloc.gaits.objective import EFFICIENCY, SPEED
+from colloc.mechanics.driven_power import actuator_powers, driven_power
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
@@ -20,6 +35,9 @@ CASES = {
     "speed": {"gait": Harmonic(2, "none"), "objective": "speed"},
     "turning": {"gait": Harmonic(2, "none"), "objective": "turning", **FREE},
     "expression": {"gait": Harmonic(1, "antipodal"), "objective": THRIFT, "at_least": {"efficiency": 0.1}},
+    "driven": {"gait": Harmonic(1, "none"), "objective": "driven efficiency"},
+    "driven path": {"gait": FreePath(4.0, "bilateral"), "objective": "distance / (driven_work + length)"},
+    "driven polygon": {"gait": Polygon(4, "none"), "objective": "driven efficiency", "at_least": {"distance / work": 0.0}},
     "polygon": {"gait": Polygon(4, "none"), "objective": TURNED, **FREE},
     "bilateral path": {"gait": FreePath(4.0, "bilateral"), "objective": "speed", "at_least": {THRIFT: 0.1}},
 }
@@ -160,3 +178,41 @@ def test_an_objective_may_be_negative_and_of_any_sign():
     assert solution.value < 0
     assert solution.gait.shape_speed == pytest.approx(0.1, rel=1e-3)
     assert "better still" in solution.message
+
+
+def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
+    body, friction, delta, rng = Chain((0.3, 0.2, 0.5)), Friction(1.7, 1, 1.3), 1e-2, np.random.default_rng(3)
+    angles, rates = rng.normal(size=(2, 2, 40))
+    solved = body.solve(friction, angles, rates, delta)
+    motion = body.motion(friction, angles, rates, delta, solved)
+    forces = body.forces(friction, angles, rates, motion.z, delta)
+    powers = actuator_powers(body, friction, angles, rates, forces, delta)
+    np.testing.assert_allclose(powers.sum(axis=0), motion.actuator_power, atol=1e-12)
+    # the head link's normal force acts half its length from the joint, its tangential force has no arm
+    np.testing.assert_allclose(powers[1], -(0.25 * forces[5] + forces[8]) * rates[1], atol=1e-12)
+    driven = driven_power(body, friction, angles, rates, forces, delta)[0]
+    exact = np.maximum(powers, 0.0).sum(axis=0)
+    assert (powers < 0).any()
+    assert (driven >= exact).all()
+    assert (driven - exact <= friction.largest * delta * body.n_joint / 2).all()
+
+
+def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
+    """A gait with such joints: its driven work is more than its work, and so it pays to look for another."""
+    problem = Problem("brake", SKEW, gait=Harmonic(1), objective="driven efficiency", delta=1e-3)
+    before = replay(problem.body, problem.friction, SKEW, 1e-3, driven=True)
+    assert before.driven_work > (1 + 1e-3) * before.work
+    solution = maximise_efficiency(problem)
+    assert solution.success
+    found = solution.certificate
+    assert found.value == pytest.approx(found.distance / found.driven_work, rel=1e-12)
+    assert found.value <= found.efficiency
+    usual = maximise_efficiency(problem.with_(objective="efficiency", guess=solution.gait))
+    assert solution.value >= replay(problem.body, problem.friction, usual.gait, 1e-3, objective=problem.objective).value * (
+        1 - 1e-6
+    )
+
+
+def test_driven_work_needs_the_forces_on_the_parts():
+    with pytest.raises(ProblemError, match="formulation 'full'"):
+        Problem("x", objective="driven efficiency", formulation="implicit velocity")
