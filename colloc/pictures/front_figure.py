@@ -33,7 +33,11 @@ def front_figure(front: ParetoFront) -> Figure:
         if failed.any():
             axes.legend()
         for panel in plane:
+            last = front.points[-1].gait.angles(_PHASES)
             for point, colour in zip(front.points, colours, strict=True):
-                panel.plot(*point.gait.angles(_PHASES)[:2], color=colour, lw=1.0)
+                path = point.gait.angles(_PHASES)
+                # a mirror image is the same gait
+                mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
+                panel.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
             panel.set(xlabel="joint angle 1  [rad]", ylabel="joint angle 2  [rad]", aspect="equal")
     return figure
