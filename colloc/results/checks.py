@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class Certificate:
     value_error_at_zero_delta: float = float("nan")
     rotation: float = float("nan")
     length: float = float("nan")
-    driven_work: float = float("nan")
+    driven_work: float = field(default=float("nan"), compare=False)
 
     def __post_init__(self) -> None:
         for name, usual in _USUAL.items():
