@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait_fields import BODIES, CLASSES, GAITS, AnyClass, AnyGait, body_from, class_from, fields, gait_from
-from colloc.gaits.guesses import travelling_wave
+from colloc.gaits.guesses import Limit, checked_limit, travelling_wave, under_one_limit
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.path_classes import FreePath
@@ -64,9 +64,9 @@ class Problem:
     delta_start : float
         Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), and 0.01 where delta is measured at unit
         shape speed.
-    joint_limit : float
-        Largest |joint angle| [rad], at most pi; of a smooth body, largest |tangent angle| from its mean direction, at most
-        pi/2.
+    joint_limit : float or sequence of float
+        Largest |joint angle| [rad], at most pi, of all joints or of each; of a smooth body, largest |tangent angle| from its
+        mean direction, at most pi/2.
     smallest_shape_speed : float
         Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
         2 pi. It keeps the search away from gaits
@@ -112,7 +112,7 @@ class Problem:
     gait: AnyClass = None
     delta: float = None  # type: ignore[assignment]
     delta_start: float = None  # type: ignore[assignment]
-    joint_limit: float = None  # type: ignore[assignment]
+    joint_limit: Limit = None  # type: ignore[assignment]
     smallest_shape_speed: float = 0.1
     intervals: int = None  # type: ignore[assignment]
     scheme: str = "gauss-3"
@@ -166,7 +166,7 @@ class Problem:
             raise ProblemError(f"{what}; leave gait out, or take another body.")
 
     def _check_numbers(self) -> None:
-        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
+        for field in ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
@@ -179,10 +179,7 @@ class Problem:
             )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
-        largest = self.body.usual.largest_limit
-        if not 0 < self.joint_limit <= largest + 1e-12:
-            most = f"pi/{np.pi / largest:g}".removesuffix("/1")
-            raise ProblemError(f"joint_limit must lie in (0, {most}], not {self.joint_limit:g}.")
+        object.__setattr__(self, "joint_limit", checked_limit(self.body, self.joint_limit))
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
@@ -266,13 +263,14 @@ class Problem:
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
             )
         angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
-        largest = self.body.largest_angles(angles).max()
-        if largest > self.joint_limit + self.body.usual.excess:
-            each = np.abs(self.body.limited @ angles).max(axis=1, initial=0.0)
+        stretched, limit = under_one_limit(angles, self.joint_limit)
+        largest = self.body.largest_angles(stretched).max()
+        if largest > limit + self.body.usual.excess:
+            each = np.abs(self.body.limited @ stretched).max(axis=1, initial=0.0)
             which = self.body.limit_names[np.argmax(each)] if each.size else "the tangent"
             raise ProblemError(
                 f"guess is inadmissible: {which} reaches {largest:.4g} rad, "
-                f"beyond the limit {self.joint_limit:.4g}; make its amplitude smaller."
+                f"beyond the limit {limit:.4g}; make its amplitude smaller."
             )
         depth = self.body.crossing_depth(angles)
         if depth.max() > _SLACK:
