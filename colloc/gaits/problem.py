@@ -236,6 +236,8 @@ class Problem:
                 f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
                 f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."
             )
+        if BILATERAL in needed and np.ndim(self.joint_limit) and self.joint_limit != self.joint_limit[::-1]:  # type: ignore[index]
+            raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same joint_limit.")
         if self.gait.unit_speed and self.body.n_joint < 2:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
