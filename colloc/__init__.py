@@ -27,10 +27,11 @@ from colloc.system.late_binding import bind
 
 if TYPE_CHECKING:
     from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+    from colloc.gaits.objective import Objective
     from colloc.gaits.path_classes import FreePath, Polygon
     from colloc.gaits.paths import ArcPath, Corners
-    from colloc.gaits.problem import Problem, Reference
-    from colloc.gaits.problem_file import load_problem
+    from colloc.gaits.problem import Problem
+    from colloc.gaits.problem_file import Reference, load_problem
     from colloc.gaits.relaxed import Relaxed
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
@@ -43,13 +44,15 @@ if TYPE_CHECKING:
     from colloc.smooth.modal_body import ModalBody
     from colloc.smooth.prescribed_body import Wave
     from colloc.studies.calls import Starts, multistart, solve, sweep
+    from colloc.studies.pareto import pareto_front
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
     from colloc.verification.replay import replay
 
 _HOME = {
-    "gaits.problem": ("Problem", "Reference"),
-    "gaits.problem_file": ("load_problem",),
+    "gaits.problem": ("Problem",),
+    "gaits.problem_file": ("Reference", "load_problem"),
+    "gaits.objective": ("Objective",),
     "mechanics.body": ("Chain",),
     "smooth.modal_body": ("ModalBody",),
     "smooth.concertina": ("Concertina",),
@@ -62,6 +65,7 @@ _HOME = {
     "search.optimise": ("maximise_efficiency",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
+    "studies.pareto": ("pareto_front",),
     "results.solution": ("Solution",),
     "results.store": ("load", "save"),
     "results.certificate": ("certify",),
@@ -84,6 +88,7 @@ __all__ = [
     "Harmonic",
     "ModalBody",
     "NotConvergedError",
+    "Objective",
     "Polygon",
     "Problem",
     "ProblemError",
@@ -100,6 +105,7 @@ __all__ = [
     "load_problem",
     "maximise_efficiency",
     "multistart",
+    "pareto_front",
     "replay",
     "save",
     "solve",
@@ -113,6 +119,7 @@ bind(
         "plot": "colloc.pictures.figure:solution_figure",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
+        "plot_front": "colloc.pictures.front_figure:front_figure",
     }
 )
 

@@ -33,6 +33,7 @@ ORDER = (
         "How to",
         (
             *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "check", "starts")),
+            "objectives.md",
             "studies.md",
             "cluster.md",
             "howto/paper.md",

@@ -6,6 +6,8 @@ import warnings
 from pathlib import Path
 
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
+from colloc.gaits.guesses import widest
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
@@ -17,14 +19,18 @@ CACHE = "bounds.sqlite"
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
-    None for bodies that are no chains. A cache that cannot be read or written is left as it is, with a `ChangedFileWarning`:
-    no result depends on it.
+    None for bodies that are no chains, other objectives, and gaits that turn. A cache that cannot be read or written is left
+    as it is, with a `ChangedFileWarning`: no result depends on it.
     """
     if not isinstance(problem.body, Chain):
         if compute:
             raise ProblemError("upper bounds are computed for chains of links only; for this body there is 1/min(mu).")
         return None
-    domain, cache = (problem.body, problem.friction, problem.joint_limit), folder / CACHE
+    if not _bounded(problem):
+        if compute:
+            raise ProblemError("upper bounds are of the efficiency of gaits that do not turn.")
+        return None
+    domain, cache = (problem.body, problem.friction, widest(problem.joint_limit)), folder / CACHE
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:
@@ -32,10 +38,16 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
         return efficiency_bound(*domain) if compute else None
 
 
+def _bounded(problem: Problem) -> bool:
+    return problem.objective == EFFICIENCY and problem.rotation == 0
+
+
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
     """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq. lambdaupper)."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
+    if not _bounded(problem):
+        return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.friction.smallest
     tighter = "; --bound computes a tighter one" if isinstance(problem.body, Chain) else ""
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

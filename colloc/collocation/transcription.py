@@ -13,6 +13,7 @@ turns the motion into that direction; nothing is imposed on the sideways displac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -21,9 +22,20 @@ from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
-from colloc.collocation.point_equations import N_RATE, gait_check, mean_square, minus_efficiency, point_function
+from colloc.collocation.point_equations import (
+    N_RATE,
+    BlockParts,
+    driven_point,
+    gait_check,
+    mean_square,
+    objective_block,
+    path_pace,
+    period_rows,
+    point_function,
+)
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.guesses import widest
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
@@ -157,6 +169,14 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         np.empty((0, 1)),
     )
 
+    none, own = np.empty((0, mesh.n_point)), np.concatenate([layout.angles, layout.rates, layout.forces])
+    densities: dict[str, Callable[[], BlockParts]] = {
+        "length": lambda: (path_pace(n_joint), layout.rates, none),
+        "driven_work": lambda: (driven_point(problem.body, problem.friction), own, none),
+    }
+    of_period = period_rows(problem, layout, mesh, densities, RADIANS)
+    blocks |= {name: parts for name, (parts, _) in of_period.items()}
+
     rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
     groups = [
         gait_group("angles", layout.angles, layout.parameters, problem.gait.angle_matrix(mesh.times, n_joint), layout.n),
@@ -173,6 +193,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
             sparse.csr_matrix((1, layout.n)),
             {"shape speed": sparse.eye(1, format="csr")},
         ),
+        *(group for _, group in of_period.values()),
     ]
     velocity = ImplicitVelocity(problem.body, problem.friction, mesh.n_point)
 
@@ -180,12 +201,6 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
         return velocity(angles, rates, z, delta)
 
-    objective = Block(
-        minus_efficiency(),
-        np.array([[layout.distance[0, -1]], [layout.work[0, -1]]]),
-        sparse.eye(1, format="csr"),
-        np.empty((0, 1)),
-    )
     ends = np.cumsum([0] + [g.m for g in groups])
     return Transcription(
         problem,
@@ -193,7 +208,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         layout,
         Assembly(
             layout.n,
-            objective,
+            objective_block(problem, layout),
             tuple(
                 Block(
                     function,
@@ -218,7 +233,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
 def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
     # a function bounded by L has Fourier coefficients of at most 4 L / pi
-    lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * problem.joint_limit / np.pi
+    lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * widest(problem.joint_limit) / np.pi
     if layout.forces.size:
         limit = problem.body.largest_forces(problem.friction)
         lower[layout.forces], upper[layout.forces] = -limit, limit
@@ -240,7 +255,10 @@ def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Gr
     """theta' = omega, and how theta closes where no symmetry does it."""
     state, rate = mesh.integration()
     linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
-    return [equalities("orientation", linear), *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n)]
+    return [
+        equalities("orientation", linear),
+        *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n, problem.rotation),
+    ]
 
 
 def _check_group(check: ShapeCheck, problem: Problem, n_cell: int, n: int) -> Group:

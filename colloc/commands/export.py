@@ -62,6 +62,8 @@ def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Seque
         "body": solution.problem.body.describe(),
         "friction": {key: getattr(solution.problem.friction, key) for key in ("mu_t", "mu_f", "mu_b")},
         "efficiency": measured.efficiency,
+        "objective": solution.problem.objective.name,
+        "value": measured.value,
         "distance_per_period_body_lengths": measured.distance,
         "work_per_period_weight_times_length": measured.work,
         "problem_hash": solution.problem.hash,

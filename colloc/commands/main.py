@@ -12,13 +12,14 @@ from colloc.system.processors import one_thread_each
 
 SUBCOMMANDS = {
     "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
-    "solve": ("solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
+    "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
     "multistart": (
         "multistart",
         "solve a problem from many random starts; distinct optima with their frequencies",
     ),
     "open": ("open", "what an archive of starts holds; the whole result of one of them"),
     "sweep": ("sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
+    "pareto": ("pareto", "what two objectives cost each other: a front of certified gaits"),
     "verify": ("verify", "check a result again by independent replay, without CasADi"),
     "compare": ("compare", "hold two results against each other"),
     "report": ("report", "one self-contained web page about a result, to read or to send"),

@@ -1,4 +1,4 @@
-"""A problem: body, friction, class of gaits, guess and discretisation; frozen and validated when it is made."""
+"""A problem: body, friction, class of gaits, objective, guess and discretisation; frozen and validated when it is made."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait_fields import BODIES, CLASSES, GAITS, AnyClass, AnyGait, body_from, class_from, fields, gait_from
-from colloc.gaits.guesses import travelling_wave
+from colloc.gaits.guesses import Limit, checked_limit, travelling_wave, under_one_limit
 from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.gaits.prescribed import Prescribed
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -28,6 +29,8 @@ SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 LONGEST_NAME = 200
 """File systems allow 255 bytes, and results of a problem add endings to its name."""
+_AIMS = 3
+"""The last fields say what is asked of a gait: objective, rotation, at_least."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Depth of a crossing at which a guess still counts as admissible: what a certificate allows."""
@@ -36,34 +39,10 @@ _AT_THE_BOUND = 1e-2
 corners and makes it a little shorter."""
 
 
-@dataclass(frozen=True)
-class Reference:
-    """A value to hold the result against.
-
-    Parameters
-    ----------
-    efficiency : float
-    tolerance : float
-        Largest difference that counts as agreement.
-    source : str
-        Where the value comes from.
-
-    Examples
-    --------
-    >>> from colloc import Reference
-    >>> Reference(efficiency=0.259, tolerance=0.0015, source="S. Alben (2019)").efficiency
-    0.259
-    """
-
-    efficiency: float
-    tolerance: float
-    source: str
-
-
 @named_arguments
 @dataclass(frozen=True, repr=False)
 class Problem:
-    """Maximise d/W over a class of gaits.
+    """Maximise an objective over a class of gaits: by default the efficiency d/W.
 
     Parameters
     ----------
@@ -85,9 +64,9 @@ class Problem:
     delta_start : float
         Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), and 0.01 where delta is measured at unit
         shape speed.
-    joint_limit : float
-        Largest |joint angle| [rad], at most pi; of a smooth body, largest |tangent angle| from its mean direction, at most
-        pi/2.
+    joint_limit : float or sequence of float
+        Largest |joint angle| [rad], at most pi, of all joints or of each; of a smooth body, largest |tangent angle| from its
+        mean direction, at most pi/2.
     smallest_shape_speed : float
         Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
         2 pi. It keeps the search away from gaits
@@ -101,7 +80,15 @@ class Problem:
         forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver. The
         first is usual for chains; of smooth bodies there is only the second.
     mesh_tolerance : float
-        Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
+        Relative error of the objective to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
+    objective : Objective or str
+        What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", "driven efficiency", or an expression
+        of distance, work, rotation, length and driven_work of a period.
+    rotation : float or None
+        Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than 0 need a class without
+        symmetry.
+    at_least : mapping or pairs of (Objective or str, float)
+        Values of a period that must be reached, as ``{"distance": 0.3}``.
 
     Examples
     --------
@@ -125,12 +112,15 @@ class Problem:
     gait: AnyClass = None
     delta: float = None  # type: ignore[assignment]
     delta_start: float = None  # type: ignore[assignment]
-    joint_limit: float = None  # type: ignore[assignment]
+    joint_limit: Limit = None  # type: ignore[assignment]
     smallest_shape_speed: float = 0.1
     intervals: int = None  # type: ignore[assignment]
     scheme: str = "gauss-3"
     formulation: str = None  # type: ignore[assignment]
     mesh_tolerance: float = 3e-5
+    objective: Objective = EFFICIENCY
+    rotation: float | None = 0.0
+    at_least: tuple[tuple[Objective, float], ...] = ()
 
     def __post_init__(self) -> None:
         self._check_body()
@@ -142,6 +132,7 @@ class Problem:
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
+        self._check_aims()
         if self.guess is None:
             free = self.gait.free
             self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
@@ -175,7 +166,7 @@ class Problem:
             raise ProblemError(f"{what}; leave gait out, or take another body.")
 
     def _check_numbers(self) -> None:
-        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
+        for field in ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
@@ -188,10 +179,7 @@ class Problem:
             )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
-        largest = self.body.usual.largest_limit
-        if not 0 < self.joint_limit <= largest + 1e-12:
-            most = f"pi/{np.pi / largest:g}".removesuffix("/1")
-            raise ProblemError(f"joint_limit must lie in (0, {most}], not {self.joint_limit:g}.")
+        object.__setattr__(self, "joint_limit", checked_limit(self.body, self.joint_limit))
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
@@ -204,6 +192,31 @@ class Problem:
         self._check_resolution()
         if self.intervals > 100_000:
             raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
+
+    def _check_aims(self) -> None:
+        object.__setattr__(self, "objective", objective_from(self.objective))
+        object.__setattr__(self, "at_least", least_values(self.at_least))
+        if self.rotation is not None and (isinstance(self.rotation, bool) or not abs(self.rotation) < np.inf):
+            raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
+        if self.rotation == 0 and self.uses("rotation"):
+            raise ProblemError("the objective speaks of the rotation, which is 0 unless rotation says otherwise (None: free).")
+        if self.rotation != 0 and self.gait.symmetry != NONE:
+            raise ProblemError(
+                f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class without symmetry."
+            )
+        if self.uses("driven_work") and self.formulation != FULL:
+            raise ProblemError(f"driven_work needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
+        if not self.gait.free and (self.objective != EFFICIENCY or self.at_least):
+            raise ProblemError("nothing is free in a prescribed motion; leave objective and at_least out.")
+
+    @property
+    def aims(self) -> tuple[Objective, ...]:
+        """The objective, then the values that are to be reached at least."""
+        return (self.objective, *(aim for aim, _ in self.at_least))
+
+    def uses(self, quantity: str) -> bool:
+        """Whether the objective or what must be reached speaks of a quantity of `colloc.gaits.objective.QUANTITIES`."""
+        return any(quantity in aim.uses for aim in self.aims)
 
     def _check_resolution(self) -> None:
         collocation, kind = scheme(self.scheme), type(self.gait).__name__
@@ -223,6 +236,8 @@ class Problem:
                 f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
                 f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."
             )
+        if BILATERAL in needed and np.ndim(self.joint_limit) and self.joint_limit != self.joint_limit[::-1]:  # type: ignore[index]
+            raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same joint_limit.")
         if self.gait.unit_speed and self.body.n_joint < 2:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
@@ -250,13 +265,14 @@ class Problem:
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
             )
         angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
-        largest = self.body.largest_angles(angles).max()
-        if largest > self.joint_limit + self.body.usual.excess:
-            each = np.abs(self.body.limited @ angles).max(axis=1, initial=0.0)
+        stretched, limit = under_one_limit(angles, self.joint_limit)
+        largest = self.body.largest_angles(stretched).max()
+        if largest > limit + self.body.usual.excess:
+            each = np.abs(self.body.limited @ stretched).max(axis=1, initial=0.0)
             which = self.body.limit_names[np.argmax(each)] if each.size else "the tangent"
             raise ProblemError(
                 f"guess is inadmissible: {which} reaches {largest:.4g} rad, "
-                f"beyond the limit {self.joint_limit:.4g}; make its amplitude smaller."
+                f"beyond the limit {limit:.4g}; make its amplitude smaller."
             )
         depth = self.body.crossing_depth(angles)
         if depth.max() > _SLACK:
@@ -265,8 +281,9 @@ class Problem:
 
     def __repr__(self) -> str:
         mu, coordinates = self.friction, f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
+        best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         return (
-            f"<Problem {self.name}: {coordinates}, friction ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}), "
+            f"<Problem {self.name}: {best}{coordinates}, friction ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}), "
             f"{self.gait.describe()}, delta {self.delta:.0e}>"
         )
 
@@ -279,7 +296,10 @@ class Problem:
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         for name in ("guess", "gait", "body", "friction"):
             stated[name] = fields(stated[name])
-        return stated
+        # what is as usual is left out, as files that know of nothing else leave it out
+        usual = [f.name for f in dataclasses.fields(self)[-_AIMS:] if stated[f.name] == f.default]
+        stated |= {"objective": self.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in self.at_least]}
+        return {name: value for name, value in stated.items() if name not in usual}
 
     @classmethod
     def from_dict(cls, stated: dict) -> Problem:

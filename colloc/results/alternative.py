@@ -13,8 +13,8 @@ class Alternative:
 
     Attributes
     ----------
-    efficiency : float
-        As collocation sees it on a coarse mesh, which may be a little more than a fine one would.
+    value : float
+        Of the objective, as collocation sees it on a coarse mesh, which may be a little more than a fine one would.
     delta : float
         To which it was followed.
     starts : int
@@ -24,7 +24,7 @@ class Alternative:
     gait : AnyGait
     """
 
-    efficiency: float
+    value: float
     delta: float
     starts: int
     on_speed_floor: bool
@@ -32,4 +32,4 @@ class Alternative:
 
     def __str__(self) -> str:
         size = ", as small as its bound allows" if self.on_speed_floor else ""
-        return f"{self.efficiency:.4f} at delta {self.delta:.0e} ({self.starts} start{'s' * (self.starts > 1)}{size})"
+        return f"{self.value:.4f} at delta {self.delta:.0e} ({self.starts} start{'s' * (self.starts > 1)}{size})"
