@@ -165,8 +165,9 @@ def minimised(
     curvature : (n, n), optional
         Of the first model; by default 1. Where a model leads nowhere, it begins anew with that.
     """
+    v = np.clip(v, program.lower, program.upper)
     lower, upper = np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
-    here, fresh = _Point.at(program, np.clip(v, lower, upper)), curvature is None
+    here, fresh = _Point.at(program, v), curvature is None
     b, price, feasible = np.eye(v.size) if curvature is None else curvature, np.zeros(here.rows.size), max(accuracy, _FEASIBLE)
     gradient, slopes, count, evaluations = program.gradient(here.v), program.row_slopes(here.v), 0, 1
     with interruptible():

@@ -1,8 +1,9 @@
 """The best gait, not the nearest one: many starts, cheaply told apart, the promising ones followed to the end.
 
 A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it meets a gait that an
-earlier start came through, at the same delta, it goes on as that one did, and is dropped. What is left is sorted by its value;
-the first few are followed to the final delta, and the best of those is refined, answered and certified.
+earlier start came through, at the same delta, it goes on as that one did, and is dropped. The last starts are not new ones but
+hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). What is left is sorted by its value; the first
+few are followed to the final delta, and the best of those is refined, answered and certified.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ import numpy as np
 from colloc.gaits.equivalence import distance
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
-from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor, seed_class
 from colloc.mechanics.body import Chain
 from colloc.reduced.closure import closed_gait
+from colloc.reduced.program import SearchSpace
 from colloc.reduced.spaces import space_near
 from colloc.results.alternative import Alternative
 from colloc.results.search_step import SearchStep
@@ -40,7 +42,7 @@ from colloc.search.reduced_search import (
 )
 from colloc.system.errors import CollocError, NotConvergedError
 
-STARTS = 16
+STARTS = 32
 _FEWEST = 12
 """Intervals of a coarse mesh, at least; else half of what the class asks for."""
 _LEVELS = (1.0, 0.2)
@@ -48,9 +50,12 @@ _LEVELS = (1.0, 0.2)
 _SAME_EFFICIENCY, _SAME_GAIT = 1e-3, 0.05
 _FOLLOWED, _PROMISING, _CLOSE = 3, 0.8, 0.01
 """How many gaits are followed to the final delta, the share of the best value that they need at the coarse one, and how
-far they may be from the best at the final one to be optimised as exactly."""
-_ROUNDS = 2
-"""Of moving the checks, in that: refinement goes on from there."""
+far they may be from the best at the final one to be optimised on the whole mesh."""
+_HOPS, _HOP_SIZES, _HOP_SEED = 0.5, (0.2, 0.4, 0.8), 1
+"""The share of the starts that hop from the best gait known, and how far [rad]. Optima lie near each other: of 16 independent
+starts none led to the best gait of the tutorial, of twelve hops one or two."""
+_ROUNDS = 3
+"""Of moving the checks at each delta, where a gait is followed: refinement goes on from there."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction."""
 _HARMONICS = 8
@@ -102,16 +107,36 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
     coarse = problem.with_(intervals=intervals)
     deltas = [max(factor * problem.delta_start, problem.delta) for factor in _LEVELS]
     known: list[list[Candidate]] = [[] for _ in deltas]
-    tried = 0
-    for start, gait in enumerate(starting_gaits(problem, count)):
+    tried, hops = 0, int(_HOPS * count)
+    starts = starting_gaits(problem, count - hops)
+    for start in range(count):
         if start > 0 and not goes_on():
             break
         tried += 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
-            _follow(coarse, gait, start, deltas, known)
+            gait = next(starts, None)
+            if gait is not None:
+                _follow(*space_near(coarse, closed_gait(coarse, gait, deltas[0])), start, deltas, known)
+            elif known[-1]:
+                shaken = _shaken(problem, min((c.found for c in known[-1]), key=lambda f: f.objective).gait, start)
+                _follow(*space_near(coarse, shaken), start, deltas[-1:], known[-1:])
         watch(_step("starts", tried, count, [c.found for c in known[-1]]))
     return sorted(known[-1], key=lambda c: c.found.objective), tried
+
+
+def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
+    """The Fourier series of a gait with every coefficient moved by chance: where the next hop from basin to basin lands."""
+    own, rng = seed_class(problem), np.random.default_rng([_HOP_SEED, number])
+    series = fourier_through(gait, own)
+    size = _HOP_SIZES[number % len(_HOP_SIZES)]
+    falling = size / np.arange(1, series.cos.shape[1] + 1)
+    moved = Fourier(
+        series.mean + size * rng.normal(size=series.mean.shape),
+        series.cos + falling * rng.normal(size=series.cos.shape),
+        series.sin + falling * rng.normal(size=series.sin.shape),
+    )
+    return own.fourier(own.parameters(moved), problem.body.n_joint)
 
 
 def _step(what: str, done: int, count: int, found: Sequence[Found]) -> SearchStep:
@@ -119,9 +144,9 @@ def _step(what: str, done: int, count: int, found: Sequence[Found]) -> SearchSte
     return SearchStep(what, done, count, np.nan if best is None else -best.objective, np.nan if best is None else best.delta)
 
 
-def _follow(problem: Problem, gait: AnyGait, start: int, deltas: list[float], known: list[list[Candidate]]) -> None:
+def _follow(space: SearchSpace, v: np.ndarray, start: int, deltas: list[float], known: list[list[Candidate]]) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
-    space, v = space_near(problem, closed_gait(problem, gait, deltas[0]))
+    problem = space.problem
     before, radius = None, FIRST_RADIUS
     for delta, here in zip(deltas, known, strict=True):
         found = settled_apart(space, v, delta, radius, VERY_ROUGH)
@@ -234,8 +259,8 @@ def _followed(problem: Problem, found: Found) -> list[Found]:
     edges = found.space.phase_mesh(found.gait).edges
     finer = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
     space, v = space_near(problem, found.gait, finer)
-    levels = [settled_apart(space, v, found.delta, NEXT_RADIUS, VERY_ROUGH)]
-    descended(levels[0], problem, levels.append, VERY_ROUGH)
+    levels = [settled_apart(space, v, found.delta, NEXT_RADIUS, ROUGH, rounds=_ROUNDS)]
+    descended(levels[0], problem, levels.append, _ROUNDS)
     return levels
 
 

@@ -152,10 +152,10 @@ def deltas(problem: Problem, first: float) -> list[float]:
     return levels
 
 
-def descended(found: Found, problem: Problem, report: Report, accuracy: float = ROUGH) -> Found:
-    """From a gait at some delta down to the problem's, on the same mesh."""
+def descended(found: Found, problem: Problem, report: Report, rounds: int | None = None) -> Found:
+    """From a gait at some delta down to the problem's, on the same mesh; `rounds` as in `settled`."""
     for delta in deltas(problem, found.delta)[1:]:
-        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, accuracy, found.curvature)
+        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, ROUGH, found.curvature, rounds)
         report(found)
     return found
 
