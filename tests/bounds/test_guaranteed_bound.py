@@ -1,5 +1,6 @@
 """The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities are what they claim."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -245,9 +246,19 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
     assert "left open" in with_guarantee(bound, certificate).missing
 
 
-def test_friction_without_a_potential_has_no_proof(bound):
+@pytest.mark.parametrize(
+    ("body", "friction", "harmonics"),
+    [
+        (BODY, Friction(2.0, 1.0, 1.0), (1,)),
+        (Chain((0.3, 0.4, 0.3)), Friction(), (1,)),
+        (Chain((0.25,) * 4), Friction(), (1,)),
+        (BODY, Friction(), (1, 3)),
+    ],
+    ids=["no potential", "unequal links", "four links", "higher harmonics"],
+)
+def test_what_the_proof_does_not_cover_is_refused(bound, body, friction, harmonics):
     with pytest.raises(ProblemError, match="isotropic"):
-        certify(BODY, Friction(2.0, 1.0, 1.0), bound, 0.5)
+        certify(body, friction, dataclasses.replace(bound, harmonics=harmonics), 0.5, seconds=0.0)
 
 
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
