@@ -7,6 +7,7 @@ A fixture of a module or session is set up in its first test only; what it calls
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import sys
@@ -107,7 +108,15 @@ def load(path: Path) -> list[Test]:
     return [Test(name, seconds, frozenset(calls)) for name, seconds, calls in rows]
 
 
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path, help="JSON to write")
+    parser.add_argument("tests", nargs="+", help="folders or files of tests")
+    options = parser.parse_args()
+    found, code = recorded(tuple(options.tests))
+    save(found, options.file)
+    sys.exit(code)
+
+
 if __name__ == "__main__":
-    found, ended = recorded(tuple(sys.argv[2:]))
-    save(found, Path(sys.argv[1]))
-    sys.exit(ended)
+    main()

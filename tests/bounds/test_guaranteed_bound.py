@@ -1,5 +1,6 @@
 """The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities are what they claim."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -227,6 +228,17 @@ def test_no_gait_of_the_isotropic_body_reaches_nine_tenths(bound):
     assert 0 < certificate.distance_allowance(1.0, 1e-6) < 1e-3
 
 
+@pytest.mark.parametrize(("target", "closed"), [(0.46, True), (0.44, False)])
+def test_a_body_on_twice_the_friction_goes_half_as_far_for_its_work(bound, monkeypatch, target, closed):
+    """Cells are bounded for coefficients of 1: by 0.9 here."""
+    cells = lambda body, reference, low, *rest: (np.full(low.shape[1], 0.9), np.full(low.shape[1], 8.0))  # noqa: E731
+    monkeypatch.setattr(bound_margin, "_cell_bounds", cells)
+    certificate = certify(BODY, Friction(2.0, 2.0, 2.0), bound, target, deepest=0)
+    assert (certificate.open_cells == 0) == closed
+    assert certificate.guaranteed == pytest.approx(target if closed else 0.45)
+    assert certificate.largest_multiplier == (4.0 if closed else 0.0)
+
+
 def test_out_of_time_says_what_is_proved_so_far(bound):
     certificate = certify(BODY, Friction(), bound, 0.5, seconds=0.0)
     assert certificate.open_cells > 0
@@ -234,9 +246,19 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
     assert "left open" in with_guarantee(bound, certificate).missing
 
 
-def test_friction_without_a_potential_has_no_proof(bound):
+@pytest.mark.parametrize(
+    ("body", "friction", "harmonics"),
+    [
+        (BODY, Friction(2.0, 1.0, 1.0), (1,)),
+        (Chain((0.3, 0.4, 0.3)), Friction(), (1,)),
+        (Chain((0.25,) * 4), Friction(), (1,)),
+        (BODY, Friction(), (1, 3)),
+    ],
+    ids=["no potential", "unequal links", "four links", "higher harmonics"],
+)
+def test_what_the_proof_does_not_cover_is_refused(bound, body, friction, harmonics):
     with pytest.raises(ProblemError, match="isotropic"):
-        certify(BODY, Friction(2.0, 1.0, 1.0), bound, 0.5)
+        certify(body, friction, dataclasses.replace(bound, harmonics=harmonics), 0.5, seconds=0.0)
 
 
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])

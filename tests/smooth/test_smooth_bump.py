@@ -27,6 +27,15 @@ def test_modes_and_slopes():
     assert value.shape == (41, 4)
 
 
+def test_the_second_half_of_a_motion_is_the_mirror_image_of_the_first():
+    vertices = np.random.default_rng(3).normal(size=(BODY.n, 4)) * 0.2
+    motion, t = BODY.motion(vertices), np.linspace(0.01, 0.49, 17)
+    s = np.linspace(0.4, 0.6, 31)[:, None] * np.ones((1, 17))
+    for of in (motion.angle, motion.rate):
+        assert np.abs(of(s, t)).max() > 0.1
+        np.testing.assert_allclose(of(s, t + 0.5), -of(s, t), atol=1e-12)
+
+
 @pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1.0, 1.3)])
 def test_balance_and_power_agree_with_the_general_solver(friction):
     """The same motion by links plus one bump, and by adaptive panels along the whole body."""
