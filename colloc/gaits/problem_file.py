@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pprint
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,6 +95,19 @@ def load_problem(path: str | os.PathLike[str]) -> Problem:
     <Problem three_link: 2 joints, friction (1, 1, 1), 1 harmonic, symmetry bilateral, delta 1e-04>
     """
     return read_problem_file(path).problem
+
+
+def problem_file_text(problem: Problem) -> str:
+    """A problem file that states this problem, whatever it was stated by.
+
+    Examples
+    --------
+    >>> from colloc import Problem
+    >>> print(problem_file_text(Problem("mine")).splitlines()[2])
+    PROBLEM = Problem.from_dict(
+    """
+    stated = pprint.pformat(problem.to_dict(), sort_dicts=False, width=100)
+    return f"from colloc import Problem\n\nPROBLEM = Problem.from_dict(\n{stated}\n)\n"
 
 
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:

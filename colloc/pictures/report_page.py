@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.objective import EFFICIENCY
-from colloc.gaits.problem_file import Reference
+from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.style import INK, styled
@@ -111,6 +111,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             policy=_POLICY,
             fields={name: json.dumps(value) for name, value in solution.problem.to_dict().items()},
             commands=_commands(solution),
+            source=solution.source or problem_file_text(solution.problem),
             **found,
         )
     )
@@ -147,10 +148,11 @@ def _comparison(solution: Solution, reference: Reference | None) -> str:
 
 def _commands(solution: Solution) -> str:
     p = solution.problem
+    starts = f" --starts {solution.starts}" if solution.starts > 1 else ""
     return (
         f"# save the problem source above as {p.name}.py, then\n"
         f"colloc solve {p.name}.py --delta {p.delta:g} --delta-start {p.delta_start:g} --mesh {p.intervals} "
-        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation '{p.formulation}'\n"
+        f"--mesh-tolerance {p.mesh_tolerance:g} --scheme {p.scheme} --formulation '{p.formulation}'{starts}\n"
         f"colloc verify results/{p.name}.h5"
     )
 

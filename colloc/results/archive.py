@@ -146,7 +146,10 @@ def archive_at(path: str | os.PathLike[str]) -> Archive:
     rows = row_path(path)
     stated = read_rows(rows, ROWS).values.get(_PROBLEM) if rows.exists() else None
     if stated is None:
-        raise StoreError(f"there is no archive of starts at {rows}; colloc multistart makes one.")
+        what = f"there is no archive of starts at {path}"
+        if os.path.isfile(path):
+            what = f"{path} is no archive of starts, or {rows.name}, which holds its rows, is not beside it"
+        raise StoreError(f"{what}; colloc multistart makes one.")
     return open_archive(Problem.from_dict(stated), Path(path).with_suffix(".h5"))
 
 

@@ -74,11 +74,12 @@ def test_bad_input_is_refused_in_one_sentence_and_as_one_json_object(name, place
     assert sorted(place.iterdir()) == before
 
 
-def test_a_wrong_value_of_an_option_is_named_without_words_of_programmers(place, capsys):
+def test_what_is_wrong_is_named_without_words_of_programmers(place, capsys):
     for words, message in (
         ("solve problem.py --mesh x", "--mesh must be a whole number, not 'x'"),
         ("solve problem.py --delta x", "--delta must be a number, not 'x'"),
         ("export good.h5 --format x", "--format must be one of 'csv', 'json', not 'x'"),
+        ("open good.h5", "good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it"),
     ):
         assert colloc(words.split()) == 2
         assert message in capsys.readouterr().err

@@ -18,7 +18,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.problem import Problem
-from colloc.gaits.problem_file import Reference
+from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames
@@ -271,3 +271,22 @@ def test_a_notebook_shows_a_card(three_link):
         assert words in text
     failed = Solution(three_link.problem, [], message="no first level.")
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)
+
+
+def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three_link, tmp_path):
+    solution = replace(three_link, source="")
+    text = unescape(report_page(solution))
+    stated = text[text.index("from colloc import Problem") : text.index("</code>", text.index("from colloc import Problem"))]
+    (tmp_path / "stated.py").write_text(stated, encoding="utf-8")
+    assert load_problem(tmp_path / "stated.py").hash == three_link.problem.hash
+    assert "save the problem source above" in text
+
+
+def test_levels_on_the_way_do_not_alarm_and_the_last_one_does(three_link):
+    rough = replace(three_link.levels[0], optimal=False, status="not stationary")
+    good = replace(three_link, levels=[rough, *three_link.levels[1:]])
+    text = " ".join(outline(report_page(good)).text)
+    assert "on the way" in text
+    assert "✗" not in text
+    bad = replace(three_link, levels=[*three_link.levels[:-1], rough])
+    assert "✗ not stationary" in " ".join(outline(report_page(bad)).text)
