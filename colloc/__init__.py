@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from colloc.gaits.problem import Problem, Reference
     from colloc.gaits.problem_file import load_problem
     from colloc.gaits.relaxed import Relaxed
+    from colloc.laws.elliptic import Elliptic
+    from colloc.laws.own_law import OwnLaw
+    from colloc.laws.power_law import PowerLaw
+    from colloc.laws.viscous import Viscous
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
@@ -55,6 +59,10 @@ _HOME = {
     "smooth.concertina": ("Concertina",),
     "smooth.prescribed_body": ("Wave",),
     "mechanics.friction": ("Friction",),
+    "laws.elliptic": ("Elliptic",),
+    "laws.viscous": ("Viscous",),
+    "laws.power_law": ("PowerLaw",),
+    "laws.own_law": ("OwnLaw",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
     "gaits.relaxed": ("Relaxed",),
@@ -78,13 +86,16 @@ __all__ = [
     "CollocError",
     "Concertina",
     "Corners",
+    "Elliptic",
     "Fourier",
     "FreePath",
     "Friction",
     "Harmonic",
     "ModalBody",
     "NotConvergedError",
+    "OwnLaw",
     "Polygon",
+    "PowerLaw",
     "Problem",
     "ProblemError",
     "Reference",
@@ -93,6 +104,7 @@ __all__ = [
     "Starts",
     "StoreError",
     "Study",
+    "Viscous",
     "Wave",
     "certify",
     "ellipse",

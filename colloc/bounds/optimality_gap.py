@@ -8,6 +8,7 @@ from pathlib import Path
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 
 CACHE = "bounds.sqlite"
@@ -17,14 +18,17 @@ CACHE = "bounds.sqlite"
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
-    None for bodies that are no chains. A cache that cannot be read or written is left as it is, with a `ChangedFileWarning`:
-    no result depends on it.
+    None for bodies that are no chains, and for laws other than Coulomb's. A cache that cannot be read or written is left as it
+    is, with a `ChangedFileWarning`: no result depends on it.
     """
-    if not isinstance(problem.body, Chain):
+    friction = problem.friction
+    if not isinstance(problem.body, Chain) or type(friction) is not Friction:
         if compute:
-            raise ProblemError("upper bounds are computed for chains of links only; for this body there is 1/min(mu).")
+            raise ProblemError(
+                "upper bounds are computed for chains of links under Coulomb friction only; for this one there is 1/min(mu)."
+            )
         return None
-    domain, cache = (problem.body, problem.friction, problem.joint_limit), folder / CACHE
+    domain, cache = (problem.body, friction, problem.joint_limit), folder / CACHE
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:
@@ -37,5 +41,6 @@ def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
     if bound is not None:
         return f"  {bound.report(efficiency)}"
     limit = 1.0 / problem.friction.smallest
-    tighter = "; --bound computes a tighter one" if isinstance(problem.body, Chain) else ""
+    known = isinstance(problem.body, Chain) and type(problem.friction) is Friction
+    tighter = "; --bound computes a tighter one" if known else ""
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

@@ -20,7 +20,7 @@ import casadi as ca
 
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.mechanics.bodies import FULL, Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law, distance_power, efficiency
 from colloc.numerics.blocks import LocalFunction, local_function, total_function
 
 N_RATE = 2
@@ -28,7 +28,7 @@ N_RATE = 2
 
 
 @lru_cache(maxsize=32)
-def point_function(formulation: str, body: Body, friction: Friction) -> LocalFunction:
+def point_function(formulation: str, body: Body, friction: Law) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
 
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links.
@@ -47,7 +47,7 @@ def forward(theta: ca.SX, centre: ca.SX) -> ca.SX:
     return ca.cos(theta) * centre[0] - ca.sin(theta) * centre[1]
 
 
-def _full_point(body: Body, friction: Friction) -> LocalFunction:
+def _full_point(body: Body, friction: Law) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces = ca.SX.sym("forces", body.n_force)
     lifted = body.with_forces(friction, angles, rates, z, forces, delta)
@@ -55,7 +55,7 @@ def _full_point(body: Body, friction: Friction) -> LocalFunction:
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
 
 
-def _map_point(body: Body, friction: Friction) -> LocalFunction:
+def _map_point(body: Body, friction: Law) -> LocalFunction:
     """Outputs z - Z, rate of distance at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter).
 
     Derivatives of Z follow from balance(Z, y) = 0: dZ/dy = -R_z^-1 R_y. The Hessian of w.Z + w_P P(Z, y) is that of
@@ -105,7 +105,10 @@ def mean_square(weights: ca.DM) -> LocalFunction:
     return local_function("mean_square", p, ca.SX(0, 1), ca.SX.sym("delta"), ca.bilin(weights, p, p))
 
 
-def minus_efficiency() -> LocalFunction:
-    """-x/W of the final distance and work."""
+def minus_efficiency(friction: Law, part: float = 1.0) -> LocalFunction:
+    """Minus the efficiency of a period (`colloc.mechanics.law.efficiency`), from distance and work of a part of it."""
     state = ca.SX.sym("xW", 2)
-    return local_function("objective", state, ca.SX(0, 1), ca.SX.sym("delta"), -state[0] / state[1])
+    whole = part ** (1.0 - distance_power(friction))
+    return local_function(
+        "objective", state, ca.SX(0, 1), ca.SX.sym("delta"), -whole * efficiency(friction, state[0], state[1])
+    )

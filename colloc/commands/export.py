@@ -16,6 +16,7 @@ import numpy as np
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
+from colloc.gaits.gait_fields import law_fields
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -60,7 +61,7 @@ def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Seque
         "max_speed_rad_per_s": None if limits is None else list(limits),
         "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
         "body": solution.problem.body.describe(),
-        "friction": {key: getattr(solution.problem.friction, key) for key in ("mu_t", "mu_f", "mu_b")},
+        "friction": law_fields(solution.problem.friction),
         "efficiency": measured.efficiency,
         "distance_per_period_body_lengths": measured.distance,
         "work_per_period_weight_times_length": measured.work,

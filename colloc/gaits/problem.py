@@ -10,7 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait_fields import BODIES, CLASSES, GAITS, AnyClass, AnyGait, body_from, class_from, fields, gait_from
+from colloc.gaits.gait_fields import (
+    BODIES,
+    CLASSES,
+    GAITS,
+    LAWS,
+    AnyClass,
+    AnyGait,
+    body_from,
+    class_from,
+    fields,
+    gait_from,
+    law_fields,
+    law_from,
+)
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_classes import FreePath
@@ -20,6 +33,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
@@ -75,6 +89,7 @@ class Problem:
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
+        Or any other `colloc.mechanics.law.Law` (docs/laws.md).
     gait : Harmonic, FreePath, Polygon or Relaxed
         The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md). By default one
         harmonic or, for a body whose motion is prescribed, that motion (`colloc.gaits.prescribed`).
@@ -121,7 +136,7 @@ class Problem:
     name: str
     guess: AnyGait = None
     body: Body = Chain()
-    friction: Friction = Friction()
+    friction: Law = Friction()
     gait: AnyClass = None
     delta: float = None  # type: ignore[assignment]
     delta_start: float = None  # type: ignore[assignment]
@@ -139,6 +154,7 @@ class Problem:
         self._check_parts()
         usual = self.body.usual
         start = usual.delta_start if self.gait.delta_start is None else self.gait.delta_start
+        start = start if self.friction.regularised else usual.delta  # nothing to follow down
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
@@ -167,9 +183,10 @@ class Problem:
             raise ProblemError(
                 f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
             )
-        for field, kinds in (("friction", (Friction,)), ("gait", CLASSES)):
-            if not isinstance(getattr(self, field), kinds):
-                raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(getattr(self, field)).__name__}.")
+        for field, protocol, kinds in (("friction", (Law,), LAWS), ("gait", CLASSES, CLASSES)):
+            value = getattr(self, field)
+            if isinstance(value, type) or not isinstance(value, tuple(protocol)):
+                raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(value).__name__}.")
         if self.gait.free == bool(self.body.schedule):
             what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
             raise ProblemError(f"{what}; leave gait out, or take another body.")
@@ -227,7 +244,12 @@ class Problem:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
             raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
-        if self.body.n_joint == 1 and self.friction.mu_f == self.friction.mu_b:
+        if self.gait.unit_speed and not rate_independent(self.friction):
+            raise ProblemError(
+                f"the class {type(self.gait).__name__} leaves the pace of a gait open, and with {self.friction.describe()} the "
+                "work depends on the pace; use Harmonic, whose parameters settle it (period 1)."
+            )
+        if self.body.n_joint == 1 and self.friction.reversible:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
                 "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
@@ -264,11 +286,8 @@ class Problem:
             raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def __repr__(self) -> str:
-        mu, coordinates = self.friction, f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
-        return (
-            f"<Problem {self.name}: {coordinates}, friction ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}), "
-            f"{self.gait.describe()}, delta {self.delta:.0e}>"
-        )
+        coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
+        return f"<Problem {self.name}: {coordinates}, {self.friction.label}, {self.gait.describe()}, delta {self.delta:.0e}>"
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""
@@ -277,8 +296,9 @@ class Problem:
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON)."""
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        for name in ("guess", "gait", "body", "friction"):
+        for name in ("guess", "gait", "body"):
             stated[name] = fields(stated[name])
+        stated["friction"] = law_fields(self.friction)
         return stated
 
     @classmethod
@@ -294,7 +314,7 @@ class Problem:
             stated = dict(stated)
             stated["guess"] = gait_from(stated["guess"])
             stated["body"] = body_from(stated["body"])
-            stated["friction"] = Friction(**stated["friction"])
+            stated["friction"] = law_from(stated["friction"])
             stated["gait"] = class_from(stated["gait"])
             stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
             return cls(**stated)

@@ -199,7 +199,7 @@ def _headline(solution: Solution) -> str:
     verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
     return (
         f"{problem.name}: efficiency d/W = {solution.measured.efficiency:.5f}   "
-        f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}\n"
+        f"{mu.label},  δ = {solution.last.delta:.0e}{verdict}\n"
         f"class: {problem.gait.describe()}"
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law, distance_power
 from colloc.reduced.program import ReducedProgram
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
@@ -150,7 +150,7 @@ class Measured(NamedTuple):
 
 def measured(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path | MixedPath,
     delta: float,
     *,
@@ -163,12 +163,14 @@ def measured(
     Arguments are those of `colloc.verification.replay.replay`.
     """
     replays: list[Replay] = []
-    for part in (1.0, 0.1, 0.01):
+    for part in (1.0, 0.1, 0.01) if friction.regularised else (1.0,):
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
         replays.append(replay(*at, instants=instants, tolerance=tolerance, breaks=breaks, near=near))
-    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
-    limit = extrapolated_limit([each.efficiency for each in replays], errors)
+    k = distance_power(friction)
+    errors = [each.efficiency * (each.error + k * (each.turning + each.ambiguity)) for each in replays]
+    values = [each.efficiency for each in replays]
+    limit = extrapolated_limit(values, errors) if friction.regularised else Limit(values[0], errors[0])
     fine = replays[0]
     distance_error = fine.distance_error + fine.turning * fine.distance + fine.other_distance
     return Measured(fine, errors[0], distance_error, fine.work_error + fine.other_work, limit)
@@ -246,8 +248,8 @@ def _beyond(value: float, unknown: float) -> float:
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
     """How far the efficiency depends on which of several balanced motions the body takes."""
-    if problem.friction.isotropic:
-        meaning = "relative; equal coefficients leave one balanced motion"
+    if problem.friction.associated:
+        meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:
         meaning = "relative; other balanced motions of a smooth body are not looked for"
     elif fine.several == 0:

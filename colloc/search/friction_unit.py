@@ -11,11 +11,11 @@ import dataclasses
 import numpy as np
 
 from colloc.gaits.problem import Problem
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.results.level import Level
 
 
-def friction_unit(friction: Friction) -> float:
+def friction_unit(friction: Law) -> float:
     """The power of ten nearest to the smallest coefficient, which bounds the efficiency: 1 for friction of usual size."""
     return float(10.0 ** np.rint(np.log10(friction.smallest)))
 
@@ -25,8 +25,7 @@ def in_friction_units(problem: Problem) -> tuple[Problem, float]:
     unit = friction_unit(problem.friction)
     if unit == 1.0:
         return problem, 1.0
-    friction = Friction(*(mu / unit for mu in (problem.friction.mu_t, problem.friction.mu_f, problem.friction.mu_b)))
-    return problem.with_(friction=friction), unit
+    return problem.with_(friction=problem.friction.in_units_of(unit)), unit
 
 
 def restated(level: Level, unit: float) -> Level:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
-from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.law import Law
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, Panels, bending_power, mean_velocity, node_velocity
 from colloc.smooth.motion import Motion
@@ -107,7 +107,7 @@ def _panel_integrals(body: Curve, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray
 
 def solve_smooth(
     motion: Motion,
-    friction: Friction,
+    friction: Law,
     t: np.ndarray,
     delta: float,
     *,
@@ -126,7 +126,7 @@ def solve_smooth(
     Parameters
     ----------
     motion : Motion
-    friction : Friction
+    friction : Law
     t : (n_time,)
     delta : float
         Regularisation speed [body lengths per period], > 0.
@@ -195,7 +195,7 @@ def solve_smooth(
             chosen, z = active[members], state.velocity[:, members]
             own, body = Panels(edges[:, members], order), Curve(*batch.curve)
             vs, vn = node_velocity(body, z)
-            fs, fn = force_density(vs, vn, d[:, members], friction)
+            fs, fn = friction.density(vs, vn, d[:, members])
             whole = _panel_integrals(body, vs, vn, fs, fn, own)
             out["centre"][:, chosen] = mean_velocity(body, vs, vn) * speed[members]
             out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * speed[members]
@@ -233,7 +233,7 @@ def _groups(anchor: np.ndarray, make):
 
 
 def _panel_error(
-    motion: Motion, friction: Friction, t: np.ndarray, batch: PanelBatch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
+    motion: Motion, friction: Law, t: np.ndarray, batch: PanelBatch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
 ) -> np.ndarray:
     """How far each panel is from its two halves, ``(n_panel, n_time)``.
 
@@ -252,7 +252,7 @@ def _panel_error(
         fields, _ = _motion_fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
         one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
         velocity = node_velocity(Curve(*one.curve), start)
-        force = force_density(*velocity, delta_many, friction)
+        force = friction.density(*velocity, delta_many)
         integrals = _panel_integrals(Curve(*one.curve), *velocity, *force, fields.panels).sum(axis=1)
         end = one.edge_velocity(start)[:2, -1] / slow_many
         results.append(np.concatenate([integrals / friction.largest, end]))

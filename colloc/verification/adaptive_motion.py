@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law, distance_power
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay import Path
 
@@ -33,7 +33,7 @@ class Rates:
     power: np.ndarray
 
 
-def rates_at(body: Body, friction: Friction, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None) -> Rates:
+def rates_at(body: Body, friction: Law, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None) -> Rates:
     """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
     start = None if near is None else near.reshape(3, -1)
@@ -105,7 +105,7 @@ class FineMotion:
         )
 
 
-def fine_motion(body: Body, friction: Friction, path: Path, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
+def fine_motion(body: Body, friction: Law, path: Path, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
     """Integrate a path between the first and the last of `edges` to a relative efficiency error.
 
     Parameters
@@ -133,7 +133,7 @@ def fine_motion(body: Body, friction: Friction, path: Path, delta: float, edges:
     left, width = edges[:-1], np.diff(edges)
     rates, parts = solved(left, width)
     gap = np.full(left.size, np.inf)
-    distance, work = 1.0, 1.0
+    distance, work, k = 1.0, 1.0, distance_power(friction)
     while True:
         # halve the panels that hold the excess over the tolerance
         order = np.argsort(gap)[::-1]
@@ -166,7 +166,7 @@ def fine_motion(body: Body, friction: Friction, path: Path, delta: float, edges:
         distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)
         reach = np.abs(travelled - travelled[-1]).max() / distance
         change = sum(
-            np.abs(move) / distance + np.abs(turn) * reach + np.abs(energy) / work for turn, move, energy in differences
+            k * (np.abs(move) / distance + np.abs(turn) * reach) + np.abs(energy) / work for turn, move, energy in differences
         )
         gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
         left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]

@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law, distance_power, efficiency
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
 from colloc.verification.panels import WHOLE, Panels, begun, differences, halves, increments, left_over
@@ -97,7 +97,7 @@ class Replay:
 
 def _evaluated(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path | MixedPath,
     delta: float,
     t: np.ndarray,
@@ -118,7 +118,7 @@ def _evaluated(
     motions, residual, apart = [], np.zeros(t.size), np.zeros((3, t.size))
     for share, some in zip(shares, rates if mixed else rates[None], strict=True):
         start = near
-        if not friction.isotropic:
+        if not friction.associated:
             followed = followed_motion(body, friction, angles, some, delta, None if whole else near, sense)
             if followed is not None:
                 start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
@@ -139,7 +139,7 @@ def _evaluated(
 
 def replay(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path | MixedPath,
     delta: float,
     *,
@@ -212,7 +212,7 @@ def replay(
         # an error of rotation turns all that comes after it
         reach = np.abs(travelled - travelled[-1]).max()
         astray = move_error + reach * turn_error
-        gap = astray / max(distance, 1e-300) + work_error / work
+        gap = distance_power(friction) * astray / max(distance, 1e-300) + work_error / work
         residual = float(panels.residual.max())
         order = np.argsort(gap)
         # finer panels do not make up for what the balance leaves over
@@ -231,7 +231,7 @@ def replay(
     return Replay(
         distance,
         work,
-        distance / work,
+        efficiency(friction, distance, work),
         float(heading[-1]),
         float(panels.lever.max()),
         float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
@@ -247,10 +247,10 @@ def replay(
     )
 
 
-def _starts(z: np.ndarray, friction: Friction, sense: int) -> np.ndarray:
+def _starts(z: np.ndarray, friction: Law, sense: int) -> np.ndarray:
     """Velocities ``(n, 4, 3)`` to solve from half way between instants with velocities z ``(n, 5, 3)``: the mean, or where
     there may be several branches, that on which the body is before."""
-    if friction.isotropic:
+    if friction.associated:
         return 0.5 * (z[:, :-1] + z[:, 1:])
     return z[:, :-1] if sense == FORWARDS else z[:, 1:]
 

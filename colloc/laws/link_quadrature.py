@@ -1,0 +1,105 @@
+r"""Friction on a straight link by quadrature: for laws whose integrals have no closed form.
+
+Along a link the tangential velocity vs is constant and the normal one ``y = vn + w sigma``; a dry law changes within
+``a = sqrt(vs^2 + delta^2)`` of y = 0. So Gauss nodes are laid in tau, ``y = a sinh(tau)``, where that is a stretch of unit
+width. With tau = m + h x, x in [-1, 1], on a link of length l
+
+    d sigma = l/2 h/sinh(h) cosh(tau)/cosh(m) dx,
+    sigma   = l/2 [sinh(h x) - 2 tanh(m) sinh(h (1+x)/2) sinh(h (1-x)/2)]/sinh(h).
+
+h follows from the end values without cancellation, so a link that hardly turns is no special case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.law import Law, Matrix
+from colloc.mechanics.link_friction import LinkForce
+from colloc.numerics.arrays import Array, namespace
+
+NODES = 32
+_X, _WEIGHT = np.polynomial.legendre.leggauss(NODES)
+_SMALL = 1e-8
+"""h^2 below which three terms of the series are exact."""
+
+
+class Node(NamedTuple):
+    """A Gauss node of links: distance from the midpoint, normal velocity, and weight; the weights add up to the length."""
+
+    sigma: Array
+    y: Array
+    weight: Array
+
+
+def link_nodes(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Iterator[Node]:
+    """The nodes of links, one after the other; arguments as of `colloc.mechanics.link_friction.link_moments`."""
+    xp = namespace(vs, vn, w, delta)
+    a = xp.sqrt(vs * vs + delta * delta)
+    half = 0.5 * length * w
+    y0, y1 = vn - half, vn + half
+    r0, r1 = xp.sqrt(a * a + y0 * y0), xp.sqrt(a * a + y1 * y1)
+    # sinh(2 h) = (y1 r0 - y0 r1)/a^2; where both ends have one sign that cancels
+    same = y0 * y1 > 0
+    both = xp.where(same, y1 * r0 + y0 * r1, 1.0)
+    h = 0.5 * xp.arcsinh(xp.where(same, (y1 - y0) * (y1 + y0) / both, (y1 * r0 - y0 * r1) / (a * a)))
+    m = xp.arcsinh(y0 / a) + h
+    tilt, square = xp.tanh(m), h * h
+    small = square < _SMALL
+    safe = xp.where(small, 1.0, h)
+    per_sinh = 1.0 / xp.sinh(safe)
+    width = 0.5 * length * xp.where(small, 1.0 - square / 6, safe * per_sinh) / xp.cosh(m)
+    for x, weight in zip(_X, _WEIGHT, strict=True):
+        tau, rest = m + h * x, 1.0 - x * x
+        series = x * (1.0 - square * rest / 6) - 0.5 * tilt * h * rest * (1.0 - square * rest / 12)
+        product = xp.sinh(0.5 * safe * (1.0 + x)) * xp.sinh(0.5 * safe * (1.0 - x))
+        share = xp.where(small, series, (xp.sinh(safe * x) - 2.0 * tilt * product) * per_sinh)
+        yield Node(0.5 * length * share, a * xp.sinh(tau), weight * width * xp.cosh(tau))
+
+
+class ByQuadrature:
+    """What a law says of links, from what it says of a point."""
+
+    kernel_numbers: tuple[float, ...] = ()
+
+    def link_force(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+        tangential = normal = couple = 0.0 * (vs + vn + w)
+        for sigma, y, weight in link_nodes(vs, vn, w, length, delta):
+            fs, fn = self.density(vs, y, delta)
+            tangential, normal, couple = tangential + weight * fs, normal + weight * fn, couple + weight * sigma * fn
+        return LinkForce(tangential, normal, couple)
+
+    def link_jacobian(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return _on_links([(n, self.density_jacobian(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
+
+    def link_secant(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return _on_links([(n, self.density_secant(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
+
+    def link_potential(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+        nodes = link_nodes(vs, vn, w, length, delta)
+        return sum(weight * self.density_potential(vs, y, delta) for _, y, weight in nodes)
+
+    def scaled_laws(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
+        """Differences over the secants of the link: velocities."""
+        own = self.link_force(vs, vn, w, length, delta)
+        secant = self.link_secant(vs, vn, w, length, delta)
+        return [
+            (force.tangential - own.tangential) / secant[0][0],
+            (force.normal - own.normal) / secant[1][1],
+            (force.couple - own.couple) / secant[1][1] * (6 / length),
+        ]
+
+    def largest_link_forces(self, length: np.ndarray) -> np.ndarray:
+        return np.full((3 * length.size, 1), np.inf)
+
+
+def _on_links(densities: list[tuple[Node, Matrix]]) -> Matrix:
+    """3 x 3 matrices of links from 2 x 2 ones at their nodes."""
+    total = [[0.0] * 3 for _ in range(3)]
+    for (sigma, _, weight), ((ss, sn), (ns, nn)) in densities:
+        rows = (ss, sn, sigma * sn), (ns, nn, sigma * nn), (sigma * ns, sigma * nn, sigma * sigma * nn)
+        total = [[t + weight * e for t, e in zip(*pair, strict=True)] for pair in zip(total, rows, strict=True)]
+    return tuple(tuple(row) for row in total)
