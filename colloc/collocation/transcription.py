@@ -135,7 +135,8 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body, far)
-    point = point_function(problem.formulation, problem.body, problem.friction)
+    friction = problem.friction.in_speeds_of(RADIANS)
+    point = point_function(problem.formulation, problem.body, friction)
     n_joint = problem.body.n_joint
     n_parameter = layout.parameters.shape[0]
 
@@ -170,7 +171,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
             {"shape speed": sparse.eye(1, format="csr")},
         ),
     ]
-    velocity = ImplicitVelocity(problem.body, problem.friction, mesh.n_point)
+    velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)
 
     def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])

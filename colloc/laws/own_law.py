@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,8 +32,8 @@ class OwnLaw(ByQuadrature):
         across; ``speed``, which is ``sqrt(vs**2 + vn**2 + delta**2)``; numbers, ``+ - * / **``, ``sqrt``, ``exp``, ``log``,
         ``tanh``, ``abs`` and ``where(condition, a, b)``. Where a dry law divides by the speed, let it be ``speed``: it is never
         zero.
-    unit : float
-        Forces are divided by it.
+    unit, speed_unit : float
+        Forces are divided by the first; velocities and delta multiplied by the second before the formulas see them.
 
     Raises
     ------
@@ -54,12 +54,13 @@ class OwnLaw(ByQuadrature):
     tangential: str = "-vs/speed"
     normal: str = "-vn/speed"
     unit: float = 1.0
+    speed_unit: float = 1.0
 
     associated = False
     """Samples cannot tell whether a formula is the gradient of a convex function: several motions are reckoned with."""
 
     def __post_init__(self) -> None:
-        check_positive(self, "unit")
+        check_positive(self, "unit", "speed_unit")
         vs, vn, delta = _samples()
         fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
         if not (np.isfinite(fs).all() and np.isfinite(fn).all()):
@@ -123,14 +124,19 @@ class OwnLaw(ByQuadrature):
         return f"{self.tangential} along, {self.normal} across the body{scale}"
 
     def in_units_of(self, unit: float) -> OwnLaw:
-        return OwnLaw(self.tangential, self.normal, self.unit * unit)
+        return replace(self, unit=self.unit * unit)
+
+    def in_speeds_of(self, unit: float) -> OwnLaw:
+        return replace(self, speed_unit=self.speed_unit * unit)
 
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
-        at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta + 0.0 * vs}
+        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta + 0.0 * vs))
+        at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta}
         fs, fn = (evaluated(code, at) / self.unit for code in self._codes)
         return fs, fn
 
     def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta))
         zero = 0.0 * (vs + vn)
         r = regularised_speed(vs, vn, delta)
         at = {
@@ -140,7 +146,7 @@ class OwnLaw(ByQuadrature):
             "delta": Dual(delta + zero, (zero, zero)),
         }
         rows = [differentiated(code, at).slopes for code in self._codes]
-        return tuple(tuple(zero - slope / self.unit for slope in row) for row in rows)
+        return tuple(tuple(zero - self.speed_unit / self.unit * slope for slope in row) for row in rows)
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
         """The trace of the Jacobian in every direction: no less than the secant of a law that grows with the speed."""

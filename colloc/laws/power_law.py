@@ -82,6 +82,9 @@ class PowerLaw(ByQuadrature):
     def in_units_of(self, unit: float) -> PowerLaw:
         return PowerLaw(self.power, self.mu_t / unit, self.mu_f / unit, self.mu_b / unit)
 
+    def in_speeds_of(self, unit: float) -> PowerLaw:
+        return self.in_units_of(unit**-self.power)
+
     def _tangential(self, vs: Array) -> Array:
         return self.mu_f if self.reversible else namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
 

@@ -65,6 +65,9 @@ class Viscous:
     def in_units_of(self, unit: float) -> Viscous:
         return Viscous(self.normal / unit, self.tangential / unit)
 
+    def in_speeds_of(self, unit: float) -> Viscous:
+        return self.in_units_of(1.0 / unit)
+
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         return -self.tangential * vs, -self.normal * vn
 

@@ -91,6 +91,9 @@ class Friction:
     def in_units_of(self, unit: float) -> Friction:
         return type(self)(self.mu_t / unit, self.mu_f / unit, self.mu_b / unit)
 
+    def in_speeds_of(self, unit: float) -> Friction:
+        return self
+
     def tangential(self, vs: Array) -> Array:
         """Coefficient mu_s of a link that slides along itself with velocity `vs`; no switch where mu_b = mu_f."""
         if self.reversible:

@@ -60,6 +60,9 @@ class Law(Protocol):
     def in_units_of(self, unit: float) -> Law:
         """The law whose forces are `unit` times smaller."""
 
+    def in_speeds_of(self, unit: float) -> Law:
+        """The law as a function of velocities (and delta) in units of `unit`."""
+
     # at a point
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         """Tangential and normal force per length."""
