@@ -186,7 +186,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     for state_index in (layout.distance[0, 0], layout.work[0, 0]):
         geometry.lower[state_index] = geometry.upper[state_index] = 0.0
     ends = np.array([[layout.distance[0, -1]], [layout.work[0, -1]]])
-    objective = Block(minus_efficiency(problem.friction), ends, sparse.eye(1, format="csr"), np.empty((0, 1)))
+    objective = Block(minus_efficiency(), ends, sparse.eye(1, format="csr"), np.empty((0, 1)))
     return _assembled(problem, mesh, layout, geometry, groups, objective, {} if full else {"point": balanced}, velocity)
 
 

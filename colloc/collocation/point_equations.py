@@ -20,7 +20,7 @@ import casadi as ca
 
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.mechanics.bodies import FULL, Body
-from colloc.mechanics.law import Law, distance_power, efficiency
+from colloc.mechanics.law import Law
 from colloc.numerics.blocks import LocalFunction, local_function, total_function
 
 N_RATE = 2
@@ -105,10 +105,7 @@ def mean_square(weights: ca.DM) -> LocalFunction:
     return local_function("mean_square", p, ca.SX(0, 1), ca.SX.sym("delta"), ca.bilin(weights, p, p))
 
 
-def minus_efficiency(friction: Law, part: float = 1.0) -> LocalFunction:
-    """Minus the efficiency of a period (`colloc.mechanics.law.efficiency`), from distance and work of a part of it."""
+def minus_efficiency() -> LocalFunction:
+    """-x/W of the final distance and work."""
     state = ca.SX.sym("xW", 2)
-    whole = part ** (1.0 - distance_power(friction))
-    return local_function(
-        "objective", state, ca.SX(0, 1), ca.SX.sym("delta"), -whole * efficiency(friction, state[0], state[1])
-    )
+    return local_function("objective", state, ca.SX(0, 1), ca.SX.sym("delta"), -state[0] / state[1])

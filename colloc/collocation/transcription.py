@@ -178,7 +178,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         return velocity(angles, rates, z, delta)
 
     objective = Block(
-        minus_efficiency(problem.friction, problem.gait.fraction),
+        minus_efficiency(),
         np.array([[layout.distance[0, -1]], [layout.work[0, -1]]]),
         sparse.eye(1, format="csr"),
         np.empty((0, 1)),

@@ -7,8 +7,7 @@ tail velocity, its rotation rate omega the orientation theta, both the displacem
     D = sum_ki h_k b_i e^(i theta_ki) c_ki,      W = sum_ki h_k b_i P_ki,
 
 c being the velocity of the centre of mass in the body frame and P the power. What is left is a program of the gait's
-parameters v alone: minimise -|D|/W, or minus `colloc.mechanics.law.efficiency`, where the rotation closes. Gradients take one
-sweep back through theta.
+parameters v alone: minimise -|D|/W where the rotation closes. Gradients take one sweep back through theta.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import numpy as np
 
 from colloc.gaits.symmetry import ANTIPODAL, BOTH
 from colloc.mechanics.bodies import BalanceSolution, Body
-from colloc.mechanics.law import Law, distance_power, efficiency
+from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 
 _TOLERANCE = 1e-12
@@ -83,8 +82,6 @@ class ReducedMotion:
         # share of the rotation, and of the sum of all bends, by which the direction of travel is turned
         self._turned_by = {ANTIPODAL: (0.5, 0.0), BOTH: (1.0, 0.5)}.get(symmetry)
         self._weight = mesh.h[:, None] * mesh.scheme.b
-        # of the part that is solved, distance and work are those of so many periods
-        self._periods = mesh.h.sum() ** (1.0 - distance_power(friction))
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray] | None = None
         self.solves = 0
@@ -138,7 +135,7 @@ class ReducedMotion:
     def values(self, v: np.ndarray, delta: float) -> tuple[float, float]:
         """-d/W and the net rotation over the part of the period that is solved [rad]."""
         s = self.at(v, delta)
-        return -self._periods * efficiency(self.friction, self.distance(v, delta), s.work), s.rotation
+        return -self.distance(v, delta) / s.work, s.rotation
 
     def distance(self, v: np.ndarray, delta: float) -> float:
         """Displacement along the direction of travel, over the part of the period that is solved."""
@@ -181,6 +178,4 @@ class ReducedMotion:
             on_shape[0, :, len(s.rates) :] += (weight * s.pace)[:, None]
             on_pace[0] += weight * s.rates.sum(axis=0)
         d, w, rotation = self.shapes.pulled_back(v, on_shape, on_pace)
-        k = distance_power(self.friction)
-        slope = self._periods * abs(distance) ** (k - 1)
-        return np.stack([slope * (distance / s.work * w - k * d) / s.work, rotation])
+        return np.stack([(distance / s.work * w - d) / s.work, rotation])

@@ -8,7 +8,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.law import Law, distance_power
+from colloc.mechanics.law import Law
 from colloc.reduced.program import ReducedProgram
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
@@ -167,8 +167,7 @@ def measured(
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
         replays.append(replay(*at, instants=instants, tolerance=tolerance, breaks=breaks, near=near))
-    k = distance_power(friction)
-    errors = [each.efficiency * (each.error + k * (each.turning + each.ambiguity)) for each in replays]
+    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
     values = [each.efficiency for each in replays]
     limit = extrapolated_limit(values, errors) if friction.regularised else Limit(values[0], errors[0])
     fine = replays[0]

@@ -9,7 +9,6 @@ import numpy as np
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.warm_start import balanced_variables
 from colloc.gaits.problem import Problem
-from colloc.mechanics.law import efficiency
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.level import PRESCRIBED, Level
@@ -34,6 +33,6 @@ def measured(problem: Problem) -> tuple[Level, str]:
     periods, seconds = 1.0 / problem.gait.fraction, time.perf_counter() - begin
     distance, work = (periods * float(x[row[0, -1]]) for row in (layout.distance, layout.work))
     return Level(
-        problem.delta, mesh.edges, x, np.zeros_like(x), np.empty(0), efficiency(problem.friction, distance, work),
-        distance, work, 0.0, 0.0, 0.0, PRESCRIBED, True, 0, seconds, seconds, mesh.scheme.name, PRESCRIBED,
+        problem.delta, mesh.edges, x, np.zeros_like(x), np.empty(0), distance / work, distance, work,
+        0.0, 0.0, 0.0, PRESCRIBED, True, 0, seconds, seconds, mesh.scheme.name, PRESCRIBED,
     ), message  # fmt: skip

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.law import Law, distance_power
+from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay import Path
 
@@ -133,7 +133,7 @@ def fine_motion(body: Body, friction: Law, path: Path, delta: float, edges: np.n
     left, width = edges[:-1], np.diff(edges)
     rates, parts = solved(left, width)
     gap = np.full(left.size, np.inf)
-    distance, work, k = 1.0, 1.0, distance_power(friction)
+    distance, work = 1.0, 1.0
     while True:
         # halve the panels that hold the excess over the tolerance
         order = np.argsort(gap)[::-1]
@@ -166,7 +166,7 @@ def fine_motion(body: Body, friction: Law, path: Path, delta: float, edges: np.n
         distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)
         reach = np.abs(travelled - travelled[-1]).max() / distance
         change = sum(
-            k * (np.abs(move) / distance + np.abs(turn) * reach) + np.abs(energy) / work for turn, move, energy in differences
+            np.abs(move) / distance + np.abs(turn) * reach + np.abs(energy) / work for turn, move, energy in differences
         )
         gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
         left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]

@@ -17,7 +17,6 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import smooth_minimum
-from colloc.mechanics.law import distance_power, efficiency
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, increments, rates_at
@@ -150,9 +149,8 @@ def _collocated_intervals(
     pull = displacement + 1j * rotation * (fine.path[-1] - path_right)
     direction = _direction(problem, fine.path[-1], fine.theta[-1])
     distance = float((fine.path[-1] * np.conj(direction)).real)
-    pulled = (pull * np.conj(direction)).real / distance
-    shares = distance_power(problem.friction) * pulled - energy / fine.work[-1]
-    return _Own(rotation, displacement, energy, shares, rates, (turned, moved, spent))
+    efficiency = (pull * np.conj(direction)).real / distance - energy / fine.work[-1]
+    return _Own(rotation, displacement, energy, efficiency, rates, (turned, moved, spent))
 
 
 def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
@@ -162,15 +160,14 @@ def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
 
 def _fine_efficiency(problem: Problem, fine: FineMotion) -> float:
     direction = _direction(problem, fine.path[-1], fine.theta[-1])
-    return efficiency(problem.friction, float((fine.path[-1] * np.conj(direction)).real), float(fine.work[-1]))
+    return float((fine.path[-1] * np.conj(direction)).real / fine.work[-1])
 
 
 def _efficiency(problem: Problem, turned: np.ndarray, moved: np.ndarray, spent: np.ndarray) -> float:
     """Efficiency as the scheme sees it."""
     theta = np.concatenate([[0.0], np.cumsum(turned)])
     end = (np.exp(1j * theta[:-1]) * moved).sum()
-    distance = float((end * np.conj(_direction(problem, end, theta[-1]))).real)
-    return efficiency(problem.friction, distance, float(spent.sum()))
+    return float((end * np.conj(_direction(problem, end, theta[-1]))).real / spent.sum())
 
 
 def _direction(problem: Problem, end: complex, rotation: float) -> complex:

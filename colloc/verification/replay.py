@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.law import Law, distance_power, efficiency
+from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
 from colloc.verification.panels import WHOLE, Panels, begun, differences, halves, increments, left_over
@@ -212,7 +212,7 @@ def replay(
         # an error of rotation turns all that comes after it
         reach = np.abs(travelled - travelled[-1]).max()
         astray = move_error + reach * turn_error
-        gap = distance_power(friction) * astray / max(distance, 1e-300) + work_error / work
+        gap = astray / max(distance, 1e-300) + work_error / work
         residual = float(panels.residual.max())
         order = np.argsort(gap)
         # finer panels do not make up for what the balance leaves over
@@ -231,7 +231,7 @@ def replay(
     return Replay(
         distance,
         work,
-        efficiency(friction, distance, work),
+        distance / work,
         float(heading[-1]),
         float(panels.lever.max()),
         float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
