@@ -27,10 +27,11 @@ from colloc.system.late_binding import bind
 
 if TYPE_CHECKING:
     from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+    from colloc.gaits.objective import Objective
     from colloc.gaits.path_classes import FreePath, Polygon
     from colloc.gaits.paths import ArcPath, Corners
-    from colloc.gaits.problem import Problem, Reference
-    from colloc.gaits.problem_file import load_problem
+    from colloc.gaits.problem import Problem
+    from colloc.gaits.problem_file import Reference, load_problem
     from colloc.gaits.relaxed import Relaxed
     from colloc.laws.elliptic import Elliptic
     from colloc.laws.own_law import OwnLaw
@@ -52,8 +53,9 @@ if TYPE_CHECKING:
     from colloc.verification.replay import replay
 
 _HOME = {
-    "gaits.problem": ("Problem", "Reference"),
-    "gaits.problem_file": ("load_problem",),
+    "gaits.problem": ("Problem",),
+    "gaits.problem_file": ("Reference", "load_problem"),
+    "gaits.objective": ("Objective",),
     "mechanics.body": ("Chain",),
     "smooth.modal_body": ("ModalBody",),
     "smooth.concertina": ("Concertina",),
@@ -93,6 +95,7 @@ __all__ = [
     "Harmonic",
     "ModalBody",
     "NotConvergedError",
+    "Objective",
     "OwnLaw",
     "Polygon",
     "PowerLaw",

@@ -8,5 +8,5 @@ PROBLEM = Problem(
     friction=Viscous(normal=2.0, tangential=1.0),
     gait=Harmonic(harmonics=1, symmetry="none"),
     guess=ellipse(A0=0, A1=0.7, B1=0.7),
-    delta=1e-4,
+    objective="towing",
 )

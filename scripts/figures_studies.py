@@ -9,8 +9,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from colloc.gaits.gait_class import DIRECT, RETROGRADE, STANDING
 from colloc.pictures.style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, letter, styled, subplots
+from colloc.studies.gait_class import DIRECT, RETROGRADE, STANDING
 
 KINDS = (RETROGRADE, STANDING, DIRECT)
 _COLOURS = {RETROGRADE: SKY, STANDING: ORANGE, DIRECT: GREEN}

@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from colloc.gaits.problem import Reference
+from colloc.gaits.problem_file import Reference
 from colloc.gaits.relaxed import Relaxed
 from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
 from colloc.pictures.style import styled

@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -18,8 +19,8 @@ CACHE = "bounds.sqlite"
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
-    None for bodies that are no chains, and for laws other than Coulomb's. A cache that cannot be read or written is left as it
-    is, with a `ChangedFileWarning`: no result depends on it.
+    None for bodies that are no chains, laws other than Coulomb's, other objectives, and gaits that turn. A cache that cannot be
+    read or written is left as it is, with a `ChangedFileWarning`: no result depends on it.
     """
     friction = problem.friction
     if not isinstance(problem.body, Chain) or type(friction) is not Friction:
@@ -27,6 +28,10 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
             raise ProblemError(
                 "upper bounds are computed for chains of links under Coulomb friction only; for this one there is 1/min(mu)."
             )
+        return None
+    if not _bounded(problem):
+        if compute:
+            raise ProblemError("upper bounds are of the efficiency of gaits that do not turn.")
         return None
     domain, cache = (problem.body, friction, problem.joint_limit), folder / CACHE
     try:
@@ -36,10 +41,16 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
         return efficiency_bound(*domain) if compute else None
 
 
+def _bounded(problem: Problem) -> bool:
+    return problem.objective == EFFICIENCY and problem.rotation == 0
+
+
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
     """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq. lambdaupper)."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
+    if not _bounded(problem):
+        return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.friction.smallest
     known = isinstance(problem.body, Chain) and type(problem.friction) is Friction
     tighter = "; --bound computes a tighter one" if known else ""

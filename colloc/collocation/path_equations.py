@@ -106,6 +106,11 @@ def chord(piece: Piece) -> LocalFunction:
     return local_function("chord", piece.shape, piece.given[1], ca.SX.sym("delta"), whole)
 
 
+def piece_pace(piece: Piece) -> LocalFunction:
+    """Length of path per unit of phase at a point of a piece."""
+    return local_function("pace", piece.shape, piece.given, ca.SX.sym("delta"), piece.speed)
+
+
 @lru_cache(maxsize=256)
 def placed_check(check: ShapeCheck, piece: Piece) -> LocalFunction:
     """A shape check at a point of a piece; given are those of the piece and the share of the cut."""

@@ -17,9 +17,19 @@ from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import Layout, problem_layout, problem_mesh
-from colloc.collocation.path_equations import ADVANCE, OMEGA, POWER, arc, full_path_point, path_point, side, squared_distance
+from colloc.collocation.path_equations import (
+    ADVANCE,
+    OMEGA,
+    POWER,
+    arc,
+    full_path_point,
+    path_point,
+    piece_pace,
+    side,
+    squared_distance,
+)
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
-from colloc.collocation.point_equations import minus_efficiency
+from colloc.collocation.point_equations import objective_block, period_rows
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.path_classes import FreePath
@@ -170,7 +180,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         *geometry.groups,
         *(_full_groups(problem, n_out, n_point, layout.n) if full else []),
         equalities("orientation", state @ selector(layout.theta[0], layout.n), {"point": (-rate @ pick).tocsr()}),
-        *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n),
+        *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n, problem.rotation),
         quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
         quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
     ]
@@ -185,9 +195,12 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
 
     for state_index in (layout.distance[0, 0], layout.work[0, 0]):
         geometry.lower[state_index] = geometry.upper[state_index] = 0.0
-    ends = np.array([[layout.distance[0, -1]], [layout.work[0, -1]]])
-    objective = Block(minus_efficiency(), ends, sparse.eye(1, format="csr"), np.empty((0, 1)))
-    return _assembled(problem, mesh, layout, geometry, groups, objective, {} if full else {"point": balanced}, velocity)
+    pace = (piece_pace(geometry.piece), geometry.shape[:, interval], given)
+    for name, (parts, group) in period_rows(problem, layout, mesh, pace, 1.0).items():
+        geometry.blocks[name] = parts
+        groups.append(group)
+    implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]] = {} if full else {"point": balanced}
+    return _assembled(problem, mesh, layout, geometry, groups, objective_block(problem, layout), implicit, velocity)
 
 
 def _full_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
@@ -206,7 +219,7 @@ def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None
     near, mesh = path_through(problem, gait, edges)
     size = problem_layout(problem, mesh).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
-    layout = Layout(own, none, none, none, none, none, none, none, size)
+    layout = Layout(own, none, none, none, none, none, none, none, none, size)
     geometry = _geometry(problem, mesh, own[:, 0], size, near, far)
     shapes = problem.gait.split(own[:, 0], problem.body.n_joint)
     shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")

@@ -14,17 +14,27 @@ itself is a step function of the tail velocity as delta goes to 0 and does not c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import casadi as ca
+import numpy as np
+from scipy import sparse
 
+from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
+from colloc.gaits.objective import QUANTITIES, Objective
+from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.law import Law
-from colloc.numerics.blocks import LocalFunction, local_function, total_function
+from colloc.numerics.blocks import Block, LocalFunction, local_function, total_function
+from colloc.numerics.constraint_rows import Group, least_group, total_group
+from colloc.numerics.mesh import Mesh
 
 N_RATE = 2
 """The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
+_AT_REST = 1e-12
+"""A single joint turns back where its rate vanishes; there the length of its path needs a derivative."""
 
 
 @lru_cache(maxsize=32)
@@ -105,7 +115,44 @@ def mean_square(weights: ca.DM) -> LocalFunction:
     return local_function("mean_square", p, ca.SX(0, 1), ca.SX.sym("delta"), ca.bilin(weights, p, p))
 
 
-def minus_efficiency() -> LocalFunction:
-    """-x/W of the final distance and work."""
-    state = ca.SX.sym("xW", 2)
-    return local_function("objective", state, ca.SX(0, 1), ca.SX.sym("delta"), -state[0] / state[1])
+def path_pace(n_joint: int) -> LocalFunction:
+    """Length of the path in shape space per unit of time, from the joint rates of a point."""
+    rates = ca.SX.sym("r", n_joint)
+    return local_function("pace", rates, ca.SX(0, 1), ca.SX.sym("delta"), ca.sqrt(ca.sumsqr(rates) + _AT_REST**2))
+
+
+BlockParts = tuple[LocalFunction, np.ndarray, np.ndarray]
+"""What a `colloc.numerics.blocks.Block` is made of: function, gather, instance parameters."""
+
+
+def period_block(aims: Sequence[Objective], sign: float, layout: Layout, fraction: float) -> BlockParts:
+    """`sign` times the values of objectives for a whole period, of which a part is solved."""
+    names = tuple(name for name in QUANTITIES if any(name in aim.uses for aim in aims))
+    parts = {name: ca.SX.sym(name, 2 if name == "rotation" else 1) for name in names}
+    period = {name: part[0] - part[1] if name == "rotation" else part / fraction for name, part in parts.items()}
+    out = ca.vertcat(*(sign * aim(period) for aim in aims))
+    function = local_function("period", ca.vertcat(*parts.values()), ca.SX(0, 1), ca.SX.sym("delta"), out)
+    return function, layout.of_period(names), np.empty((0, 1))
+
+
+def objective_block(problem: Problem, layout: Layout) -> Block:
+    """Minus the problem's objective."""
+    function, gather, given = period_block([problem.objective], -1.0, layout, problem.gait.fraction)
+    return Block(function, gather, sparse.eye(1, format="csr"), given)
+
+
+def period_rows(
+    problem: Problem, layout: Layout, mesh: Mesh, pace: BlockParts, unit: float
+) -> dict[str, tuple[BlockParts, Group]]:
+    """Blocks and rows, by name, of what a problem asks of a whole period besides its objective.
+
+    `pace`: the length of path per `unit` of time at the points.
+    """
+    found = {}
+    if layout.length.size:
+        found["length"] = pace, total_group("length", layout.length, mesh, layout.n, unit)
+    if problem.at_least:
+        aims, least = zip(*problem.at_least, strict=True)
+        parts = period_block(aims, 1.0, layout, problem.gait.fraction)
+        found["at least"] = parts, least_group("at least", least, layout.n)
+    return found

@@ -21,7 +21,15 @@ from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
-from colloc.collocation.point_equations import N_RATE, gait_check, mean_square, minus_efficiency, point_function
+from colloc.collocation.point_equations import (
+    N_RATE,
+    gait_check,
+    mean_square,
+    objective_block,
+    path_pace,
+    period_rows,
+    point_function,
+)
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.harmonic import Fourier
@@ -154,6 +162,10 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         np.empty((0, 1)),
     )
 
+    pace = (path_pace(n_joint), layout.rates, np.empty((0, mesh.n_point)))
+    of_period = period_rows(problem, layout, mesh, pace, RADIANS)
+    blocks |= {name: parts for name, (parts, _) in of_period.items()}
+
     rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
     groups = [
         gait_group("angles", layout.angles, layout.parameters, problem.gait.angle_matrix(mesh.times, n_joint), layout.n),
@@ -170,6 +182,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
             sparse.csr_matrix((1, layout.n)),
             {"shape speed": sparse.eye(1, format="csr")},
         ),
+        *(group for _, group in of_period.values()),
     ]
     velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)
 
@@ -177,12 +190,6 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
         return velocity(angles, rates, z, delta)
 
-    objective = Block(
-        minus_efficiency(),
-        np.array([[layout.distance[0, -1]], [layout.work[0, -1]]]),
-        sparse.eye(1, format="csr"),
-        np.empty((0, 1)),
-    )
     ends = np.cumsum([0] + [g.m for g in groups])
     return Transcription(
         problem,
@@ -190,7 +197,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         layout,
         Assembly(
             layout.n,
-            objective,
+            objective_block(problem, layout),
             tuple(
                 Block(
                     function,
@@ -237,7 +244,10 @@ def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Gr
     """theta' = omega, and how theta closes where no symmetry does it."""
     state, rate = mesh.integration()
     linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
-    return [equalities("orientation", linear), *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n)]
+    return [
+        equalities("orientation", linear),
+        *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n, problem.rotation),
+    ]
 
 
 def _check_group(check: ShapeCheck, problem: Problem, n_cell: int, n: int) -> Group:

@@ -80,6 +80,7 @@ def balanced_variables(
     x[layout.distance[0, 1:]] = distance
     x[layout.work[0, 1:]] = np.cumsum(unit * (quadrature @ now.power))
     x[layout.theta[0]] = theta
+    x[layout.length] = unit * (quadrature @ np.linalg.norm(rates, axis=0)).sum()
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     if layout.forces.size:

@@ -15,7 +15,8 @@ import numpy as np
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, new_parser
-from colloc.results.distinct_optima import SAME_EFFICIENCY, SAME_GAIT
+from colloc.gaits.objective import EFFICIENCY
+from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE
 from colloc.results.solution import Solution
 from colloc.results.store import load
 
@@ -77,7 +78,20 @@ def rows(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
     return [("", a.problem.name, b.problem.name), *zip(_NAMES, _column(a), _column(b), strict=True)]
 
 
-_NAMES = ("status", "efficiency", "  at delta -> 0", "distance d", "work W", "delta", "intervals", "iterations", "seconds")
+_NAMES = (
+    "status",
+    "objective",
+    "value",
+    "  error",
+    "efficiency",
+    "  at delta -> 0",
+    "distance d",
+    "work W",
+    "delta",
+    "intervals",
+    "iterations",
+    "seconds",
+)
 
 
 def _column(solution: Solution) -> list[str]:
@@ -85,6 +99,9 @@ def _column(solution: Solution) -> list[str]:
     error = f" +- {certificate.efficiency_error:.0e}" if certificate.replayed else " (not replayed)"
     return [
         solution.status,
+        solution.problem.objective.name,
+        f"{measured.value:.6f}",
+        f"{certificate.value_error:.0e}" if certificate.replayed else "-",
         f"{measured.efficiency:.6f}{error}",
         f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
         f"{measured.distance:.6f}",
@@ -98,13 +115,16 @@ def _column(solution: Solution) -> list[str]:
 
 def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
     """Whether the two are the same optimum, and why, in a sentence."""
-    values = [s.measured.efficiency for s in (a, b)]
+    what = a.problem.objective
+    if b.problem.objective != what:
+        return False, f"other objectives: {what.name} and {b.problem.objective.name}."
+    values = [s.measured.value for s in (a, b)]
     difference = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
-    apart = gait_distance(a, b)
+    apart, named = gait_distance(a, b), "efficiencies" if what == EFFICIENCY else f"values of {what.name}"
     if apart is None:
-        return False, f"other bodies; efficiencies differ by {100 * difference:.3g} %."
-    text = f"efficiencies differ by {100 * difference:.3g} %, paths by at most {apart:.3g} rad"
-    same = difference <= SAME_EFFICIENCY and apart <= 2 * SAME_GAIT
+        return False, f"other bodies; {named} differ by {100 * difference:.3g} %."
+    text = f"{named} differ by {100 * difference:.3g} %, paths by at most {apart:.3g} rad"
+    same = difference <= SAME_VALUE and apart <= 2 * SAME_GAIT
     return same, f"{'the same optimum' if same else 'different'}: {text}."
 
 

@@ -63,6 +63,8 @@ def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Seque
         "body": solution.problem.body.describe(),
         "friction": law_fields(solution.problem.friction),
         "efficiency": measured.efficiency,
+        "objective": solution.problem.objective.name,
+        "value": measured.value,
         "distance_per_period_body_lengths": measured.distance,
         "work_per_period_weight_times_length": measured.work,
         "problem_hash": solution.problem.hash,

@@ -12,7 +12,7 @@ from colloc.system.processors import one_thread_each
 
 SUBCOMMANDS = {
     "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
-    "solve": ("solve", "find the most efficient gait of a problem file, certify it, save and draw it"),
+    "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
     "multistart": (
         "multistart",
         "solve a problem from many random starts; distinct optima with their frequencies",

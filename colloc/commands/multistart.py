@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -67,10 +68,10 @@ def _checked(options: argparse.Namespace) -> None:
 
 def outcome_line(outcome: Outcome) -> str:
     """One line about a start."""
-    return f"{outcome.start:6d} {outcome.efficiency:11.6f} {outcome.iterations:6d} {outcome.seconds:8.2f}  {outcome.status}"
+    return f"{outcome.start:6d} {outcome.value:11.6f} {outcome.iterations:6d} {outcome.seconds:8.2f}  {outcome.status}"
 
 
-OUTCOME_HEADER = " start  efficiency   iter  seconds  status"
+OUTCOME_HEADER = " start       value   iter  seconds  status"
 
 
 def summary_lines(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[Basin]) -> list[str]:
@@ -80,7 +81,7 @@ def summary_lines(problem: Problem, outcomes: Sequence[Outcome], found: Sequence
     for basin in found[:_MOST_BASINS_SHOWN]:
         share = f"{len(basin.starts)} of {len(outcomes)} starts"
         floor = "  on the bound smallest_shape_speed" if on_speed_floor(problem, basin.best.gait) else ""
-        lines.append(f"  efficiency {basin.best.efficiency:.6f}  {share:<20s} best: start {basin.best.start}{floor}")
+        lines.append(f"  {problem.objective.name} {basin.best.value:.6f}  {share:<20s} best: start {basin.best.start}{floor}")
     if len(found) > _MOST_BASINS_SHOWN:
         lines.append(f"  ... and {len(found) - _MOST_BASINS_SHOWN} more")
     failures = [o for o in outcomes if o.status != SOLVED]
@@ -98,6 +99,7 @@ def summary_dict(problem: Problem, outcomes: Sequence[Outcome], found: Sequence[
         "counts": {status: counts(outcomes).get(status, 0) for status in STATUSES},
         "optima": [
             {
+                "value": b.best.value,
                 "efficiency": b.best.efficiency,
                 "frequency": b.frequency,
                 "starts": list(b.starts),
@@ -114,8 +116,8 @@ def _others_lines(kept: Mapping[StartName, Outcome], shown: int) -> list[str]:
     """What the archive holds besides the starts that were asked for."""
     if len(kept) == shown:
         return []
-    best = max(kept, key=lambda name: kept[name].efficiency if kept[name].status == SOLVED else -1.0)
-    what = f"; the best of all, {kept[best].efficiency:.6f}, is start {best.number} of seed {best.seed} ({best.sampler})"
+    best = max(kept, key=lambda name: kept[name].value if kept[name].status == SOLVED else -math.inf)
+    what = f"; the best of all, {kept[best].value:.6f}, is start {best.number} of seed {best.seed} ({best.sampler})"
     return [f"  starts in the file besides: {len(kept) - shown}{what if kept[best].status == SOLVED else ''}"]
 
 

@@ -36,7 +36,7 @@ def add_problem(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--delta", type=float, metavar="SPEED", help="final regularisation speed of friction")
     parser.add_argument("--delta-start", type=float, metavar="SPEED", help="where the continuation in delta begins")
     parser.add_argument("--mesh", dest="intervals", type=int, metavar="N", help="intervals of the first mesh")
-    parser.add_argument("--mesh-tolerance", type=float, metavar="TOL", help="relative efficiency error to refine to; 0: never")
+    parser.add_argument("--mesh-tolerance", type=float, metavar="TOL", help="relative error to refine to; 0: never")
     parser.add_argument("--scheme", metavar="NAME", help="trapezoid, hermite-simpson, gauss-N or radau-N")
     parser.add_argument("--formulation", choices=FORMULATIONS, help="how the balance becomes constraints")
 

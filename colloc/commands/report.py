@@ -12,7 +12,7 @@ from pathlib import Path
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_path, tell
-from colloc.gaits.problem import Reference
+from colloc.gaits.problem_file import Reference
 from colloc.pictures.report_page import write_report
 from colloc.results.store import load
 from colloc.system.progress import StatusLine

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.problem import Problem, Reference
-from colloc.gaits.problem_file import ProblemFile, read_problem_file
+from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
 from colloc.gaits.relaxed import Relaxed
 from colloc.results.level import PRESCRIBED, REDUCED, Level
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
@@ -44,7 +45,7 @@ end; after Ctrl-C or a crash the same command goes on from there.
 
 
 def _parser() -> argparse.ArgumentParser:
-    what = "Find the gait of largest efficiency d/W for a problem file, and certify it by an independent replay."
+    what = "Find the best gait of a problem file, by default the most efficient, and certify it by an independent replay."
     parser = new_parser("solve", what, _EPILOG)
     add_problem(parser)
     parser.add_argument("--start", metavar="FILE.h5", help="start from the gait of an earlier result")
@@ -72,23 +73,25 @@ def level_line(level: Level) -> str:
     """One line about a level of the continuation."""
     flag = "" if level.optimal else f"   ({level.status})"
     return (
-        f"{level.delta:9.1e} {level.edges.size - 1:6d} {level.efficiency:11.6f} {level.distance:9.5f} {level.work:9.5f} "
+        f"{level.delta:9.1e} {level.edges.size - 1:6d} {level.value:11.6f} {level.distance:9.5f} {level.work:9.5f} "
         f"{level.iterations:6d} {level.seconds:8.2f}{flag}"
     )
 
 
-LEVEL_HEADER = "    delta   mesh  efficiency         d         W   iter  seconds"
+LEVEL_HEADER = "    delta   mesh   objective         d         W   iter  seconds"
 
 
 def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
     """What a person wants to know at the end."""
     lines = [f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"]
     certificate = solution.certificate
+    best = solution.problem.objective
     if certificate.replayed:
         lines += [
-            f"  efficiency d/W  {certificate.efficiency:.6f} +- {certificate.efficiency_error:.0e} by independent replay "
-            f"({certificate.instants} instants); {certificate.efficiency_at_zero_delta:.6f} +- "
-            f"{certificate.error_at_zero_delta:.0e} for delta -> 0",
+            f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by independent replay "
+            f"({certificate.instants} instants); {certificate.value_at_zero_delta:.6f} +- "
+            f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
+            *_besides(solution),
             f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
             f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
@@ -102,6 +105,18 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             lines.append(f"  {agree} {reference.efficiency:g} +- {reference.tolerance:g} ({reference.source})")
     if solution.message:
         lines.append(f"  {solution.message}")
+    return lines
+
+
+def _besides(solution: Solution) -> list[str]:
+    """What a period comes to that its objective, and what is asked for, make worth telling."""
+    found, problem, lines = solution.certificate, solution.problem, []
+    if problem.objective != EFFICIENCY:
+        lines.append(f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}")
+    if problem.uses("length"):
+        lines.append(f"  path length L   {found.length:.6f} rad")
+    if problem.rotation != 0:
+        lines.append(f"  net rotation    {found.rotation:.6f} rad")
     return lines
 
 
@@ -127,6 +142,8 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "problem_hash": solution.problem.hash,
         "seconds": solution.seconds,
         "delta": solution.last.delta,
+        "objective": solution.problem.objective.fields(),
+        "value": solution.value,
         "efficiency": solution.efficiency,
         "distance": solution.distance,
         "work": solution.work,
@@ -137,9 +154,9 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "constraints": int(solution.last.lam_g.size),
         "kkt_error": solution.last.kkt_error,
         "starts": solution.starts,
-        "finite": None if solution.finite is None else solution.finite.efficiency,
+        "finite": None if solution.finite is None else solution.finite.value,
         "others": [
-            {"efficiency": a.efficiency, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
+            {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
             for a in solution.others
         ],
         "gait": fields(solution.gait),
@@ -151,6 +168,12 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
     if certificate.replayed:
         result["certificate"] = {
             "passed": certificate.passed,
+            "value": certificate.value,
+            "value_error": certificate.value_error,
+            "value_at_zero_delta": certificate.value_at_zero_delta,
+            "value_error_at_zero_delta": certificate.value_error_at_zero_delta,
+            "rotation": certificate.rotation,
+            "length": certificate.length,
             "efficiency": certificate.efficiency,
             "efficiency_error": certificate.efficiency_error,
             "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.commands.ending import BAD_PROBLEM, FAILED, OK
-from colloc.gaits.problem import Problem, Reference
-from colloc.gaits.problem_file import ProblemFile
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import ProblemFile, Reference
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.relaxed_store import save_relaxed
 from colloc.results.solution import SOLVED

@@ -122,7 +122,7 @@ def _work(run, options: argparse.Namespace, quiet: bool, save: Callable[[], Path
                 number, begin = progress.round, time.perf_counter()
             if not quiet:
                 best = progress.state.best
-                what = f"{best.outcome.efficiency:9.6f}" if best else "     none"
+                what = f"{best.outcome.value:9.6f}" if best else "     none"
                 tries = Counter(a.outcome.status for a in progress.new)
                 told = ", ".join(f"{n} {status}" for status, n in tries.items())
                 left = (time.perf_counter() - begin) / progress.done * (progress.total - progress.done)
@@ -180,7 +180,7 @@ def _summary_lines(run, path: Path) -> list[str]:
     if below:
         lines.append(f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more starts may find more")
     for cell in below[:_MOST_FAILURES_SHOWN]:
-        found, could = run.cells[cell].best.outcome.efficiency, run.neighbour_efficiency(cell)
+        found, could = run.cells[cell].best.outcome.value, run.neighbour_value(cell)
         lines.append(f"  {cell_text(run.study, cell)}: {found:.6f}, where a neighbour's gait achieves {could:.6f}")
     failed = [(cell, state) for cell, state in run.cells.items() if not state.best]
     for cell, state in failed[:_MOST_FAILURES_SHOWN]:

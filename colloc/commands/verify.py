@@ -48,10 +48,11 @@ def disagreement(recorded: Certificate, now: Certificate) -> str:
     """A sentence if the certificate in a file is not what a new one says; empty if they agree."""
     if not recorded.replayed:
         return "the file holds no certificate."
-    allowed = _AGREEMENT * (recorded.efficiency_error + now.efficiency_error) + 1e-9
-    difference = now.efficiency - recorded.efficiency
-    if not abs(difference) <= allowed:
-        return f"the file certifies an efficiency of {recorded.efficiency:.8f}, which is off by {-difference:.1e}."
+    for what, name in (("efficiency", "an efficiency"), ("value", "a value")):
+        allowed = _AGREEMENT * (getattr(recorded, f"{what}_error") + getattr(now, f"{what}_error")) + 1e-9
+        difference = getattr(now, what) - getattr(recorded, what)
+        if not abs(difference) <= allowed:
+            return f"the file certifies {name} of {getattr(recorded, what):.8f}, which is off by {-difference:.1e}."
     if recorded.passed and not now.passed:
         return "the file's certificate passed all checks, the new one does not."
     return ""
@@ -121,6 +122,8 @@ def _verify(options: argparse.Namespace) -> int:
     if options.json:
         checks = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks}
         keys = (
+            "value",
+            "value_error",
             "efficiency",
             "efficiency_error",
             "efficiency_at_zero_delta",
@@ -131,18 +134,24 @@ def _verify(options: argparse.Namespace) -> int:
             "work_error",
             "instants",
         )
-        facts = {"file": options.result, "name": solution.problem.name, "certified": good, "complaint": complaint}
+        facts = {
+            "file": options.result,
+            "objective": solution.problem.objective.name,
+            "name": solution.problem.name,
+            "certified": good,
+            "complaint": complaint,
+        }
         facts["changed"] = solution.changed
         print(json.dumps({**facts, **{key: getattr(certificate, key) for key in keys}, "checks": checks}))
         return OK if good else FAILED
     print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
     print(
-        f"  efficiency d/W  {certificate.efficiency:.8f} +- {certificate.efficiency_error:.0e} by replay "
+        f"  {solution.problem.objective.label:<15s} {certificate.value:.8f} +- {certificate.value_error:.0e} by replay "
         f"({certificate.instants} instants)"
     )
     if solution.certificate.replayed:
         recorded = solution.certificate
-        print(f"  in the file     {recorded.efficiency:.8f} +- {recorded.efficiency_error:.0e} ({recorded.instants} instants)")
+        print(f"  in the file     {recorded.value:.8f} +- {recorded.value_error:.0e} ({recorded.instants} instants)")
     if not options.quiet:
         print("\n".join(f"  {check.line()}" for check in certificate.checks))
     if solution.changed:

@@ -1,4 +1,4 @@
-"""A problem: body, friction, class of gaits, guess and discretisation; frozen and validated when it is made."""
+"""A problem: body, friction, class of gaits, objective, guess and discretisation; frozen and validated when it is made."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ from colloc.gaits.gait_fields import (
 )
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.gaits.prescribed import Prescribed
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -42,6 +43,8 @@ SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 LONGEST_NAME = 200
 """File systems allow 255 bytes, and results of a problem add endings to its name."""
+_AIMS = 3
+"""The last fields say what is asked of a gait: objective, rotation, at_least."""
 _CHECKED_PHASES = 2000
 _SLACK = 1e-6
 """Depth of a crossing at which a guess still counts as admissible: what a certificate allows."""
@@ -50,34 +53,10 @@ _AT_THE_BOUND = 1e-2
 corners and makes it a little shorter."""
 
 
-@dataclass(frozen=True)
-class Reference:
-    """A value to hold the result against.
-
-    Parameters
-    ----------
-    efficiency : float
-    tolerance : float
-        Largest difference that counts as agreement.
-    source : str
-        Where the value comes from.
-
-    Examples
-    --------
-    >>> from colloc import Reference
-    >>> Reference(efficiency=0.259, tolerance=0.0015, source="S. Alben (2019)").efficiency
-    0.259
-    """
-
-    efficiency: float
-    tolerance: float
-    source: str
-
-
 @named_arguments
 @dataclass(frozen=True, repr=False)
 class Problem:
-    """Maximise d/W over a class of gaits.
+    """Maximise an objective over a class of gaits: by default the efficiency d/W.
 
     Parameters
     ----------
@@ -116,7 +95,15 @@ class Problem:
         forces as variables and the balance as constraints, or with the velocities tied to those of the balance solver. The
         first is usual for chains; of smooth bodies there is only the second.
     mesh_tolerance : float
-        Relative efficiency error to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
+        Relative error of the objective to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
+    objective : Objective or str
+        What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", or an expression of distance, work,
+        rotation and length of a period.
+    rotation : float or None
+        Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than 0 need a class without
+        symmetry.
+    at_least : mapping or pairs of (Objective or str, float)
+        Values of a period that must be reached, as ``{"distance": 0.3}``.
 
     Examples
     --------
@@ -146,6 +133,9 @@ class Problem:
     scheme: str = "gauss-3"
     formulation: str = None  # type: ignore[assignment]
     mesh_tolerance: float = 3e-5
+    objective: Objective = EFFICIENCY
+    rotation: float | None = 0.0
+    at_least: tuple[tuple[Objective, float], ...] = ()
 
     def __post_init__(self) -> None:
         self._check_body()
@@ -158,6 +148,7 @@ class Problem:
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
+        self._check_aims()
         if self.guess is None:
             free = self.gait.free
             self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
@@ -221,6 +212,29 @@ class Problem:
         self._check_resolution()
         if self.intervals > 100_000:
             raise ProblemError(f"the mesh is too large: {self.intervals} intervals; use at most 100000.")
+
+    def _check_aims(self) -> None:
+        object.__setattr__(self, "objective", objective_from(self.objective))
+        object.__setattr__(self, "at_least", least_values(self.at_least))
+        if self.rotation is not None and (isinstance(self.rotation, bool) or not abs(self.rotation) < np.inf):
+            raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
+        if self.rotation == 0 and self.uses("rotation"):
+            raise ProblemError("the objective speaks of the rotation, which is 0 unless rotation says otherwise (None: free).")
+        if self.rotation != 0 and self.gait.symmetry != NONE:
+            raise ProblemError(
+                f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class without symmetry."
+            )
+        if not self.gait.free and (self.objective != EFFICIENCY or self.at_least):
+            raise ProblemError("nothing is free in a prescribed motion; leave objective and at_least out.")
+
+    @property
+    def aims(self) -> tuple[Objective, ...]:
+        """The objective, then the values that are to be reached at least."""
+        return (self.objective, *(aim for aim, _ in self.at_least))
+
+    def uses(self, quantity: str) -> bool:
+        """Whether the objective or what must be reached speaks of a quantity of `colloc.gaits.objective.QUANTITIES`."""
+        return any(quantity in aim.uses for aim in self.aims)
 
     def _check_resolution(self) -> None:
         collocation, kind = scheme(self.scheme), type(self.gait).__name__
@@ -287,7 +301,10 @@ class Problem:
 
     def __repr__(self) -> str:
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
-        return f"<Problem {self.name}: {coordinates}, {self.friction.label}, {self.gait.describe()}, delta {self.delta:.0e}>"
+        best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
+        return (
+            f"<Problem {self.name}: {best}{coordinates}, {self.friction.label}, {self.gait.describe()}, delta {self.delta:.0e}>"
+        )
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""
@@ -299,7 +316,10 @@ class Problem:
         for name in ("guess", "gait", "body"):
             stated[name] = fields(stated[name])
         stated["friction"] = law_fields(self.friction)
-        return stated
+        # what is as usual is left out, as files that know of nothing else leave it out
+        usual = [f.name for f in dataclasses.fields(self)[-_AIMS:] if stated[f.name] == f.default]
+        stated |= {"objective": self.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in self.at_least]}
+        return {name: value for name, value in stated.items() if name not in usual}
 
     @classmethod
     def from_dict(cls, stated: dict) -> Problem:

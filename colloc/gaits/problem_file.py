@@ -7,10 +7,34 @@ import traceback
 from dataclasses import dataclass
 from pathlib import Path
 
-from colloc.gaits.problem import Problem, Reference
+from colloc.gaits.problem import Problem
 from colloc.system.errors import ProblemError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A value to hold the result against.
+
+    Parameters
+    ----------
+    efficiency : float
+    tolerance : float
+        Largest difference that counts as agreement.
+    source : str
+        Where the value comes from.
+
+    Examples
+    --------
+    >>> from colloc import Reference
+    >>> Reference(efficiency=0.259, tolerance=0.0015, source="S. Alben (2019)").efficiency
+    0.259
+    """
+
+    efficiency: float
+    tolerance: float
+    source: str
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from colloc.mechanics.link_friction import LinkForce
-from colloc.numerics.arrays import Array, namespace
+from colloc.numerics.arrays import Array
 
 Matrix = tuple[tuple[Any, ...], ...]
 """2 x 2 of a point or 3 x 3 of a link, of arrays."""
@@ -105,20 +105,3 @@ class Law(Protocol):
 def rate_independent(law: Law) -> bool:
     """The force does not depend on the speed: distance and work belong to the path, and its pacing is a gauge."""
     return law.degree == 0
-
-
-def distance_power(law: Law) -> float:
-    """The power k at which the distance counts in the efficiency d^k/W of a period of duration 1.
-
-    Dry friction has d/W, viscous drag d^2/W: over the work of towing a straight body as far in that time it is a pure number
-    (Lighthill's efficiency; Becker, Koehler and Stone, J. Fluid Mech. 490, 2003). With force v^p it is k = 1 + p, and then
-    1/`smallest` bounds it: by Jensen's inequality the least work is that of sliding evenly in the direction of least friction.
-    A law without degree has d/W.
-    """
-    return 1.0 + (law.degree or 0.0)
-
-
-def efficiency(law: Law, distance: Array, work: Array) -> Array:
-    """d^k/W of a period (see `distance_power`), with the sign of d."""
-    k = distance_power(law)
-    return distance / work if k == 1 else distance * namespace(distance).abs(distance) ** (k - 1) / work

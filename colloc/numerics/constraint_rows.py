@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -64,10 +65,22 @@ def quadrature_group(name: str, variable: np.ndarray, output: int, n_out: int, m
     return equalities(name, state @ selector(variable[0], n), {"point": (-unit * rate @ pick).tocsr()})
 
 
-def rotation_groups(symmetry: str, theta: np.ndarray, n: int) -> list[Group]:
-    """How the orientation, variables `theta` in order, closes where no symmetry does it."""
+def rotation_groups(symmetry: str, theta: np.ndarray, n: int, turn: float | None) -> list[Group]:
+    """How the orientation, variables `theta` in order, closes where no symmetry does it: after a given turn; None: freely."""
     sign = {"none": -1.0, "antipodal": 1.0, "bilateral": None}[symmetry]
-    if sign is None:
+    if sign is None or turn is None:
         return []
     row = sparse.csr_matrix(([1.0, sign], ([0, 0], [theta[-1], theta[0]])), shape=(1, n))
-    return [equalities("rotation", row)]
+    return [Group("rotation", np.array([turn]), np.array([turn]), row)]
+
+
+def total_group(name: str, variable: np.ndarray, mesh: Mesh, n: int, unit: float) -> Group:
+    """A variable ``(1, 1)`` is the integral over the mesh of the output of the block `name`, which is per `unit` of time."""
+    _, rate = mesh.quadrature()
+    return equalities(name, selector(variable[0], n), {name: sparse.csr_matrix(-unit * rate.sum(axis=0))})
+
+
+def least_group(name: str, least: Sequence[float], n: int) -> Group:
+    """Outputs of the block of the same name are no less than given values."""
+    lower, rows = np.array(least, dtype=float), len(least)
+    return Group(name, lower, np.full(rows, np.inf), sparse.csr_matrix((rows, n)), {name: sparse.eye(rows, format="csr")})

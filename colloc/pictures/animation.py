@@ -70,7 +70,7 @@ class _Scene:
         axes.tick_params(length=0, labelbottom=False, labelleft=False)
         axes.spines[:].set_visible(False)
         verdict = "" if solution.status == "solved" else f"  ({solution.status})"
-        title = f"{solution.problem.name}   efficiency {solution.measured.efficiency:.4f}{verdict}"
+        title = f"{solution.problem.name}   {solution.problem.objective.name} {solution.measured.value:.4f}{verdict}"
         figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
         self.phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
         self.trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, VERMILION)]

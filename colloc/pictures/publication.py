@@ -45,26 +45,26 @@ class Panel(NamedTuple):
 
 
 def draw_convergence(axes: Axes, solution: Solution) -> None:
-    """Efficiency at every level of the continuation against its delta; crosses did not converge."""
+    """The objective at every level of the continuation against its delta; crosses did not converge."""
     good = [level for level in solution.levels if level.optimal]
     bad = [level for level in solution.levels if not level.optimal]
     deltas = np.array([level.delta for level in solution.levels])
-    axes.plot([level.delta for level in good], [level.efficiency for level in good], "o-", color=BLUE, ms=4, lw=1.2)
+    axes.plot([level.delta for level in good], [level.value for level in good], "o-", color=BLUE, ms=4, lw=1.2)
     if good:
         axes.set_ylim(*axes.get_ylim())
-    axes.plot([level.delta for level in bad], [level.efficiency for level in bad], "x", color=VERMILION, ms=5)
-    axes.set(xlabel="δ  [length/period]", ylabel="efficiency d/W")
+    axes.plot([level.delta for level in bad], [level.value for level in bad], "x", color=VERMILION, ms=5)
+    axes.set(xlabel="δ  [length/period]", ylabel=solution.problem.objective.label)
     axes.ticklabel_format(axis="y", useOffset=False)
     set_log(axes, "x", (deltas.min() / 2, deltas.max() * 2))
 
 
 def mesh_errors(solution: Solution) -> np.ndarray:
-    """Estimated error of the efficiency from every mesh interval, ``(n,)``, magnitudes."""
-    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.delta_per_period).efficiency)
+    """Estimated error of the objective from every mesh interval, ``(n,)``, magnitudes."""
+    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.delta_per_period).value)
 
 
 def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
-    """Estimated error of the efficiency from every mesh interval, `mesh_errors`, and what is allowed in all."""
+    """Estimated error of the objective from every mesh interval, `mesh_errors`, and what is allowed in all."""
     edges, shown, tolerance = solution.mesh.edges, np.maximum(errors, 1e-12), solution.problem.mesh_tolerance
     axes.stairs(shown, edges, color=ORANGE, lw=1.2, baseline=None)
     draw_mesh_ticks(axes, edges)

@@ -13,7 +13,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
-from colloc.gaits.problem import Reference
+from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.problem_file import Reference
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.style import INK, styled
@@ -34,12 +35,12 @@ PLAIN = {
     "joint limits": "No joint bends further than it may, at any instant.",
     "tangent angle": "The body bends no further from its own direction than it may, so that it cannot cross itself.",
     "self-contact": "No part of the body passes through another, at any instant.",
-    "replay gap": "An independent replay of the motion finds the same efficiency.",
+    "replay gap": "An independent replay of the motion finds the same value.",
     "replay error": "The replay itself is as exact as was asked for.",
     "work = dissipation": "All work of what bends the body goes into friction: energy is conserved.",
-    "mesh error": "More time steps would hardly change the efficiency.",
-    "delta influence": "Friction is smoothed a little at rest; that hardly changes the efficiency.",
-    "one motion": "Friction leaves the body no choice of another motion, or none that changes the efficiency.",
+    "mesh error": "More time steps would hardly change the result.",
+    "delta influence": "Friction is smoothed a little at rest; that hardly changes the result.",
+    "one motion": "Friction leaves the body no choice of another motion, or none that changes the result.",
     "joins": "The pieces of the path meet without a jump.",
     "curvature": "The path bends no more sharply than it may.",
 }
@@ -91,7 +92,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
         found["gait_pictures"] = [_plane(drawn[name], body.coordinate, j) for j, name in enumerate(planes)]
         found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
         found["convergence_pictures"] = [
-            _picture(drawn["convergence"], "efficiency at each level"),
+            _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
             _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
         ]
         found |= {"motion": motion_data(frames(solution), body.hinges), "errors": float(errors.sum())}
@@ -130,7 +131,10 @@ def _headline(solution: Solution) -> str:
     if not solution.levels:
         return "no gait was found"
     measured = solution.measured
-    return f"moves {measured.distance:.2g} body lengths a cycle; {measured.efficiency:.2g} body lengths per unit of work"
+    best = solution.problem.objective
+    other = "" if best == EFFICIENCY else f"; {best.name} {measured.value:.3g}"
+    moves = f"moves {measured.distance:.2g} body lengths a cycle; {measured.efficiency:.2g} body lengths per unit of work"
+    return moves + other
 
 
 def _comparison(solution: Solution, reference: Reference | None) -> str:

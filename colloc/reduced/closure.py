@@ -50,10 +50,10 @@ class _Nearest:
 
 
 def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> AnyGait:
-    """A gait near a given one whose net rotation vanishes and that encloses the same area.
+    """A gait near a given one whose net rotation is as prescribed and that encloses the same area.
 
-    Where a symmetry closes the rotation, and for gaits that are no Fourier series, it is the gait itself. A start need not be
-    perfect: where SQP does not come to rest in a few steps, what it has found is returned.
+    Where a symmetry closes the rotation or nothing prescribes it, and for gaits that are no Fourier series, it is the gait
+    itself. A start need not be perfect: where SQP does not come to rest in a few steps, what it has found is returned.
 
     Parameters
     ----------
@@ -63,12 +63,14 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
     delta : float, optional
         In the units of the problem's class; by default the problem's.
     """
-    if problem.gait.symmetry != NONE or not gait.is_series:
+    if problem.gait.symmetry != NONE or problem.rotation is None or not gait.is_series:
         return gait
     delta = problem.delta if delta is None else delta
     if problem.gait.unit_speed:
         delta *= path_length(gait)
     harmonics: Harmonic = seed_class(problem)
-    space, v = space_near(problem.with_(gait=harmonics, guess=gait, intervals=_INTERVALS + 4 * harmonics.harmonics), gait)
+    space, v = space_near(
+        problem.with_(gait=harmonics, guess=gait, intervals=_INTERVALS + 4 * harmonics.harmonics, at_least=()), gait
+    )
     program, area = ReducedProgram(space, delta), harmonics.enclosed_area(problem.body.n_joint)
     return space.member(minimised(_Nearest(program, v, area), v, np.inf, _ACCURACY, _STEPS).v)

@@ -1,4 +1,4 @@
-r"""Efficiency and net rotation of a collocated gait as functions of the gait alone, with exact gradients.
+r"""Distance, work, net rotation and path length of a collocated gait as functions of the gait alone, with exact gradients.
 
 On a mesh with nodes (A, b) and intervals of length h every equation of the collocation fixes one unknown: the balance the
 tail velocity, its rotation rate omega the orientation theta, both the displacement D and the work W,
@@ -7,7 +7,7 @@ tail velocity, its rotation rate omega the orientation theta, both the displacem
     D = sum_ki h_k b_i e^(i theta_ki) c_ki,      W = sum_ki h_k b_i P_ki,
 
 c being the velocity of the centre of mass in the body frame and P the power. What is left is a program of the gait's
-parameters v alone: minimise -|D|/W where the rotation closes. Gradients take one sweep back through theta.
+parameters v alone: of |D|, W, the rotation and the length of the path. Gradients take one sweep back through theta.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.gaits.symmetry import ANTIPODAL, BOTH
+from colloc.gaits.symmetry import ANTIPODAL, BOTH, fraction
 from colloc.mechanics.bodies import BalanceSolution, Body
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
@@ -66,7 +66,7 @@ class _State:
 
 
 class ReducedMotion:
-    """-d/W and rotation of gaits on a mesh as functions of their parameters.
+    """What a period of gaits on a mesh comes to, as functions of their parameters.
 
     Parameters
     ----------
@@ -75,10 +75,13 @@ class ReducedMotion:
     mesh : Mesh
         Of the part of the period that is solved.
     shapes : Shapes
+    with_length : bool
+        Whether the length of the path is asked for.
     """
 
-    def __init__(self, body: Body, friction: Law, symmetry: str, mesh: Mesh, shapes: Shapes) -> None:
+    def __init__(self, body: Body, friction: Law, symmetry: str, mesh: Mesh, shapes: Shapes, with_length: bool = False) -> None:
         self.body, self.friction, self.shapes, self.mesh = body, friction, shapes, mesh
+        self._periods, self._with_length = 1.0 / fraction(symmetry), with_length
         # share of the rotation, and of the sum of all bends, by which the direction of travel is turned
         self._turned_by = {ANTIPODAL: (0.5, 0.0), BOTH: (1.0, 0.5)}.get(symmetry)
         self._weight = mesh.h[:, None] * mesh.scheme.b
@@ -132,23 +135,29 @@ class ReducedMotion:
         """Rate of the sum of all joint angles at the stages, ``(n, s)``."""
         return (s.rates.sum(axis=0) * s.pace).reshape(-1, self.mesh.n_point).sum(axis=0)[self.mesh.points]
 
-    def values(self, v: np.ndarray, delta: float) -> tuple[float, float]:
-        """-d/W and the net rotation over the part of the period that is solved [rad]."""
+    def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
+        """Distance along the direction of travel and work of a whole period, net rotation over the part that is solved [rad],
+        and, if asked for, the length of the path."""
         s = self.at(v, delta)
-        return -self.distance(v, delta) / s.work, s.rotation
+        distance = float((s.displacement * np.conj(self._direction(s))).real)
+        found = {"distance": self._periods * distance, "work": self._periods * s.work, "rotation": s.rotation}
+        if self._with_length:
+            pieces = np.linalg.norm(s.rates, axis=0) * s.pace
+            found["length"] = self._periods * float(pieces @ self._on_columns(s))
+        return found
 
-    def distance(self, v: np.ndarray, delta: float) -> float:
-        """Displacement along the direction of travel, over the part of the period that is solved."""
-        s = self.at(v, delta)
-        return float((s.displacement * np.conj(self._direction(s))).real)
+    def _on_columns(self, s: _State) -> np.ndarray:
+        """Weight of every point of every block in an integral over the part of the period that is solved."""
+        weight = np.zeros(self.mesh.n_point)
+        np.add.at(weight, self.mesh.points, self._weight)
+        return np.tile(weight, s.pace.size // self.mesh.n_point)
 
-    def gradients(self, v: np.ndarray, delta: float) -> np.ndarray:
-        """Derivatives of `values`, ``(2, n)``."""
+    def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
+        """Derivatives of `values`, ``(n,)`` each."""
         s, mesh, rule, h = self.at(v, delta), self.mesh, self.mesh.scheme, self.mesh.h[:, None]
         slopes = self.body.slopes(self.friction, s.angles, s.rates, delta, s.solved)
         self._near = (s, slopes)
         back = np.conj(self._direction(s))
-        distance = (s.displacement * back).real
 
         # distance: directly through c, and through every theta
         on_theta = self._weight * (1j * s.turned * back).real
@@ -172,10 +181,14 @@ class ReducedMotion:
         on_pace = np.einsum("krt,rt->kt", on_out, s.out)
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[_OUTPUTS])
         if on_bend:
-            weight = np.zeros(mesh.n_point)
-            np.add.at(weight, mesh.points, on_bend * self._weight)
-            weight = np.tile(weight, s.pace.size // mesh.n_point)
+            weight = on_bend * self._on_columns(s)
             on_shape[0, :, len(s.rates) :] += (weight * s.pace)[:, None]
             on_pace[0] += weight * s.rates.sum(axis=0)
-        d, w, rotation = self.shapes.pulled_back(v, on_shape, on_pace)
-        return np.stack([(distance / s.work * w - d) / s.work, rotation])
+        if self._with_length:
+            weight, size = self._on_columns(s), np.linalg.norm(s.rates, axis=0)
+            along = np.zeros((1, *on_shape.shape[1:]))
+            along[0, :, len(s.rates) :] = (weight * s.pace * s.rates / np.maximum(size, 1e-300)).T
+            on_shape, on_pace = np.concatenate([on_shape, along]), np.concatenate([on_pace, (weight * size)[None]])
+        d, w, rotation, *length = self.shapes.pulled_back(v, on_shape, on_pace)
+        found = {"distance": self._periods * d, "work": self._periods * w, "rotation": rotation}
+        return found | dict(zip(["length"], [self._periods * row for row in length], strict=False))

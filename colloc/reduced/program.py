@@ -1,4 +1,4 @@
-"""The program of a search: the gait's parameters alone, with net rotation and admissibility as rows."""
+"""The program of a search: the gait's parameters alone; net rotation, values to be reached and admissibility are rows."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Pairs
@@ -56,7 +57,9 @@ class SearchSpace(Shapes, Protocol):
 
 
 class ReducedProgram:
-    """Minimise -d/W over a class of gaits on a mesh, at one delta; rows: net rotation where nothing closes it, the space's.
+    """Maximise a problem's objective over a class of gaits on a mesh, at one delta.
+
+    Rows: net rotation where it is prescribed and no symmetry closes it, what must be reached at least, the space's.
 
     Attributes
     ----------
@@ -68,41 +71,50 @@ class ReducedProgram:
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
         problem = space.problem
-        self.motion = ReducedMotion(problem.body, problem.friction, problem.gait.symmetry, space.mesh, space)
-        self._closes = problem.gait.symmetry == NONE
+        self.motion = ReducedMotion(
+            problem.body, problem.friction, problem.gait.symmetry, space.mesh, space, problem.uses("length")
+        )
+        turns = [problem.rotation] if problem.gait.symmetry == NONE and problem.rotation is not None else []
+        least = [value for _, value in problem.at_least]
+        self._objective, self._closes, self._reached = problem.objective, bool(turns), [aim for aim, _ in problem.at_least]
+        self._own_lower, self._own_upper = np.array([*turns, *least]), np.array([*turns, *np.full(len(least), np.inf)])
         self.lower, self.upper = space.lower, space.upper
-        self._gradients: tuple[bytes, float, np.ndarray] | None = None
+        self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
 
     @property
     def row_lower(self) -> np.ndarray:
         """Lower bounds of the rows; they change as the checks move."""
-        return np.append(0.0, self.space.row_lower) if self._closes else self.space.row_lower
+        return np.concatenate([self._own_lower, self.space.row_lower])
 
     @property
     def row_upper(self) -> np.ndarray:
         """Upper bounds of the rows."""
-        return np.append(0.0, self.space.row_upper) if self._closes else self.space.row_upper
+        return np.concatenate([self._own_upper, self.space.row_upper])
 
     def objective(self, v: np.ndarray) -> float:
-        """-d/W."""
-        return float(self.motion.values(v, self.delta)[0])
+        """Minus the value that is maximised."""
+        return -float(self._objective(self.motion.values(v, self.delta)))
 
     def gradient(self, v: np.ndarray) -> np.ndarray:
         """Of the objective, ``(n,)``."""
-        return self._both(v)[0]
+        return -self._slope(self._objective, v)
 
-    def _both(self, v: np.ndarray) -> np.ndarray:
+    def _slope(self, aim: Objective, v: np.ndarray) -> np.ndarray:
+        return aim.with_slopes(self.motion.values(v, self.delta), self._slopes(v)).slope + np.zeros_like(v)
+
+    def _slopes(self, v: np.ndarray) -> dict[str, np.ndarray]:
         key = v.tobytes()
         if self._gradients is None or self._gradients[:2] != (key, self.delta):
             self._gradients = (key, self.delta, self.motion.gradients(v, self.delta))
         return self._gradients[2]
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        """Net rotation, if it is a row, and the rows of the space."""
-        own = self.space.rows(v)
-        return np.append(self.motion.values(v, self.delta)[1], own) if self._closes else own
+        """Net rotation, if it is a row, what must be reached, and the rows of the space."""
+        values = self.motion.values(v, self.delta) if self._own_lower.size else {}
+        own = [values["rotation"]] if self._closes else []
+        return np.concatenate([own, [aim(values) for aim in self._reached], self.space.rows(v)])
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        own = self.space.row_slopes(v)
-        return np.vstack([self._both(v)[1], own]) if self._closes else own
+        own = [self._slopes(v)["rotation"]] if self._closes else []
+        return np.vstack([*own, *(self._slope(aim, v) for aim in self._reached), self.space.row_slopes(v)])

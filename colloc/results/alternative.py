@@ -13,8 +13,8 @@ class Alternative:
 
     Attributes
     ----------
-    efficiency : float
-        As collocation sees it on a first mesh.
+    value : float
+        Of the objective, as collocation sees it on a first mesh.
     delta : float
         To which it was followed.
     starts : int
@@ -24,7 +24,7 @@ class Alternative:
     gait : AnyGait
     """
 
-    efficiency: float
+    value: float
     delta: float
     starts: int
     on_speed_floor: bool

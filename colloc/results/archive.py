@@ -5,9 +5,9 @@ also at the same time. The rows (NAME.sqlite beside NAME.h5) are what a search g
 HDF5 file is made of them when a search ends, with named dimensions; a free path or polygon is there by its Fourier series::
 
     start, sampler, seed, status, message                        (start)
-    efficiency, efficiency_error, distance, work, delta, iterations, seconds, cpu_seconds    (start)
+    value, value_error, efficiency, efficiency_error, distance, work, delta, iterations, seconds, cpu_seconds    (start)
     guess_mean, gait_mean (start, joint)         guess_cos, guess_sin, gait_cos, gait_sin (start, joint, harmonic)
-    basin_{row,count,frequency,efficiency,on_speed_floor} (basin)      distinct optima, best first; row: which start is best
+    basin_{row,count,frequency,value,efficiency,on_speed_floor} (basin)     distinct optima, best first; row: the best start
     problem, versions: JSON texts; attributes problem_hash, command (the last one that added to it)
 """
 
@@ -41,6 +41,8 @@ _COLUMNS = {
     "message": "text",
     "efficiency": "1/weight",
     "efficiency_error": "1/weight",
+    "value": "of the objective",
+    "value_error": "of the objective",
     "distance": "length",
     "work": "weight length",
     "delta": "length/period",
@@ -194,5 +196,6 @@ def _write(file: h5py.File, archive: Archive, command: str) -> None:
     put_column("basin_count", [len(b.starts) for b in found], "1", "basin")
     put_column("basin_frequency", [b.frequency for b in found], "share of starts", "basin")
     put_column("basin_efficiency", [b.best.efficiency for b in found], "1/weight", "basin")
+    put_column("basin_value", [b.best.value for b in found], "of the objective", "basin")
     floor = [int(on_speed_floor(archive.problem, b.best.gait)) for b in found]
     put_column("basin_on_speed_floor", floor, "1", "basin")

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
@@ -24,7 +25,7 @@ MOTIONS = 1e-2
 """Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
 SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
-"""Curvatures of the efficiency over the efficiency [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
+"""Curvatures of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
 5e-5, what the mesh may be wrong by; less than FLAT is called flat. NEAR: largest gradient at which they mean anything."""
 _MOST_PARAMETERS = 150
 
@@ -46,7 +47,7 @@ def certify(
     ----------
     solution : Solution
     tolerance : float
-        Relative error of the replayed efficiency; a replay that does not reach it fails its check.
+        Relative error of the replayed objective; a replay that does not reach it fails its check.
     instants : int, optional
         Instants of the first replay grid; by default many times the collocation points of a period.
     second_order : Check, optional
@@ -77,7 +78,7 @@ def certify(
         solution.gait.corner_phases,
         instants,
         tolerance,
-        claimed=solution.efficiency,
+        claimed=solution.value,
         before=(*_optimality(solution), second_order or _second_order(solution)),
         after=(*_class(solution), *_mesh(solution)),
     )
@@ -110,16 +111,18 @@ def gait_certificate(
     instants, tolerance
         Of the replay, see `certify`.
     claimed : float, optional
-        An efficiency that the replay has to confirm.
+        A value of the problem's objective that the replay has to confirm.
     before, after : tuple of Check
         What else has to hold.
     """
 
-    known = measured(problem.body, problem.friction, path, delta, tolerance=tolerance, instants=instants, breaks=breaks)
+    settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
+    known = measured(problem.body, problem.friction, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
         *before,
         *_motion(problem, path, fine, breaks, tolerance, claimed),
+        *_reached(problem, fine),
         _one_motion(problem, fine),
         *after,
         *_delta(problem, fine, known.limit.value),
@@ -130,11 +133,17 @@ def gait_certificate(
         fine.distance,
         fine.work,
         known.efficiency_error,
-        known.limit.value,
+        known.efficiency_limit.value,
         fine.instants,
-        known.limit.error,
+        known.efficiency_limit.error,
         known.distance_error,
         known.work_error,
+        fine.value,
+        known.value_error,
+        known.limit.value,
+        known.limit.error,
+        fine.rotation,
+        fine.length,
     )
 
 
@@ -142,10 +151,12 @@ class Measured(NamedTuple):
     """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for every balanced motion."""
 
     fine: Replay
+    value_error: float
+    limit: Limit
     efficiency_error: float
+    efficiency_limit: Limit
     distance_error: float
     work_error: float
-    limit: Limit
 
 
 def measured(
@@ -157,22 +168,41 @@ def measured(
     tolerance: float = 1e-6,
     instants: int = 1600,
     breaks: np.ndarray | tuple[float, ...] = (),
+    objective: Objective = EFFICIENCY,
+    rotation: float | None = 0.0,
 ) -> Measured:
-    """Efficiency, distance and work of a path at delta, and the limit of the efficiency for delta -> 0, with their errors.
+    """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
 
-    Arguments are those of `colloc.verification.replay.replay`.
+    Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked for: the distance of a body
+    that turns by more depends on the point that is followed.
     """
     replays: list[Replay] = []
     for part in (1.0, 0.1, 0.01) if friction.regularised else (1.0,):
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
-        replays.append(replay(*at, instants=instants, tolerance=tolerance, breaks=breaks, near=near))
-    errors = [each.efficiency * (each.error + each.turning + each.ambiguity) for each in replays]
-    values = [each.efficiency for each in replays]
-    limit = extrapolated_limit(values, errors) if friction.regularised else Limit(values[0], errors[0])
+        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "near": near, "objective": objective}
+        replays.append(replay(*at, **settings))  # type: ignore[arg-type]
+    known = []
+    for aim in (objective, EFFICIENCY):
+        values = [aim(each.period) for each in replays]
+        errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
+        limit = extrapolated_limit(values, errors) if friction.regularised else Limit(values[0], errors[0])
+        known.append((errors[0], limit))
     fine = replays[0]
-    distance_error = fine.distance_error + fine.turning * fine.distance + fine.other_distance
-    return Measured(fine, errors[0], distance_error, fine.work_error + fine.other_work, limit)
+    distance_error = fine.distance_error + astray(fine, rotation) + fine.other_distance
+    return Measured(fine, *known[0], *known[1], distance_error, fine.work_error + fine.other_work)
+
+
+def astray(replayed: Replay, rotation: float | None) -> float:
+    """How far the distance depends on the point of the body that is followed: by the rotation beyond what is asked for."""
+    return 0.0 if rotation is None else abs(replayed.rotation - rotation) * replayed.lever
+
+
+def _error(replayed: Replay, aim: Objective, rotation: float | None) -> float:
+    """Relative error of an objective, for every reason."""
+    by_lever = float(aim.relative_error(replayed.period, {"distance": astray(replayed, rotation)}))
+    error = replayed.error if aim == replayed.objective else replayed.error_of(aim)
+    return error + by_lever + replayed.ambiguity_of(aim)
 
 
 def _optimality(solution: Solution) -> list[Check]:
@@ -200,7 +230,7 @@ def _second_order(solution: Solution) -> Check:
     if v.size > _MOST_PARAMETERS:
         return Check("second order", 0.0, SADDLE, f"not measured, for {v.size} parameters")
     found = curvature(ReducedProgram(space, level.delta), v)
-    size = abs(level.efficiency)
+    size = abs(level.value)
     least, error = found.smallest / size, found.error / size
     value = max(-least - error, 0.0)
     if not found.kkt_error < NEAR * size:
@@ -226,12 +256,12 @@ def _motion(
     checks = [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
         Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),
-        Check("net rotation", fine.turning, ROTATION, "over a period, times the body's reach over the distance"),
+        *_rotation(problem, fine),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
     ]
     if claimed is not None:
-        gap = _beyond(claimed / fine.efficiency - 1, fine.ambiguity)
+        gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
     return [
         *checks,
@@ -240,13 +270,31 @@ def _motion(
     ]
 
 
+def _rotation(problem: Problem, fine: Replay) -> list[Check]:
+    """The net rotation, where it is prescribed."""
+    if problem.rotation is None:
+        return []
+    which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a period"
+    value = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
+    return [Check("net rotation", value, ROTATION, f"{which}, times the body's reach over the distance")]
+
+
+def _reached(problem: Problem, fine: Replay) -> list[Check]:
+    """Values that have to be reached."""
+    checks = []
+    for aim, least in problem.at_least:
+        lacks = max(least - aim(fine.period), 0.0) / max(abs(least), 1e-300)
+        checks.append(Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay"))
+    return checks
+
+
 def _beyond(value: float, unknown: float) -> float:
     """The part of a difference that something of unknown sign does not explain."""
     return float(np.copysign(max(abs(value) - unknown, 0.0), value))
 
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
-    """How far the efficiency depends on which of several balanced motions the body takes."""
+    """How far the objective depends on which of several balanced motions the body takes."""
     if problem.friction.associated:
         meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:
@@ -270,9 +318,11 @@ def _mesh(solution: Solution) -> list[Check]:
     if tolerance == 0:
         return []
     error = mesh_error(problem, solution.mesh, solution.gait, solution.delta_per_period, tolerance)
-    return [Check("mesh error", error.estimate, tolerance, "of the efficiency, relative, from defects between nodes")]
+    return [
+        Check("mesh error", error.estimate, tolerance, f"of the {problem.objective.name}, relative, from defects between nodes")
+    ]
 
 
 def _delta(problem: Problem, fine: Replay, at_zero: float) -> list[Check]:
     allowed = problem.body.usual.delta_influence
-    return [Check("delta influence", at_zero / fine.efficiency - 1, allowed, "same gait at delta -> 0, relative change")]
+    return [Check("delta influence", at_zero / fine.value - 1, allowed, "same gait at delta -> 0, relative change")]

@@ -27,6 +27,14 @@ class Check:
         )
 
 
+_USUAL = {
+    "value": "efficiency",
+    "value_error": "efficiency_error",
+    "value_at_zero_delta": "efficiency_at_zero_delta",
+    "value_error_at_zero_delta": "error_at_zero_delta",
+}
+
+
 @dataclass(frozen=True, repr=False)
 class Certificate:
     """The verdict of an independent replay.
@@ -47,6 +55,10 @@ class Certificate:
         Error of the extrapolation (`colloc.results.delta_limit.extrapolated_limit`); NaN if an older file does not state it.
     distance_error, work_error : float
         The same of distance and work; NaN if an older file does not state it.
+    value, value_error, value_at_zero_delta, value_error_at_zero_delta : float
+        The same as of the efficiency, of the problem's objective; by default the efficiency's.
+    rotation, length : float
+        Net rotation, and length of the path in shape space, of the period [rad]; NaN if an older file does not state it.
     """
 
     checks: tuple[Check, ...]
@@ -59,6 +71,17 @@ class Certificate:
     error_at_zero_delta: float = float("nan")
     distance_error: float = float("nan")
     work_error: float = float("nan")
+    value: float = float("nan")
+    value_error: float = float("nan")
+    value_at_zero_delta: float = float("nan")
+    value_error_at_zero_delta: float = float("nan")
+    rotation: float = float("nan")
+    length: float = float("nan")
+
+    def __post_init__(self) -> None:
+        for name, usual in _USUAL.items():
+            if np.isnan(getattr(self, name)):
+                object.__setattr__(self, name, getattr(self, usual))
 
     def __repr__(self) -> str:
         if not self.replayed:

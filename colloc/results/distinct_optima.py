@@ -16,9 +16,9 @@ from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
 
 TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
 STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, TIME_LIMIT, ERROR, CRASHED)
-SAME_EFFICIENCY, SAME_GAIT = 1e-3, 0.05
-"""Two certified optima are the same if their efficiencies differ by less than this relative amount and their paths by less
-than this root-mean-square distance [rad], modulo symmetries. Efficiency is flat at its maximum, so the path is the laxer."""
+SAME_VALUE, SAME_GAIT = 1e-3, 0.05
+"""Two certified optima are the same if their values differ by less than this relative amount and their paths by less than
+this root-mean-square distance [rad], modulo symmetries. The objective is flat at its maximum, so the path is the laxer."""
 SERIES_HARMONICS = 16
 """Free paths and polygons are tabulated and told apart by their Fourier series in arc length."""
 
@@ -56,6 +56,8 @@ class Outcome:
         Wall time, certificate included.
     cpu_seconds : float
         Processor time of the same, which other work on the machine does not lengthen as much.
+    value, value_error : float
+        Of the problem's objective; by default those of the efficiency.
     """
 
     start: int
@@ -71,6 +73,13 @@ class Outcome:
     iterations: int = 0
     seconds: float = 0.0
     cpu_seconds: float = 0.0
+    value: float = np.nan
+    value_error: float = np.nan
+
+    def __post_init__(self) -> None:
+        for name, usual in (("value", self.efficiency), ("value_error", self.efficiency_error)):
+            if np.isnan(getattr(self, name)):
+                object.__setattr__(self, name, usual)
 
     def __repr__(self) -> str:
         return f"<Outcome of start {self.start}: {self.status}, d/W = {self.efficiency:.6g}, {self.cpu_seconds:.1f} s>"
@@ -83,7 +92,7 @@ class Basin:
     Attributes
     ----------
     best : Outcome
-        Its most efficient member.
+        Its member of largest value.
     starts : tuple of int
     frequency : float
         Share of all starts tried.
@@ -100,17 +109,17 @@ class Basin:
 def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     """The distinct certified optima, best first.
 
-    Outcomes join the first, more efficient, optimum they agree with in efficiency and in gait modulo start phase and the
+    Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase and the
     symmetries of body and friction (see `colloc.gaits.equivalence.images`).
     """
-    solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.efficiency)
+    solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value)
     found: list[list[Outcome]] = []
     paths: list[Fourier] = []
     for outcome in solved:
         path = fourier_series(problem, outcome.gait)
         for members, near in zip(found, paths, strict=True):
             best = members[0]
-            if best.efficiency - outcome.efficiency > SAME_EFFICIENCY * best.efficiency:
+            if best.value - outcome.value > SAME_VALUE * abs(best.value):
                 continue
             if distance(near, path, problem.body, problem.friction) < SAME_GAIT:
                 members.append(outcome)

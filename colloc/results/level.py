@@ -36,6 +36,8 @@ class Level:
     seconds, evaluation_seconds : float
     scheme : str
         Collocation scheme, which refinement may have raised in order; "" for the problem's.
+    objective : float
+        Value of the problem's objective, where that is not the efficiency.
     program : str
         What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
         formulation; "prescribed" where nothing is free.
@@ -59,6 +61,12 @@ class Level:
     evaluation_seconds: float
     scheme: str = ""
     program: str = REDUCED
+    objective: float = float("nan")
+
+    @property
+    def value(self) -> float:
+        """Of the problem's objective."""
+        return self.efficiency if np.isnan(self.objective) else self.objective
 
     def __repr__(self) -> str:
         verdict = "" if self.optimal else f", {self.status}"

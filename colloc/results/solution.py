@@ -14,6 +14,7 @@ import numpy as np
 
 from colloc.collocation.layout import Layout, problem_layout
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Sliding
 from colloc.numerics.mesh import Mesh
@@ -90,8 +91,9 @@ class Solution:
         facts = [self.problem.name, self.status]
         if self.levels:
             replayed = "" if self.certificate.replayed else " (not replayed)"
-            error = f" +- {self.certificate.efficiency_error:.0e}" if self.certificate.replayed else ""
-            facts.append(f"d/W = {self.measured.efficiency:.6g}{error}{replayed} at delta = {self.last.delta:.1e}")
+            error = f" +- {self.certificate.value_error:.0e}" if self.certificate.replayed else ""
+            what = self.problem.objective.short
+            facts.append(f"{what} = {self.measured.value:.6g}{error}{replayed} at delta = {self.last.delta:.1e}")
         return f"<Solution {', '.join(facts)}>"
 
     @property
@@ -122,8 +124,13 @@ class Solution:
 
     @property
     def measured(self) -> Certificate | Level:
-        """What says efficiency, distance and work best: the replay if there was one, else the last level."""
+        """What says the objective, efficiency, distance and work best: the replay if there was one, else the last level."""
         return self.certificate if self.certificate.replayed else self.last
+
+    @property
+    def value(self) -> float:
+        """Of the problem's objective, at the last level; the certificate says whether to believe it."""
+        return self.last.value
 
     @property
     def efficiency(self) -> float:
@@ -147,7 +154,7 @@ class Solution:
         lines = [f"local optimum, best of {self.starts} starts; {best.starts} led here"]
         for other in others[:_MOST_OTHERS]:
             size = ", as small as the bound on the shape speed allows" if other.on_speed_floor else ""
-            lines.append(f"also met: {other.efficiency:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
+            lines.append(f"also met: {other.value:.4f} at delta {other.delta:.0e} from {other.starts}{size}")
         return lines
 
     @property
@@ -266,6 +273,8 @@ class Solution:
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
         about = {"name": self.problem.name, "status": self.status, "efficiency": self.measured.efficiency}
+        if self.problem.objective != EFFICIENCY:
+            about |= {"objective": self.problem.objective.name, "value": self.measured.value}
         return motion_dataset(self._columns(t), about)
 
     def to_dataframe(self, t: np.ndarray | None = None) -> pandas.DataFrame:
@@ -283,12 +292,14 @@ class Solution:
     def _facts(self) -> list[tuple[str, str]]:
         if not self.levels:
             return []
-        certificate = self.certificate
+        certificate, best = self.certificate, self.problem.objective
         if not certificate.replayed:
-            return [("efficiency (not replayed)", f"{self.efficiency:.5f}"), ("δ", f"{self.last.delta:.0e}")]
+            return [(f"{best.name} (not replayed)", f"{self.value:.5f}"), ("δ", f"{self.last.delta:.0e}")]
+        own = [] if best == EFFICIENCY else [(EFFICIENCY.label, f"{certificate.efficiency:.5f}")]
         return [
-            ("efficiency d/W", f"{certificate.efficiency:.5f} ± {certificate.efficiency_error:.0e}"),
-            ("for δ → 0", f"{certificate.efficiency_at_zero_delta:.5f} ± {certificate.error_at_zero_delta:.0e}"),
+            (best.label, f"{certificate.value:.5f} ± {certificate.value_error:.0e}"),
+            ("for δ → 0", f"{certificate.value_at_zero_delta:.5f} ± {certificate.value_error_at_zero_delta:.0e}"),
+            *own,
             ("distance d", f"{certificate.distance:.5f}"),
             ("work W", f"{certificate.work:.5f}"),
             ("δ", f"{self.last.delta:.0e}"),

@@ -6,8 +6,8 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /gait/{mean,cos,sin}                                 /versions   JSON text
          or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
-    /levels/000/{edges,x,lam_x,lam_g}, attributes delta, efficiency, distance, work, kkt_error, iterations, ...
-    /certificate/{name,value,threshold,passed,meaning}, attributes efficiency, efficiency_error, ...
+    /levels/000/{edges,x,lam_x,lam_g}, attributes delta, efficiency, objective (NaN: the efficiency), ...
+    /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, efficiency, efficiency_error, ...
 """
 
 from __future__ import annotations
@@ -206,6 +206,8 @@ def _read(file: h5py.File) -> Solution:
     )
     if "others" in file:
         others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(text(file, "others"))]
+        for other in others:  # earlier files know of the efficiency only
+            other.setdefault("value", other.pop("efficiency", np.nan))
         solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
     if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
         raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")

@@ -29,6 +29,11 @@ _PATH = {
     "start": "the start of the path",
     "sides": "the least length of sides and path",
 }
+_OF_PERIOD = {
+    "length": "the length of the path",
+    "at least": "a value that has to be reached",
+    "shape speed": "the lower bound on the shape speed",
+}
 _SMALLEST_EIGENVALUE = 1e-12
 """Of the product of the equations, scaled to length 1, with their transpose: where it is less, they are redundant. What sums
 distance and work over n intervals has one of 1.2 / n^2; redundant rows have one of 1e-18."""
@@ -61,10 +66,10 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         return "the rotation between nodes", float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
     if name == "rotation":
         return "closure of the net rotation", float(mesh.edges[-1])
+    if name in _OF_PERIOD:
+        return _OF_PERIOD[name], 0.0
     if name in ("distance", "work"):
         return f"the {name} gained over an interval", float(mesh.edges[index])
-    if name == "shape speed":
-        return "the lower bound on the shape speed", 0.0
     phase = float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
     if name in body.limit_names:
         return f"the limit of {name}", phase
@@ -94,7 +99,8 @@ def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> 
     elif result.status == "still moving":
         failed, advice = "the gait kept moving from trust region to trust region", "start from a better guess"
     else:
-        failed = f"every equation holds, but the efficiency is not stationary (KKT error {result.kkt_error:.1e})"
+        what = transcription.problem.objective.name
+        failed = f"every equation holds, but the {what} is not stationary (KKT error {result.kkt_error:.1e})"
         advice = "use more intervals, since kinks at stick may be under-resolved, or start from another guess"
         if delta < SMALLEST_DELTA:
             advice = f"ask for a delta of at least {SMALLEST_DELTA:.0e}, below which rounding hides the optimum"
@@ -105,6 +111,8 @@ def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> 
 def _advice(group: str) -> str:
     if group in ("balance", "force law"):
         return "start the continuation at a larger delta_start, use more intervals, or another formulation"
+    if group == "at least":
+        return "ask for less, or start from a guess that reaches it"
     if group == "rotation":
         return "start from a guess with less net rotation, or impose a symmetry that closes it"
     if group.startswith(("joint", "links", "tangent")):

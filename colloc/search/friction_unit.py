@@ -2,6 +2,7 @@
 
 Balance and velocities depend on the ratios of the coefficients only; forces and work are proportional to them, efficiency
 inversely. So a problem with coefficients of 1e-6 is one with coefficients of 1, and its tolerances are relative to friction.
+An objective that is proportional to no power of the coefficients is left as it is.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import dataclasses
 
 import numpy as np
 
+from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.law import Law
 from colloc.results.level import Level
@@ -23,11 +25,20 @@ def friction_unit(friction: Law) -> float:
 def in_friction_units(problem: Problem) -> tuple[Problem, float]:
     """The problem with its coefficients in units of `friction_unit`, and that unit."""
     unit = friction_unit(problem.friction)
-    if unit == 1.0:
+    if unit == 1.0 or any(aim.degree is None for aim in problem.aims):
         return problem, 1.0
-    return problem.with_(friction=problem.friction.in_units_of(unit)), unit
+    least = tuple((aim, in_unit(value, 1 / unit, aim)) for aim, value in problem.at_least)
+    return problem.with_(friction=problem.friction.in_units_of(unit), at_least=least), unit
 
 
-def restated(level: Level, unit: float) -> Level:
-    """A level's efficiency and work for coefficients `unit` times as large; its variables stay in the solver's units."""
-    return dataclasses.replace(level, efficiency=level.efficiency / unit, work=level.work * unit)
+def restated(level: Level, unit: float, objective: Objective) -> Level:
+    """A level's values for coefficients `unit` times as large; its variables stay in the solver's units."""
+    if unit == 1.0:
+        return level
+    value, efficiency = in_unit(level.objective, unit, objective), level.efficiency / unit
+    return dataclasses.replace(level, efficiency=efficiency, work=level.work * unit, objective=value)
+
+
+def in_unit(value: float, unit: float, objective: Objective) -> float:
+    """The value of an objective for coefficients `unit` times as large."""
+    return value * unit ** (objective.degree or 0.0)

@@ -11,9 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.collocation.layout import problem_layout
+from colloc.collocation.layout import Layout, problem_layout
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
+from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, transcribed
 from colloc.results.level import REDUCED, Level
 from colloc.search.diagnosis import explanation
@@ -34,16 +36,14 @@ def level_found(found: Found) -> Level:
     space, problem = found.space, found.space.problem
     mesh, layout = space.phase_mesh(found.gait), problem_layout(problem, space.mesh)
     x = balanced_variables(problem, layout, mesh, found.gait, space.full_parameters(found.v), found.delta)
-    conditions, periods = found.conditions, 1.0 / problem.gait.fraction
+    conditions = found.conditions
     return Level(
         found.delta,
         mesh.edges,
         x,
         np.zeros_like(x),
         conditions.on_rows,
-        -found.objective,
-        periods * float(x[layout.distance[0, -1]]),
-        periods * float(x[layout.work[0, -1]]),
+        *_of_period(problem, layout, x),
         conditions.kkt_error,
         conditions.violation,
         conditions.complementarity,
@@ -53,22 +53,31 @@ def level_found(found: Found) -> Level:
         found.seconds,
         found.seconds,
         space.mesh.scheme.name,
+        objective=_stated(problem, -found.objective),
     )
+
+
+def _of_period(problem: Problem, layout: Layout, x: np.ndarray) -> tuple[float, float, float]:
+    """Efficiency, distance and work of a whole period."""
+    distance, work = (float(x[row[0, -1]]) / problem.gait.fraction for row in (layout.distance, layout.work))
+    return distance / work, distance, work
+
+
+def _stated(problem: Problem, value: float) -> float:
+    """`Level.objective` of a value that was found."""
+    return np.nan if problem.objective == EFFICIENCY else value
 
 
 def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -> Level:
     """What is kept of a solved program."""
-    layout, periods = program.layout, 1.0 / program.problem.gait.fraction
-    gait = program.member(result.x[layout.parameters[:, 0]])
+    gait = program.member(result.x[program.layout.parameters[:, 0]])
     return Level(
         delta,
         program.phase_mesh(gait).edges,
         result.x,
         result.lam_x,
         result.lam_g,
-        -result.objective,
-        periods * float(result.x[layout.distance[0, -1]]),
-        periods * float(result.x[layout.work[0, -1]]),
+        *_of_period(program.problem, program.layout, result.x),
         result.kkt_error,
         result.violation,
         result.complementarity,
@@ -79,6 +88,7 @@ def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -
         result.evaluation_seconds,
         program.mesh.scheme.name,
         name,
+        _stated(program.problem, -result.objective),
     )
 
 
@@ -86,7 +96,7 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     """The gait of a search as a solution of the full program, and what does not hold, or "".
 
     Where IPOPT strays from a gait at which the first-order conditions of the full program hold, the gait is kept: at a kink
-    of the collocated efficiency its second derivatives mislead.
+    of the collocated objective its second derivatives mislead.
 
     Parameters
     ----------
@@ -121,8 +131,11 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
 def _multipliers(found: Found, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
-    conditions, space = found.conditions, found.space
-    on_rows, at = conditions.on_rows[-space.row_lower.size :], 0
+    conditions, space, reached = found.conditions, found.space, len(found.space.problem.at_least)
+    of_period, on_rows = np.split(conditions.on_rows, [conditions.on_rows.size - space.row_lower.size])
+    if reached:
+        lam_g[program.groups["at least"]] = of_period[-reached:]
+    at = 0
     for name, rows in space.watched.items():
         lam_g[program.groups[name].start + rows] = on_rows[at : at + rows.size]
         at += rows.size

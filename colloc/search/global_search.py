@@ -1,7 +1,7 @@
 """The best gait, not the nearest one: many starts, cheaply told apart, the promising ones followed to the end.
 
 A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it meets a gait that an
-earlier start came through, at the same delta, it goes on as that one did, and is dropped. What is left is sorted by efficiency;
+earlier start came through, at the same delta, it goes on as that one did, and is dropped. What is left is sorted by its value;
 the first few are followed to the final delta, and the best of those is refined, answered and certified.
 """
 
@@ -46,7 +46,7 @@ _LEVELS = (1.0, 0.2)
 """Deltas at which starts are compared, in units of the problem's first one."""
 _SAME_EFFICIENCY, _SAME_GAIT = 1e-3, 0.05
 _FOLLOWED, _PROMISING = 3, 0.8
-"""How many gaits are followed to the final delta, and the share of the best efficiency that they need at the coarse one."""
+"""How many gaits are followed to the final delta, and the share of the best value that they need at the coarse one."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction."""
 _HARMONICS = 8
@@ -90,7 +90,7 @@ def same_gait(problem: Problem, a: Found, b: Found) -> bool:
 
 
 def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
-    """What the starts lead to on a coarse mesh, most efficient first, and how many were tried, at least one."""
+    """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
     intervals = min(problem.intervals, max(problem.gait.intervals(problem.body.n_joint) // 2, _FEWEST))
     coarse = problem.with_(intervals=intervals)
     deltas = [max(factor * problem.delta_start, problem.delta) for factor in _LEVELS]
@@ -180,7 +180,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf) -> Chosen:
     def is_finite(found: Found) -> bool:
         return not on_speed_floor(problem, found.gait)
 
-    least = _PROMISING * -known[0].found.objective
+    least = -known[0].found.objective - (1 - _PROMISING) * abs(known[0].found.objective)
     # gaits of finite size may shrink on the way, so they are followed until one has not
     queue = [c for c in known if -c.found.objective >= least][:_FOLLOWED]
     spare = [c for c in known if is_finite(c.found) and c not in queue][:_FOLLOWED]

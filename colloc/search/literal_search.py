@@ -46,7 +46,7 @@ def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None =
         x = feasible_point(program, parameters, delta)
         solver = Solver(heading(program, x))
         result = solver.solve(x, delta, None, radius)
-        levels.append(restated(level_of(program, result, delta, problem.formulation), unit))
+        levels.append(restated(level_of(program, result, delta, problem.formulation), unit, problem.objective))
         if on_level is not None:
             on_level(levels[-1])
         message = "" if result.optimal else _why(solver, x, result, delta)

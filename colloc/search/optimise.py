@@ -8,13 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
+from colloc.gaits.symmetry import NONE
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
 from colloc.results.level import Level
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.friction_unit import in_friction_units, restated
+from colloc.search.friction_unit import in_friction_units, in_unit, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
@@ -25,6 +27,8 @@ from colloc.system.errors import NotConvergedError
 
 TRIVIAL_EFFICIENCY = 1e-4
 """Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
+TRIVIAL_ROTATION = 1e-3
+"""Rotation a period [rad] from which a gait that goes nowhere turns."""
 FINER = "a smaller mesh_tolerance"
 ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
@@ -38,8 +42,11 @@ Report = Callable[[Level], None]
 
 
 def is_trivial(solution: Solution) -> bool:
-    """Whether the search ended in a gait that goes nowhere, such as a retraced one: a critical point, but no optimum."""
-    return bool(solution.levels) and abs(solution.efficiency) * solution.problem.friction.smallest < TRIVIAL_EFFICIENCY
+    """Whether the search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
+    if not solution.levels or abs(solution.efficiency) * solution.problem.friction.smallest >= TRIVIAL_EFFICIENCY:
+        return False
+    theta = solution.last.x[solution.layout.theta[0]]
+    return not (solution.problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
 
 
 def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
@@ -67,7 +74,7 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
     scaled, unit = in_friction_units(problem)
 
     def report(level: Level) -> None:
-        levels.append(restated(level, unit))
+        levels.append(restated(level, unit, problem.objective))
         if on_level is not None:
             on_level(levels[-1])
 
@@ -90,7 +97,7 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
 def maximise_efficiency(
     problem: Problem, on_level: Report | None = None, before: Sequence[Level] = (), *, literal: bool = False
 ) -> Solution:
-    """Maximise d/W and certify the result; look at ``solution.status`` before believing it.
+    """Maximise a problem's objective and certify the result; look at ``solution.status`` before believing it.
 
     Parameters
     ----------
@@ -117,8 +124,8 @@ def maximise_efficiency(
     solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
     if problem.gait.free and is_trivial(solution):
         solution.message = (
-            "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point of the "
-            "efficiency). Try another guess, or an imposed symmetry."
+            "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point). Try another "
+            "guess, or an imposed symmetry."
         )
     else:
         _certified(solution)
@@ -133,7 +140,7 @@ def best_gait(
     seconds: float = np.inf,
     before: Sequence[Level] = (),
 ) -> Solution:
-    """Maximise d/W over the whole class, as far as many starts can tell, and certify the result.
+    """Maximise a problem's objective over the whole class, as far as many starts can tell, and certify the result.
 
     Parameters
     ----------
@@ -162,15 +169,16 @@ def best_gait(
         chosen = best_of(scaled, starts, seconds)
     except NotConvergedError:  # what fails with the guess alone is said in detail
         return maximise_efficiency(problem, on_level)
-    levels = [restated(level_found(found), unit) for found in chosen.levels]
+    objective = problem.objective
+    levels = [restated(level_found(found), unit, objective) for found in chosen.levels]
     for level in levels:
         if on_level is not None:
             on_level(level)
     solution = maximise_efficiency(problem, on_level, levels)
     solution.starts = chosen.starts
-    solution.others = tuple(replace(other, efficiency=other.efficiency / unit) for other in chosen.others)
+    solution.others = tuple(replace(other, value=in_unit(other.value, unit, objective)) for other in chosen.others)
     if chosen.finite and on_speed_floor(problem, solution.gait):
-        _add_finite(solution, [restated(level_found(found), unit) for found in chosen.finite])
+        _add_finite(solution, [restated(level_found(found), unit, objective) for found in chosen.finite])
     solution.seconds = time.perf_counter() - begin
     return solution
 
@@ -182,9 +190,9 @@ def _add_finite(solution: Solution, levels: list[Level]) -> None:
         found = finite.certificate
         finite.starts, finite.others = solution.starts, tuple(o for o in solution.others if not o.on_speed_floor)
         solution.finite = finite
-        text = f"The best gait of finite size: {found.efficiency:.6f} +- {found.efficiency_error:.0e}, certified."
+        text = f"The best gait of finite size: {found.value:.6f} +- {found.value_error:.0e}, certified."
     else:
-        text = f"The best gait of finite size, not certified: {levels[-1].efficiency:.4f}."
+        text = f"The best gait of finite size, not certified: {levels[-1].value:.4f}."
     solution.message = f"{solution.message} {text}"
 
 
@@ -203,7 +211,8 @@ def _certified(solution: Solution) -> None:
         parts = [f"the certificate failed: {failures}. Try {advice}.", solution.message]
         solution.message = " ".join(p for p in parts if p)
     elif problem.gait.free and on_speed_floor(problem, solution.gait):
+        better = "more efficient" if problem.objective == EFFICIENCY else "better"
         solution.message = (
             f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: the gait shrinks as far "
-            "as it may, smaller ones are more efficient still. Lower the bound (and delta with it) to see how far that goes."
+            f"as it may, smaller ones are {better} still. Lower the bound (and delta with it) to see how far that goes."
         )

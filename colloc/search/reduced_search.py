@@ -27,9 +27,9 @@ FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
 """Boxes round the last gait [rad], at the first level, later ones, and on a refined mesh: far enough for an optimum to move,
 not so far that a step ends in another world. A gait that ends on the edge of its box goes on from there."""
 VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
-"""Accuracy of -d/W at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
+"""Accuracy of the objective at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
 STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
-"""What the first-order conditions have to keep to then; the efficiency is off by the square of that."""
+"""What the first-order conditions have to keep to then; the objective is off by the square of that."""
 _GROWTH, _FEW_POINTS = 3, 300
 """A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
 _DRIER, _LOST = 0.1, 0.5
@@ -53,11 +53,11 @@ class Found:
     v : (n,)
     delta : float
     objective : float
-        -d/W.
+        Minus the value of the problem's objective.
     conditions : Stationarity
         Of the reduced program.
     accuracy : float
-        Of -d/W that was asked for.
+        Of it that was asked for.
     iterations, evaluations : int
     seconds : float
     curvature : (n, n), optional
@@ -192,9 +192,9 @@ def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
 
 
 def is_viscous(found: Found) -> bool:
-    """Whether the gait owes its efficiency to delta: at a tenth of it half is lost. Slow parts of a retraced gait do that."""
+    """Whether the gait owes its value to delta: at a tenth of it half is lost. Slow parts of a retraced gait do that."""
     dry = ReducedProgram(found.space, _DRIER * found.delta).objective(found.v)
-    return not dry <= _LOST * found.objective
+    return not dry <= found.objective + (1 - _LOST) * abs(found.objective)
 
 
 def begun(space: SearchSpace, v: np.ndarray, levels: list[float], accuracy: float) -> Found:

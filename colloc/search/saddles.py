@@ -17,7 +17,7 @@ from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, Found, Report, refi
 STEPS = (0.1, 0.03, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
 _FALLS = 1e-3
-"""A curvature below minus this part of the efficiency [1/rad^2] is one to follow."""
+"""A curvature below minus this part of the objective [1/rad^2] is one to follow."""
 _TRIES = 3
 
 

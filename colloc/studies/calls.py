@@ -141,7 +141,7 @@ class Starts:
 
     def __repr__(self) -> str:
         tally = ", ".join(f"{n} {status}" for status, n in counts(self.outcomes).items())
-        best = f"; best d/W = {self.optima[0].best.efficiency:.6g}" if self.optima else ""
+        best = f"; best {self.problem.objective.short} = {self.optima[0].best.value:.6g}" if self.optima else ""
         return f"<Starts of {self.problem.name}: {tally}; {len(self.optima)} distinct optima{best}>"
 
 
@@ -257,6 +257,6 @@ def sweep(
         for news in run.run(workers=workers, executor=pool_for):
             if verbose:
                 best = news.state.best
-                print(f"{cell_text(study, news.cell)}: {best.outcome.efficiency if best else np.nan:.6f}", flush=True)
+                print(f"{cell_text(study, news.cell)}: {best.outcome.value if best else np.nan:.6f}", flush=True)
             told(news)
         return study_table(run)

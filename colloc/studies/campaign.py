@@ -74,10 +74,11 @@ def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
     status = TRIVIAL if is_trivial(solution) else solution.status
     outcome = Outcome(start, status, solution.message, guess, solution.gait)
     if measured is not None:
-        efficiency, distance, work = measured.efficiency, measured.distance, measured.work
-        outcome = replace(outcome, delta=optimal[-1].delta, efficiency=efficiency, distance=distance, work=work)
+        found = {name: getattr(measured, name) for name in ("value", "efficiency", "distance", "work")}
+        outcome = replace(outcome, delta=optimal[-1].delta, **found)
     if certificate.replayed:
-        outcome = replace(outcome, efficiency_error=certificate.efficiency_error)
+        errors = {name: getattr(certificate, name) for name in ("value_error", "efficiency_error")}
+        outcome = replace(outcome, **errors)
     return outcome
 
 

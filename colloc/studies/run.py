@@ -2,7 +2,7 @@
 
 A task waits for the cells its warm starts come from, and takes from nowhere else. So what a study finds does not depend
 on how many workers there are or which is faster. Rounds end when no gait does better in a neighbouring cell, as it is,
-than what is known there; a cell of which that cannot be said although it was tried is marked (`StudyRun.neighbour_efficiency`).
+than what is known there; a cell of which that cannot be said although it was tried is marked (`StudyRun.neighbour_value`).
 """
 
 from __future__ import annotations
@@ -106,10 +106,10 @@ class StudyRun:
         """The best attempts of the cells around one, as far as there are any."""
         return [best for near in self.study.around(cell) if (best := self.cells[near].best) is not None]
 
-    def neighbour_efficiency(self, cell: Index) -> float:
+    def neighbour_value(self, cell: Index) -> float:
         """The most that the best gait of a neighbour, moved into the cell's class and otherwise as it is, achieves there.
 
-        NaN if there is none. Where it is more than the cell's own efficiency, the search there has missed something.
+        NaN if there is none. Where it is more than the cell's own value, the search there has missed something.
         """
         scores = [self.cells[cell].scores.get(near.gait_key, math.nan) for near in self.neighbours(cell)]
         return max((score for score in scores if not math.isnan(score)), default=math.nan)
@@ -117,7 +117,7 @@ class StudyRun:
     def below_neighbour(self, cell: Index) -> bool:
         """Whether a neighbour's gait does clearly better in the cell than its own best, though it was tried there."""
         best = self.cells[cell].best
-        return best is not None and self.neighbour_efficiency(cell) > (1 + BETTER) * best.outcome.efficiency
+        return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value
 
     def run(
         self, *, workers: int = 1, executor: Callable[[int], Executor] = process_pool, ahead: int | None = None
@@ -214,7 +214,7 @@ class StudyRun:
             inside,
             gaits,
             study.cold_numbers(cell) if first else (),
-            0.0 if own is None else own.outcome.efficiency,
+            0.0 if own is None else own.outcome.value,
             state.tried,
             study.warm_starts,
             study.warm_delta_start,

@@ -3,10 +3,11 @@
 Dimensions are the axes of the study, and ``joint`` and ``harmonic``; every dimension has its coordinate. Numbers of cells
 without a certified gait are NaN, and ``status`` and ``message`` say why. ``delta`` is per period for every class; ``mean``,
 ``cos`` and ``sin`` of a free path or polygon are its Fourier series in arc length, cut (the journal has the gait itself).
-``below_neighbour`` is 1 where a neighbour's gait, as it is, does better (``neighbour_efficiency``) than the cell's own.
+``below_neighbour`` is 1 where a neighbour's gait, as it is, does better (``neighbour_value``) than the cell's own.
 Layout::
 
-    efficiency, efficiency_error, distance, work, delta, trivial_bound, upper_bound, neighbour_efficiency, seconds   (axes)
+    value, value_error, efficiency, efficiency_error, distance, work, delta, trivial_bound, upper_bound, neighbour_value,
+    seconds                                                                                                        (axes)
     wave, forward (axes)   winding, bilateral, antipodal, retraced, at_slowest, below_neighbour (axes)
     starts, starts_certified (axes)
     status, message, origin, gait_class, problem_hash   (axes), texts

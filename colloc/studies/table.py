@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from colloc.gaits.gait_class import GaitClass, gait_class
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
 from colloc.results.distinct_optima import Outcome, fourier_series, series_class
 from colloc.results.solution import SOLVED
+from colloc.studies.gait_class import GaitClass, gait_class
 from colloc.studies.run import StudyRun
 from colloc.studies.study import Index, Study
 from colloc.system.late_binding import optional
@@ -24,9 +24,11 @@ NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
 UNITS = {
     "efficiency": "1/weight",
     "efficiency_error": "1/weight",
+    "value": "of the objective",
+    "value_error": "of the objective",
     "trivial_bound": "1/weight",
     "upper_bound": "1/weight",
-    "neighbour_efficiency": "1/weight",
+    "neighbour_value": "of the objective",
     "distance": "length",
     "work": "weight length",
     "delta": "length/period",
@@ -35,7 +37,7 @@ UNITS = {
     "cos": "rad",
     "sin": "rad",
 }
-_NUMBERS = ("efficiency", "efficiency_error", "distance", "work")
+_NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
 _COUNTS = ("starts", "starts_certified")
 KnownBound = Callable[[Problem], float | None]
 
@@ -84,7 +86,7 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
         variables[name] = np.full((*study.shape, *(sizes[e] for e in extra)), empty, dtype=kind)
         dimensions[name] = (*axes, *extra)
 
-    for name in (*_NUMBERS, "delta", "trivial_bound", "upper_bound", "neighbour_efficiency", "seconds", "wave", "forward"):
+    for name in (*_NUMBERS, "delta", "trivial_bound", "upper_bound", "neighbour_value", "seconds", "wave", "forward"):
         variable(name, float, np.nan)
     for name in (
         "bilateral",
@@ -131,7 +133,7 @@ def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]
     row["trivial_bound"] = 1.0 / problem.friction.smallest
     bound = known_bound(problem)
     row["upper_bound"] = np.nan if bound is None else bound
-    row["neighbour_efficiency"], row["below_neighbour"] = run.neighbour_efficiency(cell), int(run.below_neighbour(cell))
+    row["neighbour_value"], row["below_neighbour"] = run.neighbour_value(cell), int(run.below_neighbour(cell))
     best = state.best
     if best is not None:
         row |= {"status": SOLVED, "origin": best.origin} | _gait_row(problem, best.outcome)

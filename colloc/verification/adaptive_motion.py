@@ -7,10 +7,12 @@ The panels know nothing of a collocation mesh; this is what a mesh is measured a
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
@@ -69,7 +71,7 @@ class FineMotion:
     theta, path, work : (n + 1,)
         Orientation, displacement in the lab (complex, starting with orientation 0) and work at the edges.
     unresolved : (n,)
-        Relative efficiency error that a panel may still hold: what halving it last changed, at its end and half way.
+        Relative error of the objective that a panel may still hold: what halving it last changed, at its end and half way.
     """
 
     edges: np.ndarray
@@ -105,8 +107,16 @@ class FineMotion:
         )
 
 
-def fine_motion(body: Body, friction: Law, path: Path, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
-    """Integrate a path between the first and the last of `edges` to a relative efficiency error.
+def fine_motion(
+    body: Body,
+    friction: Law,
+    path: Path,
+    delta: float,
+    edges: np.ndarray,
+    tolerance: float,
+    shares: Callable[[Mapping[str, float]], Mapping[str, float]] = EFFICIENCY.shares,
+) -> FineMotion:
+    """Integrate a path between the first and the last of `edges` to a relative error of the efficiency, or another objective.
 
     Parameters
     ----------
@@ -119,6 +129,9 @@ def fine_motion(body: Body, friction: Law, path: Path, delta: float, edges: np.n
         First panels; the mesh to be measured is a good choice.
     tolerance : float
         Panels are halved until the sum of their disagreements is below this. The sum that remains is in the result.
+
+    shares : callable
+        From distance, work and rotation to what a small change of each changes in the objective, relative to it.
 
     Raises
     ------
@@ -133,7 +146,6 @@ def fine_motion(body: Body, friction: Law, path: Path, delta: float, edges: np.n
     left, width = edges[:-1], np.diff(edges)
     rates, parts = solved(left, width)
     gap = np.full(left.size, np.inf)
-    distance, work = 1.0, 1.0
     while True:
         # halve the panels that hold the excess over the tolerance
         order = np.argsort(gap)[::-1]
@@ -162,11 +174,13 @@ def fine_motion(body: Body, friction: Law, path: Path, delta: float, edges: np.n
             np.concatenate([rates.power[kept], new_rates.power])[place],
         )
         parts = tuple(np.concatenate([a[kept], b])[place] for a, b in zip(parts, new, strict=True))  # type: ignore[assignment]
-        _, travelled, spent = _accumulated(parts)
+        turned, travelled, spent = _accumulated(parts)
         distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)
-        reach = np.abs(travelled - travelled[-1]).max() / distance
+        share = {k: abs(s) for k, s in shares({"distance": distance, "work": work, "rotation": turned[-1]}).items()}
+        on_turn = share["distance"] * np.abs(travelled - travelled[-1]).max() + share["rotation"]
         change = sum(
-            np.abs(move) / distance + np.abs(turn) * reach + np.abs(energy) / work for turn, move, energy in differences
+            np.abs(move) * share["distance"] + np.abs(turn) * on_turn + np.abs(energy) * share["work"]
+            for turn, move, energy in differences
         )
         gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
         left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]

@@ -1,4 +1,4 @@
-"""How wrong a collocated gait is, interval by interval: states, efficiency and constraints between the nodes.
+"""How wrong a collocated gait is, interval by interval: states, objective and constraints between the nodes.
 
 On an interval the scheme takes the rate of a state to be the polynomial through its values at the nodes. The *defect* of
 a state between the nodes is that polynomial less the true rate, which the balance gives for the gait at any phase. Its
@@ -8,6 +8,7 @@ integral over the interval is the error that the interval adds to the state. It 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,11 +20,12 @@ from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import smooth_minimum
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, increments, rates_at
+from colloc.verification.adaptive_motion import PANEL_RULE, FineMotion, Rates, fine_motion, increments, rates_at
 
 FINER = 0.05
 """The panels are refined until what they may still miss is this fraction of the error they measure or of the tolerance."""
 _SAMPLES = 32
+_LENGTH_PIECES = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +43,14 @@ class MeshError:
     velocity : (n,)
         Largest error between the nodes of the interpolated velocity of the tail or, times a body length, of its rotation
         rate [body lengths per period].
-    efficiency : (n,)
-        Relative contribution to the efficiency error, signed, to first order.
+    value : (n,)
+        Contribution to the error of the problem's objective, relative to its magnitude, signed, to first order.
     violation : (n,)
         Largest excess over a joint limit [rad] or penetration of links [rad or body lengths] inside the interval.
     total : float
-        Relative error of the collocated efficiency as a whole: all contributions, not linearised.
+        Relative error of the collocated objective as a whole: all contributions, not linearised.
     unresolved : float
-        What the panels that measured all this may have missed, relative to the efficiency.
+        What the panels that measured all this may have missed, relative to the objective.
     turning : float
         Rotation that collocation misses over a whole period, times the body's reach (half a length) over the distance; 0 where
         a symmetry closes the rotation. It is what makes the distance of a closed gait ambiguous.
@@ -58,7 +60,7 @@ class MeshError:
     displacement: np.ndarray
     work: np.ndarray
     velocity: np.ndarray
-    efficiency: np.ndarray
+    value: np.ndarray
     violation: np.ndarray
     total: float
     unresolved: float
@@ -66,14 +68,47 @@ class MeshError:
 
     @property
     def estimate(self) -> float:
-        """Estimated relative efficiency error: the magnitudes of all intervals, so that errors of opposite sign do not
+        """Estimated relative error of the objective: the magnitudes of all intervals, so that errors of opposite sign do not
         cancel, and what is unresolved. An optimiser exploits cancellation; so this also covers its search."""
-        return float(np.abs(self.efficiency).sum() + self.unresolved)
+        return float(np.abs(self.value).sum() + self.unresolved)
 
 
 def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
     """The gait's motion on adaptive panels, see `adaptive_motion`."""
-    return fine_motion(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, edges, tolerance)
+    length = _whole_length(problem, gait)
+
+    def shares(part: Mapping[str, float]) -> dict[str, float]:
+        return _shares(problem, part, length)
+
+    of = (problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)))
+    return fine_motion(*of, delta, edges, tolerance, shares)
+
+
+def _period(problem: Problem, part: Mapping[str, float], length: float) -> dict[str, float]:
+    """What a whole period comes to, from distance, work and rotation of the part that is solved."""
+    whole = {name: part[name] / problem.gait.fraction for name in ("distance", "work")}
+    return whole | {"rotation": part["rotation"], "length": length}
+
+
+def _shares(problem: Problem, part: Mapping[str, float], length: float) -> dict[str, float]:
+    """What a small change of each quantity of the solved part changes in the objective, relative to it."""
+    shares = problem.objective.shares(_period(problem, part, length))
+    return {name: share if name == "rotation" else share / problem.gait.fraction for name, share in shares.items()}
+
+
+def _whole_length(problem: Problem, gait: AnyGait) -> float:
+    """Length of the path over a period [rad]; 1 where nobody asks for it."""
+    if not problem.uses("length"):
+        return 1.0
+    return gait.length if problem.gait.unit_speed else float(_lengths(gait, np.zeros(1), np.ones(1), _LENGTH_PIECES)[0])
+
+
+def _lengths(gait: AnyGait, left: np.ndarray, right: np.ndarray, pieces: int) -> np.ndarray:
+    """Length of the path over intervals, ``(n,)``, by Gauss quadrature on so many pieces of each."""
+    h = (right - left) / pieces
+    starts = left[:, None] + h[:, None] * np.arange(pieces)
+    t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
+    return h * (np.linalg.norm(gait.rates(t.ravel()), axis=0).reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
 
 
 def mesh_error(
@@ -89,7 +124,7 @@ def mesh_error(
     delta : float
         Regularisation speed, per period.
     tolerance : float
-        Relative efficiency error of interest; smaller ones need not be exact.
+        Relative error of interest; smaller ones need not be exact.
     fine : FineMotion, optional
         The gait's motion, if known.
 
@@ -106,9 +141,9 @@ def mesh_error(
         np.abs(own.displacement),
         own.work,
         _velocity_error(mesh, own.rates, fine),
-        own.efficiency,
+        own.value,
         constraint_violation(problem, mesh, gait),
-        _efficiency(problem, *own.increments) / _fine_efficiency(problem, fine) - 1,
+        _collocated_value(problem, own, gait) / _fine_value(problem, fine, gait) - 1,
         float(fine.unresolved.sum()),
         abs(float(_turning(problem, own, fine).sum())),
     )
@@ -117,10 +152,10 @@ def mesh_error(
 def interval_shares(
     problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
 ) -> np.ndarray:
-    """What collocating on each of the intervals from left to right adds to the relative efficiency error and to the rotation
-    that is missed (as `MeshError.turning`), magnitudes, ``(n,)``."""
+    """What collocating on each of the intervals from left to right adds to the relative error of the objective and to the
+    rotation that is missed (as `MeshError.turning`), magnitudes, ``(n,)``."""
     own = _collocated_intervals(problem, rule, left, right, gait, delta, fine)
-    return np.abs(own.efficiency) + np.abs(_turning(problem, own, fine))
+    return np.abs(own.value) + np.abs(_turning(problem, own, fine))
 
 
 class _Own(NamedTuple):
@@ -129,7 +164,8 @@ class _Own(NamedTuple):
     rotation: np.ndarray
     displacement: np.ndarray
     work: np.ndarray
-    efficiency: np.ndarray
+    length: np.ndarray
+    value: np.ndarray
     rates: Rates
     increments: tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -147,10 +183,14 @@ def _collocated_intervals(
     displacement = moved * np.exp(1j * theta) - (path_right - path)
     # an error of rotation turns everything after it
     pull = displacement + 1j * rotation * (fine.path[-1] - path_right)
-    direction = _direction(problem, fine.path[-1], fine.theta[-1])
-    distance = float((fine.path[-1] * np.conj(direction)).real)
-    efficiency = (pull * np.conj(direction)).real / distance - energy / fine.work[-1]
-    return _Own(rotation, displacement, energy, efficiency, rates, (turned, moved, spent))
+    direction, length = _direction(problem, fine.path[-1], fine.theta[-1]), np.zeros(left.size)
+    if problem.uses("length") and not problem.gait.unit_speed:  # else arc length is the clock, and exact
+        pace = np.linalg.norm(gait.rates(nodes.ravel()), axis=0).reshape(nodes.shape)
+        length = (right - left) * (pace @ rule.b) - _lengths(gait, left, right, 4)
+    shares = _shares(problem, _fine_part(problem, fine), _whole_length(problem, gait))
+    ahead = (pull * np.conj(direction)).real
+    value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length
+    return _Own(rotation, displacement, energy, length, value, rates, (turned, moved, spent))
 
 
 def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
@@ -158,16 +198,27 @@ def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
     return own.rotation * (0.5 / abs(fine.path[-1]) if problem.gait.symmetry == NONE else 0.0)
 
 
-def _fine_efficiency(problem: Problem, fine: FineMotion) -> float:
-    direction = _direction(problem, fine.path[-1], fine.theta[-1])
-    return float((fine.path[-1] * np.conj(direction)).real / fine.work[-1])
+def _part(problem: Problem, end: complex, work: float, rotation: float) -> dict[str, float]:
+    distance = float((end * np.conj(_direction(problem, end, rotation))).real)
+    return {"distance": distance, "work": float(work), "rotation": float(rotation)}
 
 
-def _efficiency(problem: Problem, turned: np.ndarray, moved: np.ndarray, spent: np.ndarray) -> float:
-    """Efficiency as the scheme sees it."""
+def _fine_part(problem: Problem, fine: FineMotion) -> dict[str, float]:
+    """What the solved part comes to."""
+    return _part(problem, fine.path[-1], fine.work[-1], fine.theta[-1])
+
+
+def _fine_value(problem: Problem, fine: FineMotion, gait: AnyGait) -> float:
+    return problem.objective(_period(problem, _fine_part(problem, fine), _whole_length(problem, gait)))
+
+
+def _collocated_value(problem: Problem, own: _Own, gait: AnyGait) -> float:
+    """The objective as the scheme sees it."""
+    turned, moved, spent = own.increments
     theta = np.concatenate([[0.0], np.cumsum(turned)])
-    end = (np.exp(1j * theta[:-1]) * moved).sum()
-    return float((end * np.conj(_direction(problem, end, theta[-1]))).real / spent.sum())
+    part = _part(problem, (np.exp(1j * theta[:-1]) * moved).sum(), spent.sum(), theta[-1])
+    length = _whole_length(problem, gait) + float(own.length.sum()) / problem.gait.fraction
+    return problem.objective(_period(problem, part, length))
 
 
 def _direction(problem: Problem, end: complex, rotation: float) -> complex:

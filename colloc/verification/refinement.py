@@ -1,4 +1,4 @@
-"""Mesh refinement to a requested efficiency error: knots are moved, intervals split, the order of the scheme raised.
+"""Mesh refinement to a requested error of the objective: knots are moved, intervals split, the order of the scheme raised.
 
 The gait can be tried on any mesh without solving for it again (`verification.mesh_error`), so a mesh is planned as a whole:
 
@@ -56,7 +56,7 @@ class MeshPlan:
     scheme : str
     edges : (n + 1,)
     estimate : float
-        Relative efficiency error of the gait on that mesh.
+        Relative error of the gait's value on that mesh.
     reached : bool
         Whether that is below the request; if not, the budget of points was exhausted.
     kept : array
@@ -122,7 +122,7 @@ def planned_mesh(
     delta : float
         Regularisation speed, per period.
     tolerance : float
-        Largest relative efficiency error.
+        Largest relative error of the objective.
     kept : array, optional
         Phases that have to be knots.
     aim : float

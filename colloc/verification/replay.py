@@ -18,6 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
@@ -46,38 +47,47 @@ class Replay:
         Net rotation over the period [rad].
     lever : float
         Largest distance of a point of the body from its centre of mass [body lengths].
+    length : float
+        Of the path in shape space [rad].
     actuator_work : float
         Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
     residual : float
         Largest force or torque left over, at any instant, in units of the largest friction coefficient.
     error : float
-        Relative error of the efficiency: what halving the panels would change, summed as magnitudes, and the residual.
-    distance_error, work_error : float
-        Of distance and work, for the same reasons.
+        Relative error of the objective: what halving the panels would change, summed as magnitudes, and the residual.
+    distance_error, work_error, rotation_error, length_error : float
+        Of these, for the same reasons.
     several : float
         Part of the period at which several motions are balanced; 0 for equal coefficients, where there is one.
-    other_distance, other_work : float
-        How much distance and work could change if the body took any others of them, at most.
+    other_distance, other_work, other_rotation : float
+        How much these could change if the body took any others of them, at most.
     instants : int
     tail : ((n,), (3, n))
         Phases and tail velocities there.
+    objective : Objective
+        That the replay is to measure; the efficiency unless another was asked for.
     """
 
     distance: float
     work: float
     efficiency: float
     rotation: float
+    length: float
     lever: float
     actuator_work: float
     residual: float
     error: float
     distance_error: float
     work_error: float
+    rotation_error: float
+    length_error: float
     several: float
     other_distance: float
     other_work: float
+    other_rotation: float
     instants: int
     tail: tuple[np.ndarray, np.ndarray] = field(repr=False, compare=False)
+    objective: Objective = EFFICIENCY
 
     def tail_velocity(self, t: np.ndarray) -> np.ndarray:
         """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
@@ -85,9 +95,29 @@ class Replay:
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
     @property
+    def period(self) -> dict[str, float]:
+        """What the period comes to, by the names of `colloc.gaits.objective.QUANTITIES`."""
+        return {name: getattr(self, name) for name in QUANTITIES}
+
+    @property
+    def value(self) -> float:
+        """Of the objective."""
+        return self.objective(self.period)
+
+    @property
     def ambiguity(self) -> float:
-        """How much other balanced motions could change the efficiency, relative, at most."""
-        return self.other_distance / max(self.distance, 1e-300) + self.other_work / self.work
+        """How much other balanced motions could change the objective, relative, at most."""
+        return self.ambiguity_of(self.objective)
+
+    def ambiguity_of(self, objective: Objective) -> float:
+        """The same of any objective."""
+        others = {"distance": self.other_distance, "work": self.other_work, "rotation": self.other_rotation}
+        return float(objective.relative_error(self.period, others))
+
+    def error_of(self, objective: Objective) -> float:
+        """`error` of any objective."""
+        errors = {name: getattr(self, f"{name}_error") for name in QUANTITIES}
+        return float(objective.relative_error(self.period, errors))
 
     @property
     def turning(self) -> float:
@@ -106,7 +136,7 @@ def _evaluated(
     *,
     whole: bool,
 ) -> tuple[np.ndarray, ...]:
-    """The last seven of `Panels` at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
+    """`Panels` from z to apart at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
 
     Where several motions may be balanced, that nearest to `near` is taken; or, of a `whole` period, the branch in time. The
     directions of a relaxed gait are solved for one after the other, and averaged.
@@ -132,7 +162,10 @@ def _evaluated(
     centre = mean("centre")
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), residual, lever)
+    pace = sum(
+        share * np.linalg.norm(some, axis=0) for share, some in zip(shares, rates if mixed else rates[None], strict=True)
+    )
+    values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), pace, residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
     return z, *(value.reshape(t.shape) for value in values), apart
 
@@ -149,8 +182,9 @@ def replay(
     breaks: np.ndarray | tuple[float, ...] = (),
     near: Replay | None = None,
     sense: int = FORWARDS,
+    objective: Objective = EFFICIENCY,
 ) -> Replay:
-    """Distance, work and efficiency of a path over one period, to a relative error in the efficiency.
+    """Distance, work, rotation and length of a path over one period, to a relative error in the efficiency, or an objective.
 
     Parameters
     ----------
@@ -163,7 +197,7 @@ def replay(
     instants : int
         Uniform instants to begin with, about; panels are halved until the error is below `tolerance`.
     tolerance : float
-        Relative error of the efficiency.
+        Relative error of the objective.
     most_instants : int
         No panel is halved once there are so many.
     breaks : (n,), optional
@@ -173,6 +207,7 @@ def replay(
         changes nothing else.
     sense : {FORWARDS, BACKWARDS}
         Whether branches are followed with or against time, where several motions are balanced.
+    objective : Objective
 
     Raises
     ------
@@ -202,17 +237,19 @@ def replay(
     start = None if near is None else near.tail_velocity(t.ravel())
     panels = begun(left, width, _evaluated(body, friction, path, delta, t, start, sense, whole=True))
     while True:
-        turn, move, spent = increments(WHOLE, panels, 1)
+        turn, move, spent, passed = increments(WHOLE, panels, 1)
         heading = np.concatenate([[0.0], np.cumsum(turn)])
         travelled = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
         distance, work = float(abs(travelled[-1])), float(spent.sum())
         if not work > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
-        turn_error, move_error, work_error = left_over(differences(panels), panels.wider).T
+        turn_error, move_error, work_error, length_error = left_over(differences(panels), panels.wider).T
         # an error of rotation turns all that comes after it
         reach = np.abs(travelled - travelled[-1]).max()
         astray = move_error + reach * turn_error
-        gap = astray / max(distance, 1e-300) + work_error / work
+        period = {"distance": max(distance, 1e-300), "work": work, "rotation": heading[-1], "length": float(passed.sum())}
+        errors = {"distance": astray, "work": work_error, "rotation": turn_error, "length": length_error}
+        gap = objective.relative_error(period, errors)
         residual = float(panels.residual.max())
         order = np.argsort(gap)
         # finer panels do not make up for what the balance leaves over
@@ -226,24 +263,29 @@ def replay(
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
         new = _evaluated(body, friction, path, delta, between, start, sense, whole=False)
         panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new))
-    several, other_distance, other_work = _others(panels, reach)
+    several, other_distance, other_work, other_rotation = _others(panels, reach)
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
     return Replay(
         distance,
         work,
         distance / work,
         float(heading[-1]),
+        period["length"],
         float(panels.lever.max()),
         float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
         residual,
         float(gap.sum()) + residual,
         float(astray.sum()) + residual * distance,
         float(work_error.sum()) + residual * work,
+        float(turn_error.sum()) + residual,
+        float(length_error.sum()),
         several,
         other_distance,
         other_work,
+        other_rotation,
         4 * panels.left.size,
         (known, panels.z[:, :4].reshape(-1, 3).T),
+        objective,
     )
 
 
@@ -255,12 +297,12 @@ def _starts(z: np.ndarray, friction: Law, sense: int) -> np.ndarray:
     return z[:, :-1] if sense == FORWARDS else z[:, 1:]
 
 
-def _others(panels: Panels, reach: float) -> tuple[float, float, float]:
-    """Part of the period with several motions, and how far any others would lead at most: distance and work.
+def _others(panels: Panels, reach: float) -> tuple[float, float, float, float]:
+    """Part of the period with several motions, and how far any others would lead at most: distance, work, rotation.
 
     Between two instants they count as at the worse; a rotation moves what is within `reach`.
     """
     worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
     speed, spin, power = np.einsum("n,nki->i", 0.25 * panels.width, worse)
     several = 0.25 * panels.width @ worse.any(axis=2).sum(axis=1)
-    return float(several), float(speed + reach * spin), float(power)
+    return float(several), float(speed + reach * spin), float(power), float(spin)

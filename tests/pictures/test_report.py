@@ -17,7 +17,8 @@ from colloc.gaits.gait_fields import BODIES
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import arcs_through
-from colloc.gaits.problem import Problem, Reference
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import Reference
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames

@@ -22,7 +22,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
-from colloc.results.delta_limit import efficiency_at_zero_delta, mesh_errors, resolution_warning
+from colloc.results.delta_limit import mesh_errors, resolution_warning, value_at_zero_delta
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
@@ -344,7 +344,7 @@ def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
 
 
 def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
-    limit = efficiency_at_zero_delta(three_link)
+    limit = value_at_zero_delta(three_link)
     assert limit.error < 1e-3 * limit.value
     assert abs(limit.value - three_link.certificate.efficiency_at_zero_delta) < 3 * limit.error
     assert resolution_warning(three_link) is None
@@ -364,7 +364,7 @@ def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
     coarse = optimum(problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait))
     assert "under-resolved by 5 intervals" in resolution_warning(coarse)
     with pytest.raises(ValueError, match="at least two converged levels"):
-        efficiency_at_zero_delta(coarse)
+        value_at_zero_delta(coarse)
 
 
 class _Losing(Executor):

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from colloc.commands import sweep as sweep_study
-from colloc.gaits.gait_class import DIRECT, RETROGRADE, gait_class, wave_direction, winding
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
@@ -22,6 +21,7 @@ from colloc.results.distinct_optima import CRASHED, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, start_key
+from colloc.studies.gait_class import DIRECT, RETROGRADE, gait_class, wave_direction, winding
 from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
 from colloc.studies.store import load_study, save_study
@@ -71,7 +71,7 @@ def landscape(stated, start_from, start, time_limit):
 def fake(monkeypatch):
     monkeypatch.setattr(study_cell, "run_guess", landscape)
     monkeypatch.setattr(
-        study_cell, "efficiency_as_it_is", lambda p, g, *_: (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t
+        study_cell, "value_as_it_is", lambda p, g, *_: (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t
     )
     monkeypatch.setattr(study_cell, "start_gait", lambda p, sampler, seed, k: ellipse(0.0, 1.2, 0.4))
 
@@ -198,7 +198,7 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
     assert {a.origin for a in run.cells[1, 1].attempts} == {GUESS, WARM, RESCUE}
     table = study_table(run).variables
     assert np.argwhere(table["below_neighbour"]).tolist() == [[1, 1]]
-    assert table["neighbour_efficiency"][1, 1] == pytest.approx(0.31)
+    assert table["neighbour_value"][1, 1] == pytest.approx(0.31)
     lines = sweep_study._summary_lines(run, tmp_path)
     assert "1 of them below what a neighbour's gait achieves there" in lines[1]
     assert "x 2, y 2: 0.220000, where a neighbour's gait achieves 0.310000" in lines[2]
@@ -213,7 +213,7 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     exact = replay(stated.body, stated.friction, path, stated.delta)
     assert abs(exact.rotation) > 0.01
     sure = (exact.distance - 0.5 * abs(exact.rotation)) / exact.work
-    assert study_cell.efficiency_as_it_is(stated, gait) == pytest.approx(max(sure, 0.0), abs=1e-3 * exact.efficiency)
+    assert study_cell.value_as_it_is(stated, gait) == pytest.approx(max(sure, 0.0), abs=1e-3 * exact.efficiency)
     closed = study_cell.member(stated, gait)
     again = replay(stated.body, stated.friction, lambda t: (closed.angles(t), closed.rates(t)), stated.delta)
     assert abs(again.rotation) < 1e-4
@@ -320,7 +320,7 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     def next_to(stated, start_from, start, time_limit):
         guess = start_from()
         gait = study_cell.member(stated, guess)
-        return outcome(start, guess, gait, study_cell.efficiency_as_it_is(stated, gait))
+        return outcome(start, guess, gait, study_cell.value_as_it_is(stated, gait))
 
     monkeypatch.setattr(study_cell, "run_guess", next_to)
     study = Study("kinds", (Axis("kind", tuple(CLASSES)),), in_class, cold_starts=0)
