@@ -38,8 +38,13 @@ class Node(NamedTuple):
 
 
 def link_nodes(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Iterator[Node]:
-    """The nodes of links, one after the other; arguments as of `colloc.mechanics.link_friction.link_moments`."""
+    """The nodes of links; arguments as of `colloc.mechanics.link_friction.link_moments`.
+
+    With CasADi one after the other; with NumPy those of a panel at once, along a first axis (see `_gathered`).
+    """
     xp = namespace(vs, vn, w, delta)
+    at_once = isinstance(vs, np.ndarray)
+    places = ((_X[:, None, None], _WEIGHT[:, None, None]),) if at_once else tuple(zip(_X, _WEIGHT, strict=True))
     a = xp.sqrt(vs * vs + delta * delta)
     half = 0.5 * length * w
     y0, y1 = vn - half, vn + half
@@ -57,13 +62,18 @@ def link_nodes(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> I
     slowest = -m * xp.where(small, 0.0, 1.0) / safe
     slowest = xp.where(slowest > 1.0, 1.0, xp.where(slowest < -1.0, -1.0, slowest))
     for reach, centre in ((0.5 * (slowest + 1.0), 0.5 * (slowest - 1.0)), (0.5 * (1.0 - slowest), 0.5 * (slowest + 1.0))):
-        for place, weight in zip(_X, _WEIGHT, strict=True):
+        for place, weight in places:
             x = centre + reach * place
             tau, rest = m + h * x, 1.0 - x * x
             series = x * (1.0 - square * rest / 6) - 0.5 * tilt * h * rest * (1.0 - square * rest / 12)
             product = xp.sinh(0.5 * safe * (1.0 + x)) * xp.sinh(0.5 * safe * (1.0 - x))
             share = xp.where(small, series, (xp.sinh(safe * x) - 2.0 * tilt * product) * per_sinh)
             yield Node(0.5 * length * share, a * xp.sinh(tau), weight * reach * width * xp.cosh(tau))
+
+
+def _gathered(values: Array) -> Array:
+    """What nodes add up to, where they lie along a first axis."""
+    return values.sum(axis=0) if getattr(values, "ndim", 2) > 2 else values
 
 
 class ByQuadrature:
@@ -75,7 +85,8 @@ class ByQuadrature:
         tangential = normal = couple = 0.0 * (vs + vn + w)
         for sigma, y, weight in link_nodes(vs, vn, w, length, delta):
             fs, fn = self.density(vs, y, delta)
-            tangential, normal, couple = tangential + weight * fs, normal + weight * fn, couple + weight * sigma * fn
+            tangential, normal = tangential + _gathered(weight * fs), normal + _gathered(weight * fn)
+            couple = couple + _gathered(weight * sigma * fn)
         return LinkForce(tangential, normal, couple)
 
     def link_jacobian(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
@@ -86,7 +97,7 @@ class ByQuadrature:
 
     def link_potential(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
         nodes = link_nodes(vs, vn, w, length, delta)
-        return sum(weight * self.density_potential(vs, y, delta) for _, y, weight in nodes)
+        return sum(_gathered(weight * self.density_potential(vs, y, delta)) for _, y, weight in nodes)
 
     def scaled_laws(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
         """Differences over the secants of the link: velocities."""
@@ -107,5 +118,5 @@ def _on_links(densities: list[tuple[Node, Matrix]]) -> Matrix:
     total = [[0.0] * 3 for _ in range(3)]
     for (sigma, _, weight), ((ss, sn), (ns, nn)) in densities:
         rows = (ss, sn, sigma * sn), (ns, nn, sigma * nn), (sigma * ns, sigma * nn, sigma * sigma * nn)
-        total = [[t + weight * e for t, e in zip(*pair, strict=True)] for pair in zip(total, rows, strict=True)]
+        total = [[t + _gathered(weight * e) for t, e in zip(*pair, strict=True)] for pair in zip(total, rows, strict=True)]
     return tuple(tuple(row) for row in total)
