@@ -49,9 +49,7 @@ class Dual:
     def __rtruediv__(self, other: float) -> Dual:
         return self.scaled(other / self.value, -other / (self.value * self.value))
 
-    def __pow__(self, power: Any) -> Dual:
-        if isinstance(power, Dual):
-            raise ProblemError("the exponent of ** must be a number.")
+    def __pow__(self, power: float) -> Dual:
         return self.scaled(self.value**power, power * self.value ** (power - 1) if power else 0.0 * self.value)
 
     def scaled(self, value: Array, slope: Array) -> Dual:
@@ -130,6 +128,9 @@ def parsed(text: str, variables: tuple[str, ...]) -> CodeType:
         raise ProblemError(f"'{text}' is no formula: {error.msg}.") from None
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     for node in ast.walk(tree):
+        exponent = node.right if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) else ast.Constant(1)
+        if any(isinstance(part, ast.Name) for part in ast.walk(exponent)):
+            raise ProblemError(f"'{text}' has an exponent that is no number.")
         known = FUNCTIONS if id(node) in called else variables
         if isinstance(node, ast.Name) and node.id not in known:
             raise ProblemError(f"'{text}' speaks of {node.id}; it may use {', '.join(known)}.")

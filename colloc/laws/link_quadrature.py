@@ -14,7 +14,7 @@ panels that meet at y = 0, or at the end nearest to it: a law may have a kink th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -79,7 +79,7 @@ def _gathered(values: Array) -> Array:
 class ByQuadrature:
     """What a law says of links, from what it says of a point."""
 
-    kernel_numbers: tuple[float, ...] = ()
+    kernel_numbers: ClassVar[tuple[float, ...]] = ()
 
     def link_force(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
         tangential = normal = couple = 0.0 * (vs + vn + w)

@@ -62,7 +62,8 @@ class OwnLaw(ByQuadrature):
     def __post_init__(self) -> None:
         check_positive(self, "unit", "speed_unit")
         vs, vn, delta = _samples()
-        fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
+        with np.errstate(all="ignore"):  # what is not finite is refused
+            fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
         if not (np.isfinite(fs).all() and np.isfinite(fn).all()):
             raise ProblemError("friction: a formula has no finite value somewhere; divide by speed, which is never zero.")
         gain = fs * vs + fn * vn

@@ -8,6 +8,7 @@ chain of three links under this law.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class Viscous:
     degree = 1.0
     reversible = associated = True
     regularised = False
-    kernel_numbers: tuple[float, ...] = ()
+    kernel_numbers: ClassVar[tuple[float, ...]] = ()
 
     def __post_init__(self) -> None:
         check_positive(self, "normal", "tangential")
