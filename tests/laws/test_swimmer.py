@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from benchmarks.peers import drag
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.problem import Problem
@@ -19,29 +20,7 @@ from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
 ROOT = Path(__file__).resolve().parents[2]
-LAW, CORNERS = Viscous(normal=2.0, tangential=1.0), (0.25, 0.5, 0.75)
-
-
-def drag_matrices(theta, angles):
-    """Resistance of three links of length 1/3 to (x, y, heading, angles) rates: forces on a middle link of heading theta."""
-    phi = np.array([theta - angles[0], theta, theta + angles[1]])
-    t = np.array([np.cos(phi), np.sin(phi)])
-    n = np.array([-t[1], t[0]])
-    length = 1 / 3
-    middle = [-0.5 * length * (t[:, 1] + t[:, 0]), np.zeros(2), 0.5 * length * (t[:, 1] + t[:, 2])]
-    total = np.zeros((5, 5))
-    for k in range(3):
-        # velocity of the midpoint and spin per unit of (x, y, theta, angle 0, angle 1)
-        spin = np.array([0, 0, 1, -1.0 * (k == 0), 1.0 * (k == 2)])
-        jac = np.zeros((2, 5))
-        jac[:, :2] = np.eye(2)
-        jac[:, 2] = [-middle[k][1], middle[k][0]]
-        arm = {0: -0.5 * length * n[:, 0], 2: 0.5 * length * n[:, 2]}.get(k, np.zeros(2))
-        jac[:, 3] += -arm * (k == 0)
-        jac[:, 4] += arm * (k == 2)
-        per_length = LAW.tangential * np.outer(t[:, k], t[:, k]) + LAW.normal * np.outer(n[:, k], n[:, k])
-        total += length * jac.T @ per_length @ jac + LAW.normal * length**3 / 12 * np.outer(spin, spin)
-    return total
+LAW, CORNERS = Viscous(normal=drag.NORMAL, tangential=drag.TANGENTIAL), (0.25, 0.5, 0.75)
 
 
 def square(amplitude):
@@ -66,7 +45,7 @@ def test_purcells_square_stroke_goes_as_far_as_an_independent_integration_says(a
 
     def rates(t, state):
         angles, turning = (a[:, 0] for a in path(np.array([t])))
-        R = drag_matrices(state[2], angles)
+        R = drag.resistance(state[2], angles)
         rigid = -np.linalg.solve(R[:3, :3], R[:3, 3:] @ turning)
         whole = np.concatenate([rigid, turning])
         return [*rigid, whole @ R @ whole]
