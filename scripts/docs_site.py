@@ -32,6 +32,7 @@ ORDER = (
         "How to",
         (
             *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "check", "starts")),
+            "laws.md",
             "studies.md",
             "howto/paper.md",
         ),

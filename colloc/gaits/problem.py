@@ -10,20 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait_fields import (
-    BODIES,
-    CLASSES,
-    GAITS,
-    LAWS,
-    AnyClass,
-    AnyGait,
-    body_from,
-    class_from,
-    fields,
-    gait_from,
-    law_fields,
-    law_from,
-)
+from colloc.gaits import gait_fields
+from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
@@ -152,8 +140,8 @@ class Problem:
         if self.guess is None:
             free = self.gait.free
             self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
-        if not isinstance(self.guess, GAITS):
-            raise ProblemError(f"guess must be a {_names(GAITS)}, not {type(self.guess).__name__}.")
+        if not isinstance(self.guess, gait_fields.GAITS):
+            raise ProblemError(f"guess must be a {_names(gait_fields.GAITS)}, not {type(self.guess).__name__}.")
         self._check_symmetry()
         self._check_guess()
 
@@ -165,7 +153,7 @@ class Problem:
 
     def _check_body(self) -> None:
         if isinstance(self.body, type) or not isinstance(self.body, Body):
-            raise ProblemError(f"body must be a {_names(BODIES)}, not {type(self.body).__name__}.")
+            raise ProblemError(f"body must be a {_names(gait_fields.BODIES)}, not {type(self.body).__name__}.")
 
     def _check_parts(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
@@ -174,9 +162,10 @@ class Problem:
             raise ProblemError(
                 f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
             )
-        for field, protocol, kinds in (("friction", (Law,), LAWS), ("gait", CLASSES, CLASSES)):
+        classes = gait_fields.CLASSES
+        for field, accepted, kinds in (("friction", (Law,), gait_fields.LAWS), ("gait", classes, classes)):
             value = getattr(self, field)
-            if isinstance(value, type) or not isinstance(value, tuple(protocol)):
+            if isinstance(value, type) or not isinstance(value, accepted):
                 raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(value).__name__}.")
         if self.gait.free == bool(self.body.schedule):
             what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
@@ -259,10 +248,8 @@ class Problem:
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
             raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
         if self.gait.unit_speed and not rate_independent(self.friction):
-            raise ProblemError(
-                f"the class {type(self.gait).__name__} leaves the pace of a gait open, and with {self.friction.describe()} the "
-                "work depends on the pace; use Harmonic, whose parameters settle it (period 1)."
-            )
+            what = f"the class {type(self.gait).__name__} leaves the pace open"
+            raise ProblemError(f"{what}, but under {self.friction.label} the work depends on it; use Harmonic (period 1).")
         if self.body.n_joint == 1 and self.friction.reversible:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
@@ -314,8 +301,8 @@ class Problem:
         """All fields as plain numbers, strings and lists (JSON)."""
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         for name in ("guess", "gait", "body"):
-            stated[name] = fields(stated[name])
-        stated["friction"] = law_fields(self.friction)
+            stated[name] = gait_fields.fields(stated[name])
+        stated["friction"] = gait_fields.law_fields(self.friction)
         # what is as usual is left out, as files that know of nothing else leave it out
         usual = [f.name for f in dataclasses.fields(self)[-_AIMS:] if stated[f.name] == f.default]
         stated |= {"objective": self.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in self.at_least]}
@@ -332,10 +319,10 @@ class Problem:
         """
         try:
             stated = dict(stated)
-            stated["guess"] = gait_from(stated["guess"])
-            stated["body"] = body_from(stated["body"])
-            stated["friction"] = law_from(stated["friction"])
-            stated["gait"] = class_from(stated["gait"])
+            stated["guess"] = gait_fields.gait_from(stated["guess"])
+            stated["body"] = gait_fields.body_from(stated["body"])
+            stated["friction"] = gait_fields.law_from(stated["friction"])
+            stated["gait"] = gait_fields.class_from(stated["gait"])
             stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
             return cls(**stated)
         except (KeyError, TypeError) as error:
