@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from colloc.smooth.modal_body import ModalBody
     from colloc.smooth.prescribed_body import Wave
     from colloc.studies.calls import Starts, multistart, solve, sweep
+    from colloc.studies.pareto import pareto_front
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
     from colloc.verification.replay import replay
@@ -72,6 +73,7 @@ _HOME = {
     "search.optimise": ("maximise_efficiency",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
+    "studies.pareto": ("pareto_front",),
     "results.solution": ("Solution",),
     "results.store": ("load", "save"),
     "results.certificate": ("certify",),
@@ -115,6 +117,7 @@ __all__ = [
     "load_problem",
     "maximise_efficiency",
     "multistart",
+    "pareto_front",
     "replay",
     "save",
     "solve",
@@ -128,6 +131,7 @@ bind(
         "plot": "colloc.pictures.figure:solution_figure",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
+        "plot_front": "colloc.pictures.front_figure:front_figure",
     }
 )
 

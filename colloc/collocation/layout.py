@@ -29,12 +29,14 @@ class Layout:
     z: np.ndarray
     forces: np.ndarray
     length: np.ndarray
+    driven_work: np.ndarray
     n: int
 
     def of_period(self, names: Iterable[str]) -> np.ndarray:
         """``(n, 1)``: where quantities of the solved part of the period are; of the rotation its end and its begin."""
         ends = {"distance": [self.distance[0, -1]], "work": [self.work[0, -1]], "rotation": self.theta[0, [-1, 0]]}
-        return np.concatenate([ends.get(name, self.length[:, 0]) for name in names])[:, None]
+        own = {"length": self.length[:, 0], "driven_work": self.driven_work[:, 0]}
+        return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 
 def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
@@ -59,6 +61,7 @@ def problem_layout(problem: Problem, mesh: Mesh) -> Layout:
         "z": (3, n_point),
         "forces": (problem.body.n_force if full else 0, n_point),
         "length": (int(problem.uses("length")), 1),
+        "driven_work": (int(problem.uses("driven_work")), 1),
     }
     indices, start = {}, 0
     for name, (rows, columns) in sizes.items():

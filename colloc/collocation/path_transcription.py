@@ -29,7 +29,7 @@ from colloc.collocation.path_equations import (
     squared_distance,
 )
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
-from colloc.collocation.point_equations import objective_block, period_rows
+from colloc.collocation.point_equations import BlockParts, driven_point, objective_block, period_rows
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.path_classes import FreePath
@@ -195,8 +195,14 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
 
     for state_index in (layout.distance[0, 0], layout.work[0, 0]):
         geometry.lower[state_index] = geometry.upper[state_index] = 0.0
-    pace = (piece_pace(geometry.piece), geometry.shape[:, interval], given)
-    for name, (parts, group) in period_rows(problem, layout, mesh, pace, 1.0).items():
+    here = geometry.shape[:, interval]
+
+    def driven() -> BlockParts:
+        gather = np.concatenate([layout.angles, layout.rates, layout.forces, here])
+        return driven_point(problem.body, problem.friction, piece.shape, piece.given, piece.speed), gather, given
+
+    densities = {"length": lambda: (piece_pace(geometry.piece), here, given), "driven_work": driven}
+    for name, (parts, group) in period_rows(problem, layout, mesh, densities, 1.0).items():
         geometry.blocks[name] = parts
         groups.append(group)
     implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]] = {} if full else {"point": balanced}
@@ -219,7 +225,7 @@ def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None
     near, mesh = path_through(problem, gait, edges)
     size = problem_layout(problem, mesh).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
-    layout = Layout(own, none, none, none, none, none, none, none, none, size)
+    layout = Layout(own, none, none, none, none, none, none, none, none, none, size)
     geometry = _geometry(problem, mesh, own[:, 0], size, near, far)
     shapes = problem.gait.split(own[:, 0], problem.body.n_joint)
     shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")

@@ -14,7 +14,7 @@ itself is a step function of the tail velocity as delta goes to 0 and does not c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 import casadi as ca
@@ -26,6 +26,7 @@ from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.objective import QUANTITIES, Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.driven_power import driven_power
 from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, local_function, total_function
 from colloc.numerics.constraint_rows import Group, least_group, total_group
@@ -121,6 +122,18 @@ def path_pace(n_joint: int) -> LocalFunction:
     return local_function("pace", rates, ca.SX(0, 1), ca.SX.sym("delta"), ca.sqrt(ca.sumsqr(rates) + _AT_REST**2))
 
 
+def driven_point(
+    body: Body, friction: Law, shape: ca.SX | None = None, given: ca.SX | None = None, gain: ca.SX | float = 1.0
+) -> LocalFunction:
+    """Driven power at a point of a full program, from joint angles, rates and forces; times a gain that depends on more
+    locals, `shape`, and on what is `given`."""
+    _, angles, rates, _, delta = _symbols(body)
+    forces = ca.SX.sym("forces", body.n_force)
+    out = gain * driven_power(body, friction, angles, rates, forces, delta)
+    local = ca.vertcat(angles, rates, forces, *([] if shape is None else [shape]))
+    return local_function("driven", local, ca.SX(0, 1) if given is None else given, delta, out)
+
+
 BlockParts = tuple[LocalFunction, np.ndarray, np.ndarray]
 """What a `colloc.numerics.blocks.Block` is made of: function, gather, instance parameters."""
 
@@ -142,15 +155,16 @@ def objective_block(problem: Problem, layout: Layout) -> Block:
 
 
 def period_rows(
-    problem: Problem, layout: Layout, mesh: Mesh, pace: BlockParts, unit: float
+    problem: Problem, layout: Layout, mesh: Mesh, densities: Mapping[str, Callable[[], BlockParts]], unit: float
 ) -> dict[str, tuple[BlockParts, Group]]:
     """Blocks and rows, by name, of what a problem asks of a whole period besides its objective.
 
-    `pace`: the length of path per `unit` of time at the points.
+    `densities`: blocks of the quantities that are integrals, per `unit` of time at the points; made if they are asked for.
     """
     found = {}
-    if layout.length.size:
-        found["length"] = pace, total_group("length", layout.length, mesh, layout.n, unit)
+    for name, density in densities.items():
+        if problem.uses(name):
+            found[name] = density(), total_group(name, getattr(layout, name), mesh, layout.n, unit)
     if problem.at_least:
         aims, least = zip(*problem.at_least, strict=True)
         parts = period_block(aims, 1.0, layout, problem.gait.fraction)

@@ -13,6 +13,7 @@ turns the motion into that direction; nothing is imposed on the sideways displac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -23,6 +24,8 @@ from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
 from colloc.collocation.point_equations import (
     N_RATE,
+    BlockParts,
+    driven_point,
     gait_check,
     mean_square,
     objective_block,
@@ -162,8 +165,12 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         np.empty((0, 1)),
     )
 
-    pace = (path_pace(n_joint), layout.rates, np.empty((0, mesh.n_point)))
-    of_period = period_rows(problem, layout, mesh, pace, RADIANS)
+    none, own = np.empty((0, mesh.n_point)), np.concatenate([layout.angles, layout.rates, layout.forces])
+    densities: dict[str, Callable[[], BlockParts]] = {
+        "length": lambda: (path_pace(n_joint), layout.rates, none),
+        "driven_work": lambda: (driven_point(problem.body, friction), own, none),
+    }
+    of_period = period_rows(problem, layout, mesh, densities, RADIANS)
     blocks |= {name: parts for name, (parts, _) in of_period.items()}
 
     rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS

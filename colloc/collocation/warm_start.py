@@ -9,6 +9,7 @@ from colloc.collocation.layout import Layout
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.mechanics.driven_power import driven_power_in_balance
 from colloc.numerics.mesh import Mesh
 
 _TOLERANCE = 1e-11
@@ -80,6 +81,9 @@ def balanced_variables(
     x[layout.distance[0, 1:]] = distance
     x[layout.work[0, 1:]] = np.cumsum(unit * (quadrature @ now.power))
     x[layout.theta[0]] = theta
+    if layout.driven_work.size:
+        driven = driven_power_in_balance(body, friction, angles, rates, z, slow)
+        x[layout.driven_work] = unit * (quadrature @ driven).sum()
     x[layout.length] = unit * (quadrature @ np.linalg.norm(rates, axis=0)).sum()
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z

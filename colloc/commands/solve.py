@@ -115,6 +115,8 @@ def _besides(solution: Solution) -> list[str]:
         lines.append(f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}")
     if problem.uses("length"):
         lines.append(f"  path length L   {found.length:.6f} rad")
+    if problem.uses("driven_work"):
+        lines.append(f"  driven work W+  {found.driven_work:.6f}")
     if problem.rotation != 0:
         lines.append(f"  net rotation    {found.rotation:.6f} rad")
     return lines

@@ -22,14 +22,15 @@ QUANTITIES = {
     "work": "work against friction over a period",
     "rotation": "net rotation over a period, counter-clockwise [rad]",
     "length": "length of the path in shape space [rad]",
+    "driven_work": "work of the actuators where none takes energy back",
 }
 """What an expression may speak of."""
 _SAMPLES = (
-    {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0},
-    {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0},
+    {"distance": 0.4, "work": 1.7, "rotation": 0.3, "length": 7.0, "driven_work": 1.9},
+    {"distance": 0.7, "work": 2.9, "rotation": 0.8, "length": 11.0, "driven_work": 3.3},
 )
 """Periods at which an expression is tried when it is stated."""
-_PROPORTIONAL_TO_FRICTION = ("work",)
+_PROPORTIONAL_TO_FRICTION = ("work", "driven_work")
 _LONGEST = 300
 """Characters of an expression; it is evaluated by recursion."""
 _OPERATIONS: dict[type, Callable] = {
@@ -110,8 +111,8 @@ class Objective:
     Examples
     --------
     >>> thrifty = Objective("distance / (work + 0.1 * length)", name="thrift")
-    >>> thrifty({"distance": 0.3, "work": 0.9, "length": 6.0})
-    0.2
+    >>> thrifty({"distance": 0.75, "work": 2.0, "length": 10.0})
+    0.25
     >>> Objective("distance/work").name
     'efficiency'
     """
@@ -252,13 +253,15 @@ NAMED = {
     "efficiency": "distance / work",
     "speed": "distance / length",
     "turning": "rotation / work",
+    "driven efficiency": "distance / driven_work",
     "towing": "distance ** 2 / work",
 }
 """Objectives that a problem may name: distance per work; per path in shape space, which is the speed of a body whose shape
-changes at unit rate; rotation per work; and for viscous drag, whose work grows with the pace, Lighthill's efficiency: the work
-of towing the straight body as far in the same time, at unit drag along it, per work."""
-_SHORT = {"efficiency": "d/W", "speed": "d/L", "turning": "θ/W", "towing": "d²/W"}
-EFFICIENCY, SPEED, TURNING, TOWING = (Objective(name) for name in NAMED)
+changes at unit rate; rotation per work; distance per work where no actuator recovers energy from being driven backwards
+(`colloc.mechanics.driven_power`); and for viscous drag, whose work grows with the pace, Lighthill's efficiency: the work of
+towing the straight body as far in the same time, at unit drag along it, per work."""
+_SHORT = {"efficiency": "d/W", "speed": "d/L", "turning": "θ/W", "driven efficiency": "d/W+", "towing": "d²/W"}
+EFFICIENCY, SPEED, TURNING, DRIVEN, TOWING = (Objective(name) for name in NAMED)
 
 
 def objective_from(stated: object) -> Objective:

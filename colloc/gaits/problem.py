@@ -85,8 +85,8 @@ class Problem:
     mesh_tolerance : float
         Relative error of the objective to which the mesh is refined at the final delta; 0 keeps the uniform mesh.
     objective : Objective or str
-        What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", or an expression of distance, work,
-        rotation and length of a period.
+        What is maximised (`colloc.gaits.objective`): "efficiency", "speed", "turning", "driven efficiency", or an expression
+        of distance, work, rotation, length and driven_work of a period.
     rotation : float or None
         Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than 0 need a class without
         symmetry.
@@ -213,6 +213,8 @@ class Problem:
             raise ProblemError(
                 f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class without symmetry."
             )
+        if self.uses("driven_work") and self.formulation != FULL:
+            raise ProblemError(f"driven_work needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
         if not self.gait.free and (self.objective != EFFICIENCY or self.at_least):
             raise ProblemError("nothing is free in a prescribed motion; leave objective and at_least out.")
 

@@ -228,8 +228,8 @@ class Body(Protocol):
     def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
         """The same with the forces ``(n_force, n_time)`` on the body's parts as variables: only for the full formulation."""
 
-    def forces(self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
-        """Their values, ``(n_force, n_time)``."""
+    def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
+        """Their values, ``(n_force, n_time)``, for NumPy and CasADi."""
 
     def largest_forces(self, friction: Law) -> np.ndarray:
         """Their largest magnitudes, ``(n_force, 1)``."""

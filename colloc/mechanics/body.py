@@ -95,8 +95,8 @@ class Chain(Links):
         centre = stack(list(self.centre_velocity(posture, velocity)))
         return Lifted(stack(laws), net_force(posture, force), centre, total_power(velocity, force))
 
-    def forces(self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
-        return np.concatenate(instant(self, friction, angles, rates, z, delta).force)
+    def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
+        return namespace(angles, rates, z).stack(list(instant(self, friction, angles, rates, z, delta).force))
 
     def largest_forces(self, friction: Law) -> np.ndarray:
         return friction.largest_link_forces(self.length_column())

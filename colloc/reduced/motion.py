@@ -7,11 +7,13 @@ tail velocity, its rotation rate omega the orientation theta, both the displacem
     D = sum_ki h_k b_i e^(i theta_ki) c_ki,      W = sum_ki h_k b_i P_ki,
 
 c being the velocity of the centre of mass in the body frame and P the power. What is left is a program of the gait's
-parameters v alone: of |D|, W, the rotation and the length of the path. Gradients take one sweep back through theta.
+parameters v alone: of |D|, W, the rotation, the length of the path and the driven work. Gradients take one sweep back
+through theta.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -21,6 +23,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BOTH, fraction
 from colloc.mechanics.bodies import BalanceSolution, Body
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
+from colloc.reduced.driven_slopes import driven_slopes
 
 _TOLERANCE = 1e-12
 _ACCEPTED = 1e3
@@ -75,13 +78,15 @@ class ReducedMotion:
     mesh : Mesh
         Of the part of the period that is solved.
     shapes : Shapes
-    with_length : bool
-        Whether the length of the path is asked for.
+    besides : sequence of str
+        Which of "length" and "driven_work" are asked for, too.
     """
 
-    def __init__(self, body: Body, friction: Law, symmetry: str, mesh: Mesh, shapes: Shapes, with_length: bool = False) -> None:
+    def __init__(
+        self, body: Body, friction: Law, symmetry: str, mesh: Mesh, shapes: Shapes, besides: Sequence[str] = ()
+    ) -> None:
         self.body, self.friction, self.shapes, self.mesh = body, friction, shapes, mesh
-        self._periods, self._with_length = 1.0 / fraction(symmetry), with_length
+        self._periods, self._besides = 1.0 / fraction(symmetry), besides
         # share of the rotation, and of the sum of all bends, by which the direction of travel is turned
         self._turned_by = {ANTIPODAL: (0.5, 0.0), BOTH: (1.0, 0.5)}.get(symmetry)
         self._weight = mesh.h[:, None] * mesh.scheme.b
@@ -141,10 +146,17 @@ class ReducedMotion:
         s = self.at(v, delta)
         distance = float((s.displacement * np.conj(self._direction(s))).real)
         found = {"distance": self._periods * distance, "work": self._periods * s.work, "rotation": s.rotation}
-        if self._with_length:
-            pieces = np.linalg.norm(s.rates, axis=0) * s.pace
-            found["length"] = self._periods * float(pieces @ self._on_columns(s))
+        for name in self._besides:
+            found[name] = self._periods * float((self._density(name, s)[0] * s.pace) @ self._on_columns(s))
         return found
+
+    def _density(self, name: str, s: _State) -> tuple[np.ndarray, np.ndarray]:
+        """What grows the length of path or the driven work at every column, ``(n_column,)``, and its derivatives along (angles,
+        rates)."""
+        if name == "driven_work":
+            return driven_slopes(self.body, self.friction, s.angles, s.rates, s.solved.z, s.delta)
+        size = np.linalg.norm(s.rates, axis=0)
+        return size, np.concatenate([np.zeros_like(s.angles), s.rates / np.maximum(size, 1e-300)])
 
     def _on_columns(self, s: _State) -> np.ndarray:
         """Weight of every point of every block in an integral over the part of the period that is solved."""
@@ -184,11 +196,10 @@ class ReducedMotion:
             weight = on_bend * self._on_columns(s)
             on_shape[0, :, len(s.rates) :] += (weight * s.pace)[:, None]
             on_pace[0] += weight * s.rates.sum(axis=0)
-        if self._with_length:
-            weight, size = self._on_columns(s), np.linalg.norm(s.rates, axis=0)
-            along = np.zeros((1, *on_shape.shape[1:]))
-            along[0, :, len(s.rates) :] = (weight * s.pace * s.rates / np.maximum(size, 1e-300)).T
-            on_shape, on_pace = np.concatenate([on_shape, along]), np.concatenate([on_pace, (weight * size)[None]])
-        d, w, rotation, *length = self.shapes.pulled_back(v, on_shape, on_pace)
+        for name in self._besides:
+            weight, (density, slope) = self._on_columns(s), self._density(name, s)
+            on_shape = np.concatenate([on_shape, (weight * s.pace * slope).T[None]])
+            on_pace = np.concatenate([on_pace, (weight * density)[None]])
+        d, w, rotation, *more = self.shapes.pulled_back(v, on_shape, on_pace)
         found = {"distance": self._periods * d, "work": self._periods * w, "rotation": rotation}
-        return found | dict(zip(["length"], [self._periods * row for row in length], strict=False))
+        return found | {name: self._periods * row for name, row in zip(self._besides, more, strict=True)}

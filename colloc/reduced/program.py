@@ -71,9 +71,8 @@ class ReducedProgram:
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
         problem = space.problem
-        self.motion = ReducedMotion(
-            problem.body, problem.friction, problem.gait.symmetry, space.mesh, space, problem.uses("length")
-        )
+        besides = [name for name in ("length", "driven_work") if problem.uses(name)]
+        self.motion = ReducedMotion(problem.body, problem.friction, problem.gait.symmetry, space.mesh, space, besides)
         turns = [problem.rotation] if problem.gait.symmetry == NONE and problem.rotation is not None else []
         least = [value for _, value in problem.at_least]
         self._objective, self._closes, self._reached = problem.objective, bool(turns), [aim for aim, _ in problem.at_least]

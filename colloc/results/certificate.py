@@ -117,6 +117,7 @@ def gait_certificate(
     """
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
+    settings["driven"] = problem.uses("driven_work")
     known = measured(problem.body, problem.friction, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
@@ -144,6 +145,7 @@ def gait_certificate(
         known.limit.error,
         fine.rotation,
         fine.length,
+        fine.driven_work,
     )
 
 
@@ -170,6 +172,7 @@ def measured(
     breaks: np.ndarray | tuple[float, ...] = (),
     objective: Objective = EFFICIENCY,
     rotation: float | None = 0.0,
+    driven: bool = False,
 ) -> Measured:
     """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
 
@@ -177,16 +180,18 @@ def measured(
     that turns by more depends on the point that is followed.
     """
     replays: list[Replay] = []
-    for part in (1.0, 0.1, 0.01) if friction.regularised else (1.0,):
+    smoothed = friction.regularised or "driven_work" in objective.uses
+    for part in (1.0, 0.1, 0.01) if smoothed else (1.0,):
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
         settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "near": near, "objective": objective}
+        settings["driven"] = driven
         replays.append(replay(*at, **settings))  # type: ignore[arg-type]
     known = []
     for aim in (objective, EFFICIENCY):
         values = [aim(each.period) for each in replays]
         errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
-        limit = extrapolated_limit(values, errors) if friction.regularised else Limit(values[0], errors[0])
+        limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
         known.append((errors[0], limit))
     fine = replays[0]
     distance_error = fine.distance_error + astray(fine, rotation) + fine.other_distance

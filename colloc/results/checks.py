@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
+
+from colloc.gaits.objective import QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,9 @@ class Certificate:
         The same of distance and work; NaN if an older file does not state it.
     value, value_error, value_at_zero_delta, value_error_at_zero_delta : float
         The same as of the efficiency, of the problem's objective; by default the efficiency's.
-    rotation, length : float
-        Net rotation, and length of the path in shape space, of the period [rad]; NaN if an older file does not state it.
+    rotation, length, driven_work : float
+        Net rotation, and length of the path in shape space, of the period [rad]; work of the actuators where none takes energy
+        back. NaN if an older file does not state it, or nobody asked.
     """
 
     checks: tuple[Check, ...]
@@ -77,6 +80,7 @@ class Certificate:
     value_error_at_zero_delta: float = float("nan")
     rotation: float = float("nan")
     length: float = float("nan")
+    driven_work: float = field(default=float("nan"), compare=False)
 
     def __post_init__(self) -> None:
         for name, usual in _USUAL.items():
@@ -92,6 +96,11 @@ class Certificate:
 
     def __str__(self) -> str:
         return "\n".join(check.line() for check in self.checks)
+
+    @property
+    def period(self) -> dict[str, float]:
+        """What the replayed period comes to, by the names of `colloc.gaits.objective.QUANTITIES`."""
+        return {name: getattr(self, name) for name in QUANTITIES}
 
     @property
     def replayed(self) -> bool:

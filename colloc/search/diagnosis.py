@@ -31,6 +31,7 @@ _PATH = {
 }
 _OF_PERIOD = {
     "length": "the length of the path",
+    "driven_work": "the work of the actuators",
     "at least": "a value that has to be reached",
     "shape speed": "the lower bound on the shape speed",
 }

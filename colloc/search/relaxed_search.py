@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.mixture import Mixture
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.mixture_space import MixtureSpace
@@ -22,7 +23,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.relaxed_solution import Optimality, RelaxedSolution, realised_gaits, relaxed_certificate
 from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
-from colloc.system.errors import CollocError, NotConvergedError
+from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 
 _COARSE, _MOST = 0.4, 0.7
 """Pieces on which starts are told apart, and are followed, as shares of those of the answer."""
@@ -211,6 +212,8 @@ def best_relaxed_gait(
     repeats : tuple of int
         Of the directions on every piece, in the finite gaits; more if these lose more than half a percent.
     """
+    if problem.objective != EFFICIENCY or problem.at_least or problem.rotation != 0:
+        raise ProblemError("relaxed gaits are measured by their efficiency alone; leave objective, rotation and at_least out.")
     begin = time.perf_counter()
     best, *others = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
     report("certifying the relaxed gait")

@@ -14,6 +14,7 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.driven_power import driven_power_in_balance
 from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay import Path
@@ -28,24 +29,35 @@ _MOST_PANELS = 20_000
 @dataclass(frozen=True, eq=False)
 class Rates:
     """Velocities at instants, arrays that end in the same shape: tail velocity ``(3, ...)``, velocity of the centre of mass
-    in the body frame (complex), power."""
+    in the body frame (complex), power, driven power (0 unless asked for)."""
 
     z: np.ndarray
     centre: np.ndarray
     power: np.ndarray
+    driven: np.ndarray
 
 
-def rates_at(body: Body, friction: Law, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None) -> Rates:
+def rates_at(
+    body: Body,
+    friction: Law,
+    path: Path,
+    delta: float,
+    t: np.ndarray,
+    near: np.ndarray | None = None,
+    driven: bool = False,
+) -> Rates:
     """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
     start = None if near is None else near.reshape(3, -1)
     solved = body.solve(friction, angles, rates, delta, start=start).require()
     now = body.motion(friction, angles, rates, delta, solved)
-    return Rates(now.z.reshape(3, *t.shape), (now.centre[0] + 1j * now.centre[1]).reshape(t.shape), now.power.reshape(t.shape))
+    delivered = driven_power_in_balance(body, friction, angles, rates, now.z, delta) if driven else np.zeros(t.size)
+    rows = (now.centre[0] + 1j * now.centre[1], now.power, delivered)
+    return Rates(now.z.reshape(3, *t.shape), *(row.reshape(t.shape) for row in rows))
 
 
-Increments = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Rotation, displacement in the initial body frame (complex) and work of intervals, ``(n,)`` each."""
+Increments = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Rotation, displacement in the initial body frame (complex), work and driven work of intervals, ``(n,)`` each."""
 
 
 def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None) -> Increments:
@@ -55,7 +67,7 @@ def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | 
     """
     omega, b = rates.z[2], rule.b if weights is None else weights
     turn = np.exp(1j * h[:, None] * (omega @ rule.A.T))
-    return h * (omega @ b), h * ((turn * rates.centre) @ b), h * (rates.power @ b)
+    return h * (omega @ b), h * ((turn * rates.centre) @ b), h * (rates.power @ b), h * (rates.driven @ b)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +80,8 @@ class FineMotion:
         Panel edges.
     rates : Rates
         At the panel nodes, ``(n, s)``.
-    theta, path, work : (n + 1,)
-        Orientation, displacement in the lab (complex, starting with orientation 0) and work at the edges.
+    theta, path, work, driven_work : (n + 1,)
+        Orientation, displacement in the lab (complex, starting with orientation 0), work and driven work at the edges.
     unresolved : (n,)
         Relative error of the objective that a panel may still hold: what halving it last changed, at its end and half way.
     """
@@ -79,6 +91,7 @@ class FineMotion:
     theta: np.ndarray
     path: np.ndarray
     work: np.ndarray
+    driven_work: np.ndarray
     unresolved: np.ndarray
 
     @property
@@ -92,8 +105,8 @@ class FineMotion:
         weights = PANEL_RULE.lagrange(((t - self.edges[k]) / np.diff(self.edges)[k]).ravel()).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
-    def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Orientation, displacement and work at phases t ``(n_time,)``, by the panels' polynomials."""
+    def at(self, t: np.ndarray) -> Increments:
+        """Orientation, displacement, work and driven work at phases t ``(n_time,)``, by the panels' polynomials."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)
         weights = PANEL_RULE.integrals((t - self.edges[k]) / h[k]) * h[k][:, None]
@@ -104,6 +117,7 @@ class FineMotion:
             self.theta[k] + (weights * omega[k]).sum(axis=1),
             self.path[k] + (weights * moved[k]).sum(axis=1),
             self.work[k] + (weights * self.rates.power[k]).sum(axis=1),
+            self.driven_work[k] + (weights * self.rates.driven[k]).sum(axis=1),
         )
 
 
@@ -115,6 +129,7 @@ def fine_motion(
     edges: np.ndarray,
     tolerance: float,
     shares: Callable[[Mapping[str, float]], Mapping[str, float]] = EFFICIENCY.shares,
+    driven: bool = False,
 ) -> FineMotion:
     """Integrate a path between the first and the last of `edges` to a relative error of the efficiency, or another objective.
 
@@ -131,7 +146,9 @@ def fine_motion(
         Panels are halved until the sum of their disagreements is below this. The sum that remains is in the result.
 
     shares : callable
-        From distance, work and rotation to what a small change of each changes in the objective, relative to it.
+        From distance, work, rotation and driven work to what a small change of each changes in the objective, relative to it.
+    driven : bool
+        Whether the driven work is asked for.
 
     Raises
     ------
@@ -140,7 +157,7 @@ def fine_motion(
     """
 
     def solved(left: np.ndarray, width: np.ndarray, near: np.ndarray | None = None) -> tuple[Rates, Increments]:
-        rates = rates_at(body, friction, path, delta, left[:, None] + width[:, None] * PANEL_RULE.c, near)
+        rates = rates_at(body, friction, path, delta, left[:, None] + width[:, None] * PANEL_RULE.c, near, driven)
         return rates, increments(PANEL_RULE, width, rates)
 
     left, width = edges[:-1], np.diff(edges)
@@ -157,12 +174,13 @@ def fine_motion(
         start = np.repeat(left[chosen], 2)
         start[1::2] += half[1::2]
         new_rates, new = solved(start, half, (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1))
-        before = Rates(rates.z[:, chosen], rates.centre[chosen], rates.power[chosen])
+        before = Rates(rates.z[:, chosen], *(a[chosen] for a in (rates.centre, rates.power, rates.driven)))
         middle = increments(PANEL_RULE, width[chosen], before, _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves
         turn, move = new[0][0::2] + new[0][1::2], new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2]
+        sums = list(zip(new[2:], parts[2:], strict=True))
         differences = (
-            (turn - parts[0][chosen], move - parts[1][chosen], new[2][0::2] + new[2][1::2] - parts[2][chosen]),
+            (turn - parts[0][chosen], move - parts[1][chosen], *(n[0::2] + n[1::2] - p[chosen] for n, p in sums)),
             tuple(half - polynomial for half, polynomial in zip((a[0::2] for a in new), middle, strict=True)),
         )
         kept = np.ones(left.size, dtype=bool)
@@ -172,22 +190,27 @@ def fine_motion(
             np.concatenate([rates.z[:, kept], new_rates.z], axis=1)[:, place],
             np.concatenate([rates.centre[kept], new_rates.centre])[place],
             np.concatenate([rates.power[kept], new_rates.power])[place],
+            np.concatenate([rates.driven[kept], new_rates.driven])[place],
         )
         parts = tuple(np.concatenate([a[kept], b])[place] for a, b in zip(parts, new, strict=True))  # type: ignore[assignment]
-        turned, travelled, spent = _accumulated(parts)
+        turned, travelled, spent, delivered = _accumulated(parts)
         distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)
-        share = {k: abs(s) for k, s in shares({"distance": distance, "work": work, "rotation": turned[-1]}).items()}
+        known = {"distance": distance, "work": work, "rotation": turned[-1], "driven_work": delivered[-1]}
+        share = {k: abs(s) for k, s in shares(known).items()}
         on_turn = share["distance"] * np.abs(travelled - travelled[-1]).max() + share["rotation"]
         change = sum(
-            np.abs(move) * share["distance"] + np.abs(turn) * on_turn + np.abs(energy) * share["work"]
-            for turn, move, energy in differences
+            np.abs(move) * share["distance"]
+            + np.abs(turn) * on_turn
+            + np.abs(energy) * share["work"]
+            + np.abs(drive) * share["driven_work"]
+            for turn, move, energy, drive in differences
         )
         gap = np.concatenate([gap[kept], np.repeat(0.5 * change, 2)])[place]
         left, width = np.concatenate([left[kept], start])[place], np.concatenate([width[kept], half])[place]
     return FineMotion(np.append(left, edges[-1]), rates, *_accumulated(parts), gap)
 
 
-def _accumulated(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Orientation, lab displacement and work at the edges, from every interval's own."""
-    theta, work = (np.concatenate([[0.0], np.cumsum(a)]) for a in (parts[0], parts[2]))
-    return theta, np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]), work
+def _accumulated(parts: Increments) -> Increments:
+    """Orientation, lab displacement, work and driven work at the edges, from every interval's own."""
+    theta, work, driven = (np.concatenate([[0.0], np.cumsum(a)]) for a in (parts[0], *parts[2:]))
+    return theta, np.concatenate([[0.0], np.cumsum(np.exp(1j * theta[:-1]) * parts[1])]), work, driven

@@ -20,7 +20,7 @@ from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import smooth_minimum
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import PANEL_RULE, FineMotion, Rates, fine_motion, increments, rates_at
+from colloc.verification.adaptive_motion import PANEL_RULE, FineMotion, Increments, Rates, fine_motion, increments, rates_at
 
 FINER = 0.05
 """The panels are refined until what they may still miss is this fraction of the error they measure or of the tolerance."""
@@ -81,12 +81,12 @@ def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray
         return _shares(problem, part, length)
 
     of = (problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)))
-    return fine_motion(*of, delta, edges, tolerance, shares)
+    return fine_motion(*of, delta, edges, tolerance, shares, problem.uses("driven_work"))
 
 
 def _period(problem: Problem, part: Mapping[str, float], length: float) -> dict[str, float]:
-    """What a whole period comes to, from distance, work and rotation of the part that is solved."""
-    whole = {name: part[name] / problem.gait.fraction for name in ("distance", "work")}
+    """What a whole period comes to, from distance, work, rotation and driven work of the part that is solved."""
+    whole = {name: part[name] / problem.gait.fraction for name in ("distance", "work", "driven_work")}
     return whole | {"rotation": part["rotation"], "length": length}
 
 
@@ -167,7 +167,7 @@ class _Own(NamedTuple):
     length: np.ndarray
     value: np.ndarray
     rates: Rates
-    increments: tuple[np.ndarray, np.ndarray, np.ndarray]
+    increments: Increments
 
 
 def _collocated_intervals(
@@ -175,10 +175,11 @@ def _collocated_intervals(
 ) -> _Own:
     nodes = left[:, None] + (right - left)[:, None] * rule.c
     rates = rates_at(
-        problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, nodes, fine.velocity(nodes)
-    )
-    turned, moved, spent = increments(rule, right - left, rates)
-    (theta, path, work), (theta_right, path_right, work_right) = fine.at(left), fine.at(right)
+        problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, nodes, fine.velocity(nodes),
+        problem.uses("driven_work"),
+    )  # fmt: skip
+    turned, moved, spent, delivered = increments(rule, right - left, rates)
+    (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
     rotation, energy = turned - (theta_right - theta), spent - (work_right - work)
     displacement = moved * np.exp(1j * theta) - (path_right - path)
     # an error of rotation turns everything after it
@@ -190,7 +191,8 @@ def _collocated_intervals(
     shares = _shares(problem, _fine_part(problem, fine), _whole_length(problem, gait))
     ahead = (pull * np.conj(direction)).real
     value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length
-    return _Own(rotation, displacement, energy, length, value, rates, (turned, moved, spent))
+    value += shares["driven_work"] * (delivered - (driven_right - driven))
+    return _Own(rotation, displacement, energy, length, value, rates, (turned, moved, spent, delivered))
 
 
 def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
@@ -198,14 +200,14 @@ def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
     return own.rotation * (0.5 / abs(fine.path[-1]) if problem.gait.symmetry == NONE else 0.0)
 
 
-def _part(problem: Problem, end: complex, work: float, rotation: float) -> dict[str, float]:
+def _part(problem: Problem, end: complex, work: float, rotation: float, driven_work: float) -> dict[str, float]:
     distance = float((end * np.conj(_direction(problem, end, rotation))).real)
-    return {"distance": distance, "work": float(work), "rotation": float(rotation)}
+    return {"distance": distance, "work": float(work), "rotation": float(rotation), "driven_work": float(driven_work)}
 
 
 def _fine_part(problem: Problem, fine: FineMotion) -> dict[str, float]:
     """What the solved part comes to."""
-    return _part(problem, fine.path[-1], fine.work[-1], fine.theta[-1])
+    return _part(problem, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
 
 
 def _fine_value(problem: Problem, fine: FineMotion, gait: AnyGait) -> float:
@@ -214,9 +216,9 @@ def _fine_value(problem: Problem, fine: FineMotion, gait: AnyGait) -> float:
 
 def _collocated_value(problem: Problem, own: _Own, gait: AnyGait) -> float:
     """The objective as the scheme sees it."""
-    turned, moved, spent = own.increments
+    turned, moved, spent, delivered = own.increments
     theta = np.concatenate([[0.0], np.cumsum(turned)])
-    part = _part(problem, (np.exp(1j * theta[:-1]) * moved).sum(), spent.sum(), theta[-1])
+    part = _part(problem, (np.exp(1j * theta[:-1]) * moved).sum(), spent.sum(), theta[-1], delivered.sum())
     length = _whole_length(problem, gait) + float(own.length.sum()) / problem.gait.fraction
     return problem.objective(_period(problem, part, length))
 

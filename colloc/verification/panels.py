@@ -25,9 +25,9 @@ _MARGIN = 3.0
 
 class Panels(NamedTuple):
     """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
-    of the centre of mass in the body frame (complex), power, power of the joints, shape speed, residual and lever ``(n, 5)``;
-    and how far all balanced motions lie apart ``(n, 5, 3)`` (`colloc.verification.followed_motion.FollowedMotion.apart`). At
-    last the differences of both rules on the panel twice as wide that each is half of ``(n, 4)`` (see `differences`)."""
+    of the centre of mass in the body frame (complex), power, power of the joints, shape speed, driven power, residual and lever
+    ``(n, 5)``; and how far all balanced motions lie apart ``(n, 5, 3)`` (`colloc.verification.followed_motion.FollowedMotion`).
+    At last the differences of both rules on the panel twice as wide that each is half of ``(n, 5)`` (see `differences`)."""
 
     left: np.ndarray
     width: np.ndarray
@@ -36,6 +36,7 @@ class Panels(NamedTuple):
     power: np.ndarray
     actuator: np.ndarray
     pace: np.ndarray
+    driven: np.ndarray
     residual: np.ndarray
     lever: np.ndarray
     apart: np.ndarray
@@ -70,13 +71,13 @@ def begun(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, ...]) -
 
 
 def differences(panels: Panels) -> np.ndarray:
-    """What halving changes in rotation, displacement, work and path length of panels, magnitudes ``(n, 4)``."""
+    """What halving changes in rotation, displacement, work, path length and driven work of panels, magnitudes ``(n, 5)``."""
     whole, once = increments(WHOLE, panels, 1), increments(HALF, panels, 2)
     return np.stack([np.abs(a - b) for a, b in zip(whole, once, strict=True)], axis=1)
 
 
 def left_over(changed: np.ndarray, wider: np.ndarray) -> np.ndarray:
-    """Error of the halves of panels ``(n, 4)``, from the last change and the one before, on the panel twice as wide.
+    """Error of the halves of panels ``(n, 5)``, from the last change and the one before, on the panel twice as wide.
 
     The rest of a geometric series; but no less than smooth motion would leave of the change before, with a margin, since a
     change that falls faster does so by accident.
@@ -85,10 +86,12 @@ def left_over(changed: np.ndarray, wider: np.ndarray) -> np.ndarray:
     return np.maximum(changed * falloff / (1 - falloff), _MARGIN * _SMOOTH * wider)
 
 
-def increments(rule: np.ndarray, panels: Panels, every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Rotation, displacement in the axes at the panel's begin (complex), work and path length of panels, on every `every`-th
-    instant."""
-    omega, centre, power, pace = (a[:, ::every] for a in (panels.z[..., 2], panels.centre, panels.power, panels.pace))
+def increments(rule: np.ndarray, panels: Panels, every: int) -> tuple[np.ndarray, ...]:
+    """Rotation, displacement in the axes at the panel's begin (complex), work, path length and driven work of panels, ``(n,)``
+    each, on every `every`-th instant."""
+    omega, centre, *others = (
+        a[:, ::every] for a in (panels.z[..., 2], panels.centre, panels.power, panels.pace, panels.driven)
+    )
     h, b = panels.width, rule[-1]
     turn = np.exp(1j * h[:, None] * (omega @ rule.T))
-    return h * (omega @ b), h * ((turn * centre) @ b), h * (power @ b), h * (pace @ b)
+    return h * (omega @ b), h * ((turn * centre) @ b), *(h * (other @ b) for other in others)

@@ -20,6 +20,7 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.driven_power import driven_power_in_balance
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
@@ -41,7 +42,7 @@ class Replay:
 
     Attributes
     ----------
-    distance, work, efficiency : float
+    distance, work : float
         The distance is that of the centre of mass.
     rotation : float
         Net rotation over the period [rad].
@@ -49,13 +50,15 @@ class Replay:
         Largest distance of a point of the body from its centre of mass [body lengths].
     length : float
         Of the path in shape space [rad].
+    driven_work : float
+        Of the actuators where none takes energy back (`colloc.mechanics.driven_power`); NaN if it was not asked for.
     actuator_work : float
         Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
     residual : float
         Largest force or torque left over, at any instant, in units of the largest friction coefficient.
     error : float
         Relative error of the objective: what halving the panels would change, summed as magnitudes, and the residual.
-    distance_error, work_error, rotation_error, length_error : float
+    distance_error, work_error, rotation_error, length_error, driven_work_error : float
         Of these, for the same reasons.
     several : float
         Part of the period at which several motions are balanced; 0 for equal coefficients, where there is one.
@@ -70,9 +73,9 @@ class Replay:
 
     distance: float
     work: float
-    efficiency: float
     rotation: float
     length: float
+    driven_work: float
     lever: float
     actuator_work: float
     residual: float
@@ -81,6 +84,7 @@ class Replay:
     work_error: float
     rotation_error: float
     length_error: float
+    driven_work_error: float
     several: float
     other_distance: float
     other_work: float
@@ -93,6 +97,11 @@ class Replay:
         """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""
         known, z = self.tail
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
+
+    @property
+    def efficiency(self) -> float:
+        """Distance over work."""
+        return self.distance / self.work
 
     @property
     def period(self) -> dict[str, float]:
@@ -112,7 +121,8 @@ class Replay:
     def ambiguity_of(self, objective: Objective) -> float:
         """The same of any objective."""
         others = {"distance": self.other_distance, "work": self.other_work, "rotation": self.other_rotation}
-        return float(objective.relative_error(self.period, others))
+        # what other motions do to the work they do to its driven part as well
+        return float(objective.relative_error(self.period, others | {"driven_work": self.other_work}))
 
     def error_of(self, objective: Objective) -> float:
         """`error` of any objective."""
@@ -135,6 +145,7 @@ def _evaluated(
     sense: int,
     *,
     whole: bool,
+    driven: bool,
 ) -> tuple[np.ndarray, ...]:
     """`Panels` from z to apart at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
 
@@ -146,6 +157,7 @@ def _evaluated(
         near = None  # which is a mean, and of no one direction
     shares = mixed[0] if mixed else np.ones((1, t.size))
     motions, residual, apart = [], np.zeros(t.size), np.zeros((3, t.size))
+    delivered = np.zeros(t.size)
     for share, some in zip(shares, rates if mixed else rates[None], strict=True):
         start = near
         if not friction.associated:
@@ -154,6 +166,8 @@ def _evaluated(
                 start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
         motion, left = body.replayed(friction, angles, some, delta, start)
         motions.append(motion)
+        if driven:
+            delivered += share * driven_power_in_balance(body, friction, angles, some, motion.z, delta)
         residual = np.maximum(residual, left)
 
     def mean(name: str) -> np.ndarray:
@@ -165,7 +179,7 @@ def _evaluated(
     pace = sum(
         share * np.linalg.norm(some, axis=0) for share, some in zip(shares, rates if mixed else rates[None], strict=True)
     )
-    values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), pace, residual, lever)
+    values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), pace, delivered, residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
     return z, *(value.reshape(t.shape) for value in values), apart
 
@@ -183,6 +197,7 @@ def replay(
     near: Replay | None = None,
     sense: int = FORWARDS,
     objective: Objective = EFFICIENCY,
+    driven: bool = False,
 ) -> Replay:
     """Distance, work, rotation and length of a path over one period, to a relative error in the efficiency, or an objective.
 
@@ -208,6 +223,8 @@ def replay(
     sense : {FORWARDS, BACKWARDS}
         Whether branches are followed with or against time, where several motions are balanced.
     objective : Objective
+    driven : bool
+        Whether the driven work is asked for, whatever the objective is.
 
     Raises
     ------
@@ -235,20 +252,23 @@ def replay(
     t[np.isin(left, ends[1:-1]), 0] += _ONE_SIDED
     t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
     start = None if near is None else near.tail_velocity(t.ravel())
-    panels = begun(left, width, _evaluated(body, friction, path, delta, t, start, sense, whole=True))
+    driven = driven or "driven_work" in objective.uses
+    panels = begun(left, width, _evaluated(body, friction, path, delta, t, start, sense, whole=True, driven=driven))
     while True:
-        turn, move, spent, passed = increments(WHOLE, panels, 1)
+        turn, move, spent, passed, delivered = increments(WHOLE, panels, 1)
         heading = np.concatenate([[0.0], np.cumsum(turn)])
         travelled = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
         distance, work = float(abs(travelled[-1])), float(spent.sum())
         if not work > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
-        turn_error, move_error, work_error, length_error = left_over(differences(panels), panels.wider).T
+        turn_error, move_error, work_error, length_error, driven_error = left_over(differences(panels), panels.wider).T
         # an error of rotation turns all that comes after it
         reach = np.abs(travelled - travelled[-1]).max()
         astray = move_error + reach * turn_error
         period = {"distance": max(distance, 1e-300), "work": work, "rotation": heading[-1], "length": float(passed.sum())}
+        period["driven_work"] = float(delivered.sum())
         errors = {"distance": astray, "work": work_error, "rotation": turn_error, "length": length_error}
+        errors["driven_work"] = driven_error
         gap = objective.relative_error(period, errors)
         residual = float(panels.residual.max())
         order = np.argsort(gap)
@@ -261,16 +281,16 @@ def replay(
         old = panels.take(chosen)
         between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
-        new = _evaluated(body, friction, path, delta, between, start, sense, whole=False)
+        new = _evaluated(body, friction, path, delta, between, start, sense, whole=False, driven=driven)
         panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new))
     several, other_distance, other_work, other_rotation = _others(panels, reach)
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
     return Replay(
         distance,
         work,
-        distance / work,
         float(heading[-1]),
         period["length"],
+        period["driven_work"] if driven else np.nan,
         float(panels.lever.max()),
         float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
         residual,
@@ -279,6 +299,7 @@ def replay(
         float(work_error.sum()) + residual * work,
         float(turn_error.sum()) + residual,
         float(length_error.sum()),
+        float(driven_error.sum()) + residual * work,
         several,
         other_distance,
         other_work,

@@ -91,7 +91,7 @@ def test_the_page_holds_what_it_should(page, three_link):
     for words in (
         "three_link", "✓ certified", "0.26003", "agrees with 0.259", "upper bound 0.473", "Motion in the lab frame",
         "moves 0.27 body lengths a cycle; 0.26 body lengths per unit of work", "1 harmonic, symmetry bilateral",
-        "μt = 1 sideways", "0.3333, 0.3333, 0.3333", "replay gap", "finds the same efficiency", "joints 1 and 2",
+        "μt = 1 sideways", "0.3333, 0.3333, 0.3333", "replay gap", "finds the same value", "joints 1 and 2",
         "speeds along the body", "power against friction", "efficiency at each level", "mesh: error of",
         "How to reproduce", "colloc solve three_link.py", "casadi", three_link.problem.hash,
     ):  # fmt: skip

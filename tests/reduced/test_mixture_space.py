@@ -5,6 +5,7 @@ import pytest
 
 from colloc import Chain, Friction, Problem, Relaxed, replay
 from colloc.reduced.mixture_space import MixtureSpace
+from colloc.reduced.motion import ReducedMotion
 from colloc.reduced.program import ReducedProgram
 
 DELTA = 0.05
@@ -28,15 +29,18 @@ def begun(symmetry, links=3, directions=3, pieces=5, far=()):
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal", "both"])
 @pytest.mark.parametrize(("links", "far"), [(3, ()), (4, ((0, 3),))])
-def test_slopes_of_efficiency_rotation_and_rows_are_those_of_differences(symmetry, links, far):
+def test_slopes_of_what_a_period_comes_to_and_of_rows_are_those_of_differences(symmetry, links, far):
     space, v = begun(symmetry, links, far=far)
     program, h = ReducedProgram(space, DELTA), 1e-6
+    program.motion = ReducedMotion(space.problem.body, space.problem.friction, symmetry, space.mesh, space, ["length"])
     slopes, rows = program.motion.gradients(v, DELTA), space.row_slopes(v)
     for k in np.random.default_rng(2).choice(space.n, 8, replace=False):
         step = np.zeros(space.n)
         step[k] = h
-        up, down = (np.array(program.motion.values(v + side * step, DELTA)) for side in (1, -1))
-        assert np.allclose(slopes[:, k], (up - down) / (2 * h), atol=2e-8)
+        up, down = (program.motion.values(v + side * step, DELTA) for side in (1, -1))
+        assert list(slopes) == list(up) == ["distance", "work", "rotation", "length"]
+        for name, slope in slopes.items():
+            assert np.allclose(slope[k], (up[name] - down[name]) / (2 * h), atol=1e-7), name
         assert np.allclose(rows[:, k], (space.rows(v + step) - space.rows(v - step)) / (2 * h), atol=2e-8)
 
 
@@ -60,7 +64,7 @@ def test_a_mixture_of_one_direction_is_a_polygon(symmetry):
     v = fine.parameters(space.member(v).split(60))
     program = ReducedProgram(fine, DELTA)
     assert -program.objective(v) == pytest.approx(replayed.efficiency, rel=1e-5)
-    assert program.motion.distance(v, DELTA) / problem.gait.fraction == pytest.approx(replayed.distance, rel=1e-5)
+    assert program.motion.values(v, DELTA)["distance"] == pytest.approx(replayed.distance, rel=1e-5)
 
 
 def test_a_gait_beyond_its_limits_is_seen_between_the_pieces_too():

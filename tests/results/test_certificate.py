@@ -161,7 +161,8 @@ def test_influence_of_delta(failures, replays, sign):
     largest = replays[max(replays)].efficiency
 
     def run(f):
-        return failures(change=lambda part, r: r if part == 1 else replace(r, efficiency=largest * (1 + sign * f * 1e-2)))
+        changed = largest * (1 + sign * f * 1e-2)
+        return failures(change=lambda part, r: r if part == 1 else replace(r, distance=changed * r.work))
 
     judged("delta influence", run)
 

@@ -74,7 +74,7 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
     true = abs(x) / work / replayed(friction).efficiency - 1
     assert error.total == pytest.approx(true, rel=2e-3, abs=3e-8)
     assert abs(true) <= 1.02 * error.estimate
-    assert error.efficiency.sum() == pytest.approx(true, rel=0.1, abs=1e-6)
+    assert error.value.sum() == pytest.approx(true, rel=0.1, abs=1e-6)
 
 
 def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():

@@ -1,0 +1,96 @@
+"""Command line: the front of two objectives of a problem: certified gaits of which none is better in both.
+
+Exit codes: 0 every point certified, 2 bad problem or option, 3 not converged, 4 a point is not certified, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from colloc.commands.ending import FAILED, OK, run
+from colloc.commands.options import add_printing, add_problem, changed, new_parser, output_path
+from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
+from colloc.gaits.problem_file import read_problem_file
+from colloc.results.solution import Solution
+from colloc.system.progress import StatusLine
+from colloc.system.replaced_file import replaced_file
+
+_POINTS = 9
+_EPILOG = """\
+An objective is "efficiency", "speed", "turning", or an expression of distance, work, rotation and length of a period. Every
+point is a result like any other: NAME.front/00.h5 is the best by the first objective, the last one the best by the second.
+
+  colloc pareto problems/three_link.py
+  colloc pareto mine.py --objectives distance "distance / work" --points 15"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    what = "Find certified gaits from the best by one objective to the best by another, of which none is better in both."
+    parser = new_parser("pareto", what, _EPILOG)
+    add_problem(parser)
+    parser.add_argument(
+        "--objectives", nargs=2, metavar=("FIRST", "SECOND"), default=[SPEED.name, EFFICIENCY.name],
+        help=f"default: {SPEED.name} {EFFICIENCY.name}",
+    )  # fmt: skip
+    parser.add_argument("--points", type=int, default=_POINTS, metavar="N", help=f"of the front (default: {_POINTS})")
+    parser.add_argument("--starts", type=int, metavar="N", help="starts to find both ends of (default: 16)")
+    parser.add_argument("--output", metavar="PATH", help="folder, or .csv file (default: results/NAME.front.csv)")
+    parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.front.png")
+    add_printing(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _pareto, arguments)
+
+
+def _pareto(options: argparse.Namespace) -> int:
+    stated = read_problem_file(options.problem)
+    problem = changed(stated.problem, options)
+    first, second = (objective_from(text) for text in options.objectives)
+    aims = (first, second)
+    table = output_path(options.output, Path("results") / f"{problem.name}.front.csv")
+    from colloc.results.store import save
+    from colloc.search.global_search import STARTS
+    from colloc.studies.pareto import pareto_front
+
+    quiet = options.quiet or options.json
+    with StatusLine(enabled=not quiet) as line:
+        line.say(f"{problem.name}: the ends of the front")
+        starts = options.starts or stated.starts or STARTS
+
+        def told(k: int, found: Solution) -> None:
+            line.say(f"{problem.name}: point {k} of {options.points - 1}: {found}")
+
+        front = pareto_front(problem, first, second, options.points, starts=starts, progress=told)
+    rows = []
+    for k, (point, values) in enumerate(zip(front.points, front.values.tolist(), strict=True)):
+        point.source = stated.source
+        path = save(point, table.with_suffix("") / f"{k:02d}.h5")
+        rows.append([k, *values, point.measured.distance, point.measured.work, point.status, str(path)])
+    names = ["point", *(aim.expression for aim in aims), "distance", "work", "status", "file"]
+    with replaced_file(table) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([names, *rows])
+    saved = [table]
+    if not options.no_figure:
+        from colloc.pictures.style import save as save_figure
+
+        saved += save_figure(front.plot(), table.with_suffix(""), ("png",))
+    if options.json:
+        points = [dict(zip(names, row, strict=True)) for row in rows]
+        print(json.dumps({"objectives": [aim.fields() for aim in aims], "points": points}))
+    else:
+        print(f"{problem.name}: {first.name} against {second.name}, {len(rows)} points")
+        print("\n".join(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}" for k, a, b, _, _, status, _ in rows))
+        print(f"  saved {', '.join(map(str, saved))}, {table.with_suffix('')}/00.h5 ...")
+    return OK if front.certified else FAILED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

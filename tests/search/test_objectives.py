@@ -1,0 +1,218 @@
+"""Other things than efficiency to be best at: exact derivatives, optima that the replay confirms, and what must be reached."""
+
+import numpy as np
+import pytest
+from shared.differences import assert_derivatives_are_differences
+
+from colloc import (
+    Chain,
+    Fourier,
+    FreePath,
+    Friction,
+    Harmonic,
+    Objective,
+    Polygon,
+    Problem,
+    ProblemError,
+    ellipse,
+    load,
+    replay,
+    save,
+)
+from colloc.collocation.warm_start import feasible_point
+from colloc.commands import verify
+from colloc.gaits.objective import EFFICIENCY, SPEED
+from colloc.mechanics.driven_power import actuator_powers, driven_power
+from colloc.numerics.blocks import oracles
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near, transcribed
+from colloc.search.optimise import maximise_efficiency
+
+THRIFT = "sqrt(distance) / (work + 0.1 * length)"
+TURNED = "(distance + rotation**2) / (work + length)"
+FREE = {"rotation": None, "at_least": {"distance": 0.2, TURNED: 0.01}}
+CASES = {
+    "speed": {"gait": Harmonic(2, "none"), "objective": "speed"},
+    "turning": {"gait": Harmonic(2, "none"), "objective": "turning", **FREE},
+    "expression": {"gait": Harmonic(1, "antipodal"), "objective": THRIFT, "at_least": {"efficiency": 0.1}},
+    "driven": {"gait": Harmonic(1, "none"), "objective": "driven efficiency"},
+    "driven path": {"gait": FreePath(4.0, "bilateral"), "objective": "distance / (driven_work + length)"},
+    "driven polygon": {"gait": Polygon(4, "none"), "objective": "driven efficiency", "at_least": {"distance / work": 0.0}},
+    "polygon": {"gait": Polygon(4, "none"), "objective": TURNED, **FREE},
+    "bilateral path": {"gait": FreePath(4.0, "bilateral"), "objective": "speed", "at_least": {THRIFT: 0.1}},
+}
+SKEW = Fourier([0.5, 0.5], [[1.0], [0.2]], [[0.0], [1.0]])
+DELTA = 0.1
+
+
+def stated(case):
+    usual = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10, "friction": Friction(1.7, 1, 1.3)}
+    return Problem("p", **(usual | CASES[case]))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_gradients_of_the_reduced_program_are_those_of_differences(case):
+    problem, h = stated(case), 1e-6
+    space, v = space_near(problem, problem.guess)
+    v = v + 1e-2 * np.random.default_rng(0).normal(size=v.size)
+    space.move_checks(v)
+    program = ReducedProgram(space, DELTA)
+    steps = h * np.eye(space.n)
+    slopes = [(program.objective(v + e) - program.objective(v - e)) / (2 * h) for e in steps]
+    # balances are solved to 1e-12, so that differences over 2 h know the slope of a value of order 1 to 1e-6
+    np.testing.assert_allclose(program.gradient(v), slopes, atol=1e-6)
+    rows = np.transpose([(program.rows(v + e) - program.rows(v - e)) / (2 * h) for e in steps])
+    np.testing.assert_allclose(program.row_slopes(v), rows, atol=2e-6)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
+    problem = stated(case)
+    space, v = space_near(problem, problem.guess)
+    reduced, delta = ReducedProgram(space, DELTA), DELTA
+    full = transcribed(problem, space.member(v), space.mesh.edges)
+    x = feasible_point(full, space.full_parameters(v), delta)
+    found = oracles(full.assembly)
+    p = found.parameter_vector(delta / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]]))
+    assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(reduced.objective(v), rel=1e-9)
+    g = np.array(found.options["jac_g"](x, p)[0]).ravel()
+    if problem.at_least:
+        first = 1 if problem.gait.symmetry == "none" and problem.rotation is not None else 0
+        own = reduced.rows(v)[first : first + len(problem.at_least)]
+        np.testing.assert_allclose(g[full.groups["at least"]], own, atol=1e-11)
+    assert_derivatives_are_differences(found, x, p, 3e-5)
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return maximise_efficiency(Problem("usual", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral")))
+
+
+@pytest.fixture(scope="module")
+def fast():
+    return maximise_efficiency(Problem("fast", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective="speed"))
+
+
+def test_an_expression_that_equals_the_efficiency_has_its_optimum(usual):
+    same = maximise_efficiency(usual.problem.with_(objective="1 / (work / distance)"))
+    assert same.success
+    assert same.value == pytest.approx(usual.value, rel=1e-9)
+    assert same.certificate.value == pytest.approx(usual.certificate.efficiency, rel=1e-7)
+    np.testing.assert_allclose(same.gait.cos, usual.gait.cos, atol=1e-4)
+
+
+def test_the_fastest_gait_is_faster_and_less_efficient_and_the_replay_says_so(usual, fast):
+    assert fast.success
+    best, known = fast.certificate, usual.certificate
+    measured = replay(fast.problem.body, fast.problem.friction, fast.gait, fast.delta_per_period, objective=SPEED)
+    assert measured.value == measured.distance / measured.length == pytest.approx(best.value, abs=best.value_error)
+    assert fast.value == pytest.approx(best.value, rel=1e-4)
+    t = np.linspace(0, 1, 200_001)
+    length = np.linalg.norm(np.diff(fast.gait.angles(t)), axis=0).sum()
+    assert measured.length == pytest.approx(length, rel=1e-8)
+    assert best.value > SPEED(known.period) + 100 * best.value_error
+    assert best.efficiency < known.efficiency - 100 * known.efficiency_error
+
+
+def test_a_result_says_what_it_is_best_at_and_comes_back_from_its_file(fast, tmp_path, capsys):
+    again = load(save(fast, tmp_path / "fast.h5"))
+    assert again.problem.objective == SPEED
+    assert again.value == fast.value
+    assert again.certificate == fast.certificate
+    assert "d/L = 0.014" in repr(again)
+    assert verify.main([str(tmp_path / "fast.h5")]) == 0
+    assert "speed d/L" in capsys.readouterr().out
+
+
+def test_speed_does_not_depend_on_the_size_of_friction(fast):
+    light = maximise_efficiency(fast.problem.with_(friction=Friction(1e-3, 1e-3, 1e-3)))
+    assert light.success
+    assert light.value == pytest.approx(fast.value, rel=1e-9)
+    assert light.certificate.efficiency == pytest.approx(1e3 * fast.certificate.efficiency, rel=1e-6)
+
+
+def test_a_least_distance_is_reached_for_the_price_of_efficiency():
+    friction = Friction(3, 1, 1)
+    free = maximise_efficiency(Problem("free", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1, "bilateral"), friction=friction))
+    least = 1.05 * free.distance
+    far = maximise_efficiency(free.problem.with_(at_least={"distance": least}, guess=free.gait))
+    assert free.success
+    assert far.success
+    assert far.certificate.distance == pytest.approx(least, rel=1e-4)
+    assert far.certificate.efficiency < free.certificate.efficiency
+    assert "least distance" in {check.name for check in far.certificate.checks}
+
+
+def test_a_turning_gait_turns_by_the_prescribed_angle():
+    solution = maximise_efficiency(Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3))
+    assert solution.success
+    gait, problem = solution.gait, solution.problem
+    measured = replay(problem.body, problem.friction, gait, solution.delta_per_period, instants=3000)
+    assert measured.rotation == pytest.approx(0.3, abs=1e-5)
+    # of free gaits, one turns by more and for less work per angle
+    free = maximise_efficiency(problem.with_(rotation=None, guess=gait))
+    assert free.success
+    assert free.certificate.rotation > 0.5
+    assert free.value > solution.value
+
+
+def test_an_efficient_gait_may_turn_as_well():
+    solution = maximise_efficiency(Problem("arc", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.2))
+    assert solution.success
+    assert solution.problem.objective == EFFICIENCY
+    assert solution.certificate.rotation == pytest.approx(0.2, abs=1e-4)
+
+
+def test_an_objective_may_be_negative_and_of_any_sign():
+    """Work costs more than the distance is worth: the best gait is the smallest."""
+    solution = maximise_efficiency(
+        Problem(
+            "idle",
+            ellipse(0.0, 0.6, 0.4),
+            gait=Harmonic(1, "bilateral"),
+            objective=Objective("distance - work", "net"),
+            delta=1e-3,
+        )
+    )
+    assert solution.success
+    assert solution.value < 0
+    assert solution.gait.shape_speed == pytest.approx(0.1, rel=1e-3)
+    assert "better still" in solution.message
+
+
+def test_the_moment_of_a_joint_is_that_of_the_friction_ahead_of_it():
+    body, friction, delta, rng = Chain((0.3, 0.2, 0.5)), Friction(1.7, 1, 1.3), 1e-2, np.random.default_rng(3)
+    angles, rates = rng.normal(size=(2, 2, 40))
+    solved = body.solve(friction, angles, rates, delta)
+    motion = body.motion(friction, angles, rates, delta, solved)
+    forces = body.forces(friction, angles, rates, motion.z, delta)
+    powers = actuator_powers(body, friction, angles, rates, forces, delta)
+    np.testing.assert_allclose(powers.sum(axis=0), motion.actuator_power, atol=1e-12)
+    # the head link's normal force acts half its length from the joint, its tangential force has no arm
+    np.testing.assert_allclose(powers[1], -(0.25 * forces[5] + forces[8]) * rates[1], atol=1e-12)
+    driven = driven_power(body, friction, angles, rates, forces, delta)[0]
+    exact = np.maximum(powers, 0.0).sum(axis=0)
+    assert (powers < 0).any()
+    assert (driven >= exact).all()
+    assert (driven - exact <= friction.largest * delta * body.n_joint / 2).all()
+
+
+def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
+    """A gait with such joints: its driven work is more than its work, and so it pays to look for another."""
+    problem = Problem("brake", SKEW, gait=Harmonic(1), objective="driven efficiency", delta=1e-3)
+    before = replay(problem.body, problem.friction, SKEW, 1e-3, driven=True)
+    assert before.driven_work > (1 + 1e-3) * before.work
+    solution = maximise_efficiency(problem)
+    assert solution.success
+    found = solution.certificate
+    assert found.value == pytest.approx(found.distance / found.driven_work, rel=1e-12)
+    assert found.value <= found.efficiency
+    usual = maximise_efficiency(problem.with_(objective="efficiency", guess=solution.gait))
+    assert solution.value >= replay(problem.body, problem.friction, usual.gait, 1e-3, objective=problem.objective).value * (
+        1 - 1e-6
+    )
+
+
+def test_driven_work_needs_the_forces_on_the_parts():
+    with pytest.raises(ProblemError, match="formulation 'full'"):
+        Problem("x", objective="driven efficiency", formulation="implicit velocity")

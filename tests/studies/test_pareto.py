@@ -1,0 +1,60 @@
+"""A front of two objectives: no gait of it is better in both, and its ends are the best by one alone."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from colloc import Friction, Harmonic, Problem, ProblemError, load, pareto_front
+from colloc.commands.main import main
+from colloc.pictures.front_figure import front_figure
+from colloc.search.optimise import best_gait
+
+PROBLEM = Problem("wide", gait=Harmonic(1, "bilateral"), friction=Friction(10, 1, 1), delta=1e-3, mesh_tolerance=1e-4)
+
+
+@pytest.fixture(scope="module")
+def front():
+    return pareto_front(PROBLEM, points=4, starts=1)
+
+
+def test_the_front_is_monotone_and_every_point_is_certified(front):
+    assert front.certified
+    speed, efficiency = front.values.T
+    assert (np.diff(speed) < 0).all()
+    assert (np.diff(efficiency) > 0).all()
+    np.testing.assert_allclose(np.diff(efficiency), np.ptp(efficiency) / 3, rtol=2e-2)
+
+
+def test_its_ends_are_the_best_by_one_objective_alone(front):
+    for k, (name, at) in enumerate((("speed", 0), ("efficiency", -1))):
+        alone = best_gait(PROBLEM.with_(objective=name), 1)
+        assert front.values[at, k] == pytest.approx(alone.certificate.value, rel=1e-9)
+
+
+def test_the_front_bulges_beyond_its_chord(front):
+    speed, efficiency = front.values.T
+    chord = np.interp(efficiency, efficiency[[0, -1]], speed[[0, -1]])
+    assert (speed[1:-1] > chord[1:-1]).all()
+
+
+def test_one_objective_twice_is_no_front():
+    with pytest.raises(ProblemError, match="two objectives"):
+        pareto_front(PROBLEM, "speed", "distance/length")
+
+
+def test_the_command_leaves_a_table_a_figure_and_results(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('p', gait=Harmonic(1, 'bilateral'), delta=1e-2)\n")
+    assert main(["pareto", "p.py", "--points", "3", "--starts", "1", "--quiet"]) == 0
+    assert "p: speed against efficiency, 3 points" in capsys.readouterr().out
+    rows = list(csv.DictReader((tmp_path / "results/p.front.csv").read_text(encoding="utf-8").splitlines()))
+    middle = load(rows[1]["file"])
+    assert float(rows[1]["distance / length"]) == pytest.approx(middle.certificate.value, rel=1e-12)
+    assert (tmp_path / "results/p.front.png").stat().st_size > 1000
+
+
+def test_the_figure_names_its_axes(front):
+    axes = front_figure(front).axes
+    assert (axes[0].get_xlabel(), axes[0].get_ylabel()) == ("efficiency d/W", "speed d/L")
+    assert len(axes[1].lines) == 4
