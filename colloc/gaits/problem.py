@@ -131,8 +131,7 @@ class Problem:
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
         self._check_parts()
         usual = self.body.usual
-        start = usual.delta_start if self.gait.delta_start is None else self.gait.delta_start
-        start = start if self.friction.regularised else usual.delta  # nothing to follow down
+        start = (self.gait.delta_start or usual.delta_start) if self.friction.regularised else usual.delta
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
@@ -162,10 +161,9 @@ class Problem:
             raise ProblemError(
                 f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
             )
-        classes = gait_fields.CLASSES
-        for field, accepted, kinds in (("friction", (Law,), gait_fields.LAWS), ("gait", classes, classes)):
+        for field, kind, kinds in (("friction", Law, gait_fields.LAWS), ("gait", gait_fields.CLASSES, gait_fields.CLASSES)):
             value = getattr(self, field)
-            if isinstance(value, type) or not isinstance(value, accepted):
+            if isinstance(value, type) or not isinstance(value, kind):
                 raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(value).__name__}.")
         if self.gait.free == bool(self.body.schedule):
             what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
