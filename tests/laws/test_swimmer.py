@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks.peers import drag
+from colloc.commands.solve import summary_lines
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.problem import Problem
@@ -14,6 +15,7 @@ from colloc.gaits.problem_file import load_problem
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.body import Chain
+from colloc.pictures.report_page import report_page
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import ProblemError
@@ -93,6 +95,8 @@ def test_purcells_swimmer_is_solved_certified_kept_and_read(tmp_path):
     read = load(save(solution, tmp_path / "purcell.h5"))
     assert read.problem.hash == solution.problem.hash
     assert read.problem.friction == LAW
+    assert "as work depends on the pace under drag (2, 1)" in "\n".join(summary_lines(solution, None))
+    assert "the work depends on the pace" in report_page(solution)
 
 
 def test_harmonics_settle_the_pace_and_more_of_them_come_closer_to_the_best_one_constant_power():
