@@ -135,6 +135,14 @@ def best_small_stroke() -> Row:
     return number("largest d/W of small strokes, period 1", source, round(drag.best_small_stroke(), 6), ours, 1e-5)
 
 
+def small_wave() -> Row:
+    amplitude, number_of_waves = 0.05, 16.0
+    moved = period(sine_wave(amplitude, number_of_waves), SWIMMER, 1e-3, intervals=1, nodes=6, quadrature_tolerance=1e-8).d
+    ours = moved * number_of_waves / (amplitude**2 / 2)  # in units of the wave's own speed times mean squared slope
+    source = "derived: long filament of J. Gray and G. J. Hancock (1955), c_n/c_t - 1 for small slopes"
+    return number("speed of a small wave along a filament", source, drag.NORMAL / drag.TANGENTIAL - 1, ours, 1e-2)
+
+
 def resistance_laws() -> Row:
     lines, parts = [], []
     for mu in (2.0, 100.0):
@@ -207,8 +215,8 @@ def amplitude_exponent() -> Row:
 
 
 PARTS: tuple[Callable[[], Row | list[Row]], ...] = (
-    scallop, circular_optimum, nearly_harmonic, large_strokes, reversal, small_stroke, best_small_stroke, resistance_laws,
-    symmetric_ellipses, ellipse_optima, waves, amplitude_exponent,
+    scallop, circular_optimum, nearly_harmonic, large_strokes, reversal, small_stroke, best_small_stroke, small_wave,
+    resistance_laws, symmetric_ellipses, ellipse_optima, waves, amplitude_exponent,
 )  # fmt: skip
 
 

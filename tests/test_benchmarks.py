@@ -11,7 +11,7 @@ from benchmarks.peers import drag, physics
 from benchmarks.peers.nelder_mead import minus_efficiency
 from benchmarks.peers.slsqp_three_link import Reduced, solve
 from benchmarks.peers.starts import feasible_motion, starts
-from benchmarks.published import DIFFERS, number, scallop, small_stroke
+from benchmarks.published import DIFFERS, number, scallop, small_stroke, small_wave
 from benchmarks.scaling import problem_of
 from benchmarks.smooth_panels import MOTION, loads
 from benchmarks.tables import interleaved_seconds, markdown_table
@@ -119,7 +119,7 @@ def test_tables_and_report():
 def test_rows_about_published_results_judge_by_the_printed_digits():
     assert number("", "", 0.259, 0.2600, 1.5e-3).verdict == "agrees"
     assert number("", "", 0.094, 0.1000, 1.5e-3, "why").verdict == f"{DIFFERS}; why"
-    assert scallop().verdict == small_stroke().verdict == "agrees"
+    assert scallop().verdict == small_stroke().verdict == small_wave().verdict == "agrees"
 
 
 def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():

@@ -17,7 +17,9 @@ from colloc.system.errors import ProblemError
 
 VARIABLES = ("vs", "vn", "speed", "delta")
 _DIRECTIONS, _SPEEDS, _DELTAS = 48, np.geomspace(1e-4, 1e2, 13), (1e-6, 1e-2)
-_SAME = 1e-10
+_SAME, _LEAST = 1e-10, 1e-12
+_BESIDE, _JUMP = 1e-9, 1e-6
+"""Distance in delta, and change of the force over the largest, by which a jump is told from a slope of 1/delta."""
 
 
 @named_arguments
@@ -79,6 +81,18 @@ class OwnLaw(ByQuadrature):
         left = self.density(vs, -vn, delta)
         if not (_same(left[0], fs) and _same(left[1], -fn)):
             raise ProblemError("friction: the law differs between left and right (vn and -vn), which the symmetries exclude.")
+
+        self._check_continuity()
+
+    def _check_continuity(self) -> None:
+        """A force that jumps has no balance where it does."""
+        vs, vn, delta = _samples()
+        for what, across in (("vs", (1.0, 0.0)), ("vn", (0.0, 1.0))):
+            at, step = (vs * across[1], vn * across[0]), _BESIDE * delta
+            sides = [self.density(at[0] + sign * across[0] * step, at[1] + sign * across[1] * step, delta) for sign in (1, -1)]
+            jump = np.hypot(*(a - b for a, b in zip(*sides, strict=True))) / np.hypot(*sides[0]).max()
+            if jump.max() > _JUMP:
+                raise ProblemError(f"friction: the force jumps where {what} changes its sign; let it vanish or agree there.")
 
     @cached_property
     def _codes(self):
@@ -153,8 +167,7 @@ class OwnLaw(ByQuadrature):
         """The trace of the Jacobian in every direction: no less than the secant of a law that grows with the speed."""
         (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
         zero = 0.0 * ss
-        size = ss * ss + nn * nn
-        trace = regularised_speed(ss, nn, 1e-12 + 0.0 * size)
+        trace = regularised_speed(ss + nn, zero, _LEAST + zero)  # positive for any law
         return (trace, zero), (zero, trace)
 
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:

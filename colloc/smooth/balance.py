@@ -167,8 +167,9 @@ def solve_smooth(
     for level in range(refinements + 1):
         grid = Panels(edges, order)
         # work in units of the largest rate: the law is homogeneous once delta scales along
-        fields, speed = _motion_fields(motion, t[active], grid)
-        d = relative_delta(delta, speed)
+        unit = np.ones(active.size) if friction.degree is None else None
+        fields, speed = _motion_fields(motion, t[active], grid, unit)
+        d, spent = relative_delta(delta, speed), speed ** (1.0 + (friction.degree or 0.0))
 
         def make(members: np.ndarray, reference: int, fields: PanelFields = fields) -> PanelBatch:
             return PanelBatch(fields, friction, members, reference)
@@ -198,12 +199,12 @@ def solve_smooth(
             fs, fn = friction.density(vs, vn, d[:, members])
             whole = _panel_integrals(body, vs, vn, fs, fn, own)
             out["centre"][:, chosen] = mean_velocity(body, vs, vn) * speed[members]
-            out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * speed[members]
+            out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * spent[members]
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
             inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
             out["force"][:, chosen] = whole[:3].sum(axis=1)
-            out["power"][chosen] = whole[3].sum(axis=0) * speed[members]
-            out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * speed[members]
+            out["power"][chosen] = whole[3].sum(axis=0) * spent[members]
+            out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * spent[members]
             out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]
             tail = batch.edge_velocity(z)[:, 0]
             tail[2] -= fields.edge_rate[0, members]

@@ -66,7 +66,7 @@ def solve_modal(
     n = q.shape[1]
     # work in units of the largest rate: the law is homogeneous once delta scales along
     speed = np.abs(body.modes_at(body.grid.nodes[:, 0]) @ rates).max(axis=0)
-    speed[speed == 0] = 1.0
+    speed[(speed == 0) | (friction.degree is None)] = 1.0
     fields = _fields(body, q, rates / speed)
 
     def make(members: np.ndarray, reference: int) -> PanelBatch:

@@ -15,9 +15,10 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.smooth.modal_body import ModalBody
 
 LENGTHS = Chain().length_column()
-OWN = OwnLaw("-vs/speed * (1 + 0.5*exp(-speed))", "where(vs > 0, -2, -1.5) * vn / speed")
+OWN = OwnLaw("-where(vs > 0, 1, 1.5)*vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))")
 EVERY = [Friction(2.0, 1.0, 1.5), Elliptic(2.0, 1.0, 1.5), Viscous(1.8, 1.0), PowerLaw(0.4, 2.0, 1.0, 1.5), OWN]
 ASSOCIATED = [Elliptic(0.3, 1.0, 4.0), Viscous(1.8, 1.0), PowerLaw(0.4, 1.5, 1.5, 1.5)]
 each = pytest.mark.parametrize("law", EVERY, ids=lambda law: type(law).__name__)
@@ -192,6 +193,38 @@ def test_the_kernel_knows_the_elliptic_law():
     with numpy_instead():
         for a, b in zip(compiled, found(), strict=True):
             np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("law", [Viscous(), PowerLaw(0.5, 2.0), OWN], ids=lambda law: type(law).__name__)
+def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
+    body, rng = ModalBody(), np.random.default_rng(14)
+    at = law, 0.3 * rng.normal(size=(body.n_joint, 2)), 5.0 * rng.normal(size=(body.n_joint, 2)), 0.1
+    solved = body.motion(*at, body.solve(*at).require())
+    replayed = body.replayed(*at, None)[0]
+    # fixed panels resolve an instant like these to some 1e-3, whatever the law
+    np.testing.assert_allclose(replayed.power, solved.power, rtol=5e-3)
+    for motion in (solved, replayed):
+        np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-6)
+
+
+def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
+    """The kernel treats it alone; no law is asked in Python but for its coefficients."""
+    angles, rates = np.array([[0.5, -1.2], [0.2, 0.7]]), np.array([[1.0, 0.3], [-2.0, 1.5]])
+    law, body = Friction(1.7, 1.0, 1.3), Chain()
+    expected = [  # before other laws were known
+        [0.0111061444960639, 0.0153392649399081],
+        [0.0299279046686109, 0.1135819154364744],
+        [-0.2696918937274128, -0.5554178355603785],
+    ]
+    with numpy_instead():
+        by_numpy = body.solve(law, angles, rates, 1e-4).require()
+    np.testing.assert_allclose(by_numpy.z, expected, rtol=1e-12)
+    if native_kernel() is not None:
+        for name in ("link_force", "link_jacobian", "link_secant", "link_potential", "density"):
+            monkeypatch.delattr(Friction, name)
+        compiled = body.solve(law, angles, rates, 1e-4).require()
+        np.testing.assert_allclose(compiled.z, expected, rtol=1e-12)
+        assert body.slopes(law, angles, rates, 1e-4, compiled).shape == (6, 4, 2)
 
 
 def test_viscous_motion_is_linear_in_the_rates():

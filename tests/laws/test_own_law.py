@@ -56,6 +56,8 @@ def test_a_stated_law_moves_a_body_as_the_built_in_one_does(own, built_in):
         ("-vs/speed - 0.5*vn/speed", "-vn/speed", "left and right"),
         ("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn", "rest"),
         ("-vs/(speed - speed)", "-vn", "no finite value"),
+        ("-vs/speed", "where(vs > 0, -2, -1.5)*vn/speed", "jumps where vs changes its sign"),
+        ("-vs", "-vn - where(vn > 0, 1, -1)*where(vn*vn > 0, 1, 0)", "jumps where vn changes its sign"),
         ("-vs/speeed", "-vn", "speaks of speeed"),
         ("-vs +", "-vn", "is no formula"),
         ("-vs.real", "-vn", "is no formula that can be differentiated"),
