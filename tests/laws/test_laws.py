@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from colloc.bounds.sampled import QUICK, bound_key
+from colloc.bounds.sampling import Domain
 from colloc.gaits.gait_fields import LAWS, law_fields, law_from
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
@@ -171,6 +173,11 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
             expected = found
     for a, b in zip(expected, found, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_bounds_of_the_two_laws_are_kept_apart():
+    keys = {bound_key(Domain(Chain(), law, 3.0), QUICK) for law in (Friction(2, 1, 1), Elliptic(2, 1, 1))}
+    assert len(keys) == 2
 
 
 def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
