@@ -9,7 +9,7 @@ agreement to the digits printed, or of the order or sign that a sentence states.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,6 +21,7 @@ import colloc
 from benchmarks.peers import drag
 from benchmarks.tables import markdown_table
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, Solution, Viscous, ellipse, replay
+from colloc.gaits.gait_fields import AnyGait as Gait
 from colloc.mechanics.law import Law
 from colloc.smooth.motion import Motion, sine_wave, tanh_wave
 from colloc.smooth.period import period
@@ -30,6 +31,8 @@ PAPER = "S. Alben, Efficient sliding locomotion with isotropic friction (2019)"
 THREE_LINKS = "S. Alben, Efficient sliding locomotion of three-link bodies, arXiv:2012.03379, abstract"
 SNAKES = "S. Alben, Optimizing snake locomotion in the plane, Proc. R. Soc. A 469 (2013), abstract"
 COMMENT = "O. Raz and J. E. Avron, comment on Tam and Hosoi, arXiv:0706.3906"
+DISPLACED = (2.017955906441066, 1.353385144748382, 0.013112519773635, 0.263823759269392, -0.031456173657342, -0.003626287235861)
+EFFICIENT = (1.495398722861924, 1.326600886340017, 0.083253854456986, 0.089227148110158, -0.034695750579259, -0.044559551791058)
 AGREES, DIFFERS = "agrees", "**differs**"
 
 
@@ -71,10 +74,14 @@ def swimmer(harmonics: int, symmetry: str, starts: int = 8, objective: str = "to
     return solved(SWIMMER, Harmonic(harmonics, symmetry), starts, **settings)
 
 
+def distance(gait: Gait, instants: int = 400) -> float:
+    """How far a stroke takes the swimmer."""
+    return replay(Chain(), SWIMMER, gait, 1e-4, instants=instants).distance
+
+
 def circle(amplitude: float) -> float:
-    """How far a circular stroke takes the swimmer."""
-    gait = Fourier(np.zeros(2), amplitude * np.array([[1.0], [0.0]]), amplitude * np.array([[0.0], [1.0]]))
-    return replay(Chain(), SWIMMER, gait, 1e-4, instants=160).distance
+    """The same of a circular stroke."""
+    return distance(Fourier(np.zeros(2), amplitude * np.eye(2)[:, :1], amplitude * np.eye(2)[:, 1:]), 160)
 
 
 def scallop() -> Row:
@@ -109,6 +116,45 @@ def large_strokes() -> Row:
     ratio = swimmer(5, "bilateral").measured.value / swimmer(5, "antipodal").measured.value
     note = "larger strokes do win; the printed ratio is for a limit on the angles that the text we read has lost, ours for none"
     return number("efficiency of a large off-centre stroke over the centred one", COMMENT, 1.53, ratio, 5e-3, note)
+
+
+def printed_stroke(coefficients: Sequence[float]) -> Fourier:
+    """A stroke by its coefficients (a1, b1, a3, b3, a5, b5) along the diagonals of the plane of joint angles."""
+    cos, sin = np.zeros((2, 5)), np.zeros((2, 5))
+    cos[:, ::2] = np.outer([1.0, 1.0], coefficients[::2]) / np.sqrt(2)
+    sin[:, ::2] = np.outer([1.0, -1.0], coefficients[1::2]) / np.sqrt(2)
+    return Fourier(np.zeros(2), cos, sin)
+
+
+def half_axes(gait: Gait) -> str:
+    """How far a stroke goes along the two diagonals."""
+    angles = gait.angles(np.linspace(0.0, 1.0, 2001))
+    return " and ".join(f"{np.abs(angles[0] + side * angles[1]).max() / np.sqrt(2):.3f}" for side in (1, -1))
+
+
+def at_best_pace(gait: Gait) -> float:
+    """Lighthill's efficiency of a stroke's path run through at constant power."""
+    t = (np.arange(4000) + 0.5) / 4000
+    body, at = Chain(), (SWIMMER, gait.angles(t), gait.rates(t), 1e-4)
+    power = body.motion(*at, body.solve(*at)).power
+    return float((distance(gait) / np.sqrt(power).mean()) ** 2)
+
+
+def strokes_of_others() -> list[Row]:
+    """Strokes that a program of others prints as optimal for the same swimmer, beside the optima found from them."""
+    source, rows = "coefficients in OSU-LRAM/GeometricSystemPlotter, shchf_LowRe_{}.m; replayed here", []
+    for objective, name, coefficients, value, what in (
+        ("distance", "MaxDisplacement", DISPLACED, distance, "distance"),
+        ("towing", "MaxEfficiency", EFFICIENT, at_best_pace, "d²/W at its best pace"),
+    ):
+        theirs = printed_stroke(coefficients)
+        ours = solved(SWIMMER, Harmonic(5, "antipodal"), 1, objective=objective, guess=theirs).gait
+        printed, found = value(theirs), value(ours)
+        axes = f"half-axes {half_axes(theirs)} rad", f"half-axes {half_axes(ours)} rad"
+        verdict = AGREES if abs(found / printed - 1) < 1e-3 else "**ours is better**" if found > printed else DIFFERS
+        shown = f"{printed:.6f}, {axes[0]}", f"{found:.6f}, {axes[1]}"
+        rows.append(Row(f"best moderate stroke: {what}", source.format(name), *shown, f"{found - printed:+.2g}", verdict))
+    return rows
 
 
 def reversal() -> Row:
@@ -215,8 +261,8 @@ def amplitude_exponent() -> Row:
 
 
 PARTS: tuple[Callable[[], Row | list[Row]], ...] = (
-    scallop, circular_optimum, nearly_harmonic, large_strokes, reversal, small_stroke, best_small_stroke, small_wave,
-    resistance_laws, symmetric_ellipses, ellipse_optima, waves, amplitude_exponent,
+    scallop, strokes_of_others, circular_optimum, nearly_harmonic, large_strokes, reversal, small_stroke, best_small_stroke,
+    small_wave, resistance_laws, symmetric_ellipses, ellipse_optima, waves, amplitude_exponent,
 )  # fmt: skip
 
 
