@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
+from colloc.gaits.guesses import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
@@ -33,7 +34,7 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
         if compute:
             raise ProblemError("upper bounds are of the efficiency of gaits that do not turn.")
         return None
-    domain, cache = (problem.body, friction, problem.joint_limit), folder / CACHE
+    domain, cache = (problem.body, friction, widest(problem.joint_limit)), folder / CACHE
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:

@@ -8,6 +8,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from colloc.gaits.guesses import Limit
 from colloc.mechanics.bodies import Body, Contact, Pairs
 from colloc.mechanics.contact import share_of_first, smooth_minimum, tangent_of_minimum
 
@@ -19,6 +20,7 @@ class ShapeCheck:
     value: of the shape. share: of the shape, the weight of the first of two functions of which this is the minimum,
     or -1. cut: of the shape and a share, the tangent plane of that weight, or the function itself where it is negative.
     slope: its derivative with respect to the shape. row: the angle that it is, per shape coordinate; None if it is none.
+    place: which of the body's angles it is.
     """
 
     name: str
@@ -27,16 +29,18 @@ class ShapeCheck:
     cut: ca.Function
     slope: ca.Function
     row: np.ndarray | None = None
+    place: int = 0
 
     def along(self, angles: np.ndarray) -> np.ndarray:
         """Values ``(n_time,)`` at shapes ``(n_joint, n_time)``."""
         return self.value(angles).full().ravel() if self.row is None else self.row @ angles
 
-    def bounds(self, limit: float) -> tuple[float, float]:
-        """The least and the largest value allowed, for a limit on the body's angles."""
-        return (-np.inf, 0.0) if self.row is None else (-limit, limit)
+    def bounds(self, limit: Limit) -> tuple[float, float]:
+        """The least and the largest value allowed, for a limit on the body's angles, or one on each."""
+        own = limit[self.place] if isinstance(limit, tuple) else limit
+        return (-np.inf, 0.0) if self.row is None else (-own, own)
 
-    def excess(self, values: np.ndarray, limit: float) -> np.ndarray:
+    def excess(self, values: np.ndarray, limit: Limit) -> np.ndarray:
         """How far values are beyond their bounds; negative where they are not."""
         lower, upper = self.bounds(limit)
         return np.maximum(values - upper, lower - values)
@@ -50,14 +54,15 @@ def shape_checks(body: Body, far: Pairs = ()) -> list[ShapeCheck]:
     and for the pairs `far` of parts farther apart.
     """
     angles = ca.SX.sym("q", body.n_joint)
-    checks = [_angle_check(name, angles, row) for name, row in zip(body.limit_names, body.limited, strict=True)]
+    names = enumerate(body.limit_names)
+    checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
     return checks + [_minimum_check(contact, angles) for contact in body.contacts(angles, far)]
 
 
-def _angle_check(name: str, angles: ca.SX, row: np.ndarray) -> ShapeCheck:
+def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> ShapeCheck:
     share, value = ca.SX.sym("share"), ca.mtimes(ca.DM(row[None]), angles)
     none = ca.Function("share", [angles], [ca.SX(-1)])
-    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, *_cut(angles, share, value), row)
+    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, *_cut(angles, share, value), row, place)
 
 
 def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:

@@ -35,6 +35,7 @@ from colloc.collocation.point_equations import (
 )
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.guesses import widest
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
@@ -229,7 +230,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
 def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
     # a function bounded by L has Fourier coefficients of at most 4 L / pi
-    lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * problem.joint_limit / np.pi
+    lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * widest(problem.joint_limit) / np.pi
     if layout.forces.size:
         limit = problem.body.largest_forces(problem.friction)
         lower[layout.forces], upper[layout.forces] = -limit, limit

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from colloc.collocation.shape_checks import ShapeCheck
+from colloc.gaits.guesses import Limit
 from colloc.gaits.path_samples import Gait
 from colloc.numerics.mesh import Mesh
 
@@ -32,7 +33,7 @@ def worst_instants(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck]) -> list
     return [_worst(gait, mesh, check, np.arange(mesh.n)) for check in checks]
 
 
-def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: float) -> list[tuple[np.ndarray, np.ndarray]]:
+def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each check, the mesh cells in which it might bind soon, and its worst instants there, ``(n,)`` each.
 
     Those are the cells in which it is near its bound (`limit` for angles, else 0), and those in which it has a peak.

@@ -10,10 +10,13 @@ the same from both ends. Bending travels towards the head for w > 0, towards the
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
+from colloc.system.errors import ProblemError
 
 WAVES = -1.0
 """Waves along the body: one, towards the tail, which carries a body with mu_t > mu_f head first."""
@@ -25,9 +28,47 @@ SAFE = 1 - 1e-3
 _BISECTIONS = 40
 
 
-def largest_factor(body: Body, joint_limit: float, angles: np.ndarray) -> float:
+Limit = float | tuple[float, ...]
+"""On the magnitude of all angles of a body, or of each joint angle of a chain."""
+
+
+def checked_limit(body: Body, limit: Any) -> Limit:
+    """A limit as it is, or as a tuple of one for each joint.
+
+    Raises
+    ------
+    ProblemError
+        If it cannot be used for the body.
+    """
+    each, largest = np.ravel(np.asarray(limit, dtype=object)), body.usual.largest_limit
+    numbers = all(isinstance(a, (int, float, np.number)) and not isinstance(a, bool) for a in each)
+    if not numbers or not all(0 < a <= largest + 1e-12 for a in each):
+        most = f"pi/{np.pi / largest:g}".removesuffix("/1")
+        shown = f"{limit:g}" if numbers and np.ndim(limit) == 0 else repr(limit)
+        raise ProblemError(f"joint_limit must lie in (0, {most}], not {shown}.")
+    if np.ndim(limit) == 0:
+        return limit
+    if len(each) != body.n_joint or len(body.limit_names) != body.n_joint:
+        raise ProblemError(f"joint_limit has {len(each)} values; give one for all joints, or one for each joint of a chain.")
+    return tuple(float(a) for a in each)
+
+
+def widest(limit: Limit) -> float:
+    """The largest of the limits."""
+    return float(np.max(limit))
+
+
+def under_one_limit(angles: np.ndarray, limit: Limit) -> tuple[np.ndarray, float]:
+    """Shapes ``(n_joint, n)``, each joint stretched by what its limit is below the widest, and that: to be held against it."""
+    if np.ndim(limit) == 0:
+        return angles, limit  # type: ignore[return-value]
+    return angles * (widest(limit) / np.array(limit))[:, None], widest(limit)
+
+
+def largest_factor(body: Body, joint_limit: Limit, angles: np.ndarray) -> float:
     """The largest factor by which shapes ``(n_joint, n)`` can be multiplied and stay admissible; inf for straight ones."""
-    peak = body.largest_angles(angles).max()
+    stretched, joint_limit = under_one_limit(angles, joint_limit)
+    peak = body.largest_angles(stretched).max()
     if peak == 0:
         return np.inf
     low, high = 0.0, joint_limit / peak
@@ -40,13 +81,13 @@ def largest_factor(body: Body, joint_limit: float, angles: np.ndarray) -> float:
     return low * SAFE
 
 
-def travelling_wave(body: Body, joint_limit: float, waves: float = WAVES, share: float = _SHARE) -> Fourier:
+def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share: float = _SHARE) -> Fourier:
     """A wave of bending along a body.
 
     Parameters
     ----------
     body : Body
-    joint_limit : float
+    joint_limit : float or tuple of float
     waves : float
         How many stand along the body; positive ones travel towards the head.
     share : float

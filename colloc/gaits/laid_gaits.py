@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.guesses import largest_factor
+from colloc.gaits.guesses import Limit, largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through, path_length
 from colloc.gaits.paths import Corners
@@ -23,7 +23,7 @@ _NEAR = 10.0
 gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 times the final delta 0.3998)."""
 
 
-def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: float = float(np.pi)) -> AnyGait:
+def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> AnyGait:
     """A gait of a chain laid into another body: every link gets the mean tangent angle of the part of the body it covers.
 
     That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of arcs becomes a polygon of
@@ -42,7 +42,7 @@ def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: float = flo
 
 
 def laid_into(
-    gait_class: AnyClass, gait: AnyGait, body: Body, joint_limit: float = float(np.pi), smallest_shape_speed: float = 0.1
+    gait_class: AnyClass, gait: AnyGait, body: Body, joint_limit: Limit = float(np.pi), smallest_shape_speed: float = 0.1
 ) -> AnyGait:
     """The gait that starts a search in a class: its Fourier series for harmonics, else itself, made admissible.
 

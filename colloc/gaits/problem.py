@@ -12,7 +12,7 @@ import numpy as np
 
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.guesses import travelling_wave
+from colloc.gaits.guesses import Limit, checked_limit, travelling_wave, under_one_limit
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.path_classes import FreePath
@@ -67,9 +67,9 @@ class Problem:
     delta_start : float
         Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), and 0.01 where delta is measured at unit
         shape speed.
-    joint_limit : float
-        Largest |joint angle| [rad], at most pi; of a smooth body, largest |tangent angle| from its mean direction, at most
-        pi/2.
+    joint_limit : float or sequence of float
+        Largest |joint angle| [rad], at most pi, of all joints or of each; of a smooth body, largest |tangent angle| from its
+        mean direction, at most pi/2.
     smallest_shape_speed : float
         Lower bound on the root-mean-square shape speed [rad per radian of phase], that is on the length of a path over
         2 pi. It keeps the search away from gaits
@@ -115,7 +115,7 @@ class Problem:
     gait: AnyClass = None
     delta: float = None  # type: ignore[assignment]
     delta_start: float = None  # type: ignore[assignment]
-    joint_limit: float = None  # type: ignore[assignment]
+    joint_limit: Limit = None  # type: ignore[assignment]
     smallest_shape_speed: float = 0.1
     intervals: int = None  # type: ignore[assignment]
     scheme: str = "gauss-3"
@@ -170,7 +170,7 @@ class Problem:
             raise ProblemError(f"{what}; leave gait out, or take another body.")
 
     def _check_numbers(self) -> None:
-        for field in ("delta", "delta_start", "joint_limit", "smallest_shape_speed", "mesh_tolerance"):
+        for field in ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
@@ -183,10 +183,7 @@ class Problem:
             )
         if self.delta_start < self.delta:
             object.__setattr__(self, "delta_start", self.delta)
-        largest = self.body.usual.largest_limit
-        if not 0 < self.joint_limit <= largest + 1e-12:
-            most = f"pi/{np.pi / largest:g}".removesuffix("/1")
-            raise ProblemError(f"joint_limit must lie in (0, {most}], not {self.joint_limit:g}.")
+        object.__setattr__(self, "joint_limit", checked_limit(self.body, self.joint_limit))
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
@@ -243,6 +240,8 @@ class Problem:
                 f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
                 f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."
             )
+        if BILATERAL in needed and np.ndim(self.joint_limit) and self.joint_limit != self.joint_limit[::-1]:  # type: ignore[index]
+            raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same joint_limit.")
         if self.gait.unit_speed and self.body.n_joint < 2:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
@@ -273,13 +272,14 @@ class Problem:
                 f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
             )
         angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
-        largest = self.body.largest_angles(angles).max()
-        if largest > self.joint_limit + self.body.usual.excess:
-            each = np.abs(self.body.limited @ angles).max(axis=1, initial=0.0)
+        stretched, limit = under_one_limit(angles, self.joint_limit)
+        largest = self.body.largest_angles(stretched).max()
+        if largest > limit + self.body.usual.excess:
+            each = np.abs(self.body.limited @ stretched).max(axis=1, initial=0.0)
             which = self.body.limit_names[np.argmax(each)] if each.size else "the tangent"
             raise ProblemError(
                 f"guess is inadmissible: {which} reaches {largest:.4g} rad, "
-                f"beyond the limit {self.joint_limit:.4g}; make its amplitude smaller."
+                f"beyond the limit {limit:.4g}; make its amplitude smaller."
             )
         depth = self.body.crossing_depth(angles)
         if depth.max() > _SLACK:

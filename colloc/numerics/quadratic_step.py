@@ -7,6 +7,7 @@ DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill, IEEE TAC 67, 2
 
 from __future__ import annotations
 
+import threading
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -66,14 +67,24 @@ def quadratic_step(
 
 
 def _minimum(**program: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    solver = _solver(*program["a"].shape)
+    solver = _OWN.solver(*program["a"].shape)
     found = solver(**program)
     if not solver.stats()["success"]:
         return None
     return found["x"].full().ravel(), found["lam_a"].full().ravel()
 
 
-@lru_cache(maxsize=64)
-def _solver(m: int, n: int) -> ca.Function:
+class _OfThread(threading.local):
+    """Solvers by size; one that two threads share would be torn by them."""
+
+    def __init__(self) -> None:
+        self.solver = lru_cache(maxsize=64)(_new_solver)
+
+
+def _new_solver(m: int, n: int) -> ca.Function:
     shapes = {"h": ca.Sparsity.dense(n, n), "a": ca.Sparsity.dense(m, n)}
-    return ca.conic("step", "daqp", shapes, {"error_on_fail": False, "daqp": {"primal_tol": _TOLERANCE}})
+    with _MAKING:
+        return ca.conic("step", "daqp", shapes, {"error_on_fail": False, "daqp": {"primal_tol": _TOLERANCE}})
+
+
+_OWN, _MAKING = _OfThread(), threading.Lock()

@@ -11,6 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from colloc.gaits.guesses import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import lab_outline
@@ -83,7 +84,7 @@ def draw_lab(axes: Axes, solution: Solution | RelaxedSolution) -> None:
     _key(axes)
 
 
-def forbidden(body: Body, joint_limit: float, cells: int = 180) -> tuple[np.ndarray, np.ndarray]:
+def forbidden(body: Body, joint_limit: Limit, cells: int = 180) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of joint angles that joint limits or, for two joints, crossing links forbid.
 
     Returns
@@ -97,13 +98,14 @@ def forbidden(body: Body, joint_limit: float, cells: int = 180) -> tuple[np.ndar
     a, b = np.meshgrid(grid, grid)
     shapes = np.zeros((body.n_joint, a.size))
     shapes[:2] = a.ravel(), b.ravel()
-    excess = np.maximum(body.largest_angles(shapes) - joint_limit, 0.0)
+    stretched, limit = under_one_limit(shapes, joint_limit)
+    excess = np.maximum(body.largest_angles(stretched) - limit, 0.0)
     if body.n_joint == 2:
         excess = np.maximum(excess, body.crossing_depth(shapes))
     return grid, excess.reshape(a.shape)
 
 
-def draw_allowed(axes: Axes, body: Body, joint_limit: float) -> None:
+def draw_allowed(axes: Axes, body: Body, joint_limit: Limit) -> None:
     """Grey over the pairs of joint angles that are forbidden."""
     grid, excess = forbidden(body, joint_limit)
     if excess.max() > 1e-9:

@@ -8,6 +8,7 @@ from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.guesses import widest
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
@@ -41,7 +42,7 @@ class HarmonicSpace:
         self._pace = np.ones(self.mesh.n_point)
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
         # a function bounded by L has Fourier coefficients of at most 4 L / pi
-        self.upper = np.full(self.n, 4 * limit / np.pi)
+        self.upper = np.full(self.n, 4 * widest(limit) / np.pi)
         self.lower = -self.upper
         self.own = np.arange(self.n)
         self.move_checks(np.zeros(self.n))

@@ -23,7 +23,6 @@ from colloc.gaits.symmetry import ANTIPODAL, BOTH, fraction
 from colloc.mechanics.bodies import BalanceSolution, Body
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
-from colloc.reduced.driven_slopes import driven_slopes
 
 _TOLERANCE = 1e-12
 _ACCEPTED = 1e3
@@ -154,6 +153,8 @@ class ReducedMotion:
         """What grows the length of path or the driven work at every column, ``(n_column,)``, and its derivatives along (angles,
         rates)."""
         if name == "driven_work":
+            from colloc.reduced.driven_slopes import driven_slopes  # loads CasADi, which a certificate can do without
+
             return driven_slopes(self.body, self.friction, s.angles, s.rates, s.solved.z, s.delta)
         size = np.linalg.norm(s.rates, axis=0)
         return size, np.concatenate([np.zeros_like(s.angles), s.rates / np.maximum(size, 1e-300)])

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.gaits.guesses import under_one_limit
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
@@ -256,7 +257,8 @@ def _motion(
 ) -> list[Check]:
     body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
     angles = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))[0]
-    beyond = max(float(body.largest_angles(angles).max()) - problem.joint_limit, 0.0)
+    stretched, limit = under_one_limit(angles, problem.joint_limit)
+    beyond = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     checks = [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),

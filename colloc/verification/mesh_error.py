@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.guesses import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import smooth_minimum
@@ -243,8 +244,9 @@ def constraint_violation(problem: Problem, mesh: Mesh, gait: AnyGait) -> np.ndar
     """Largest excess over a joint limit or penetration of any two links inside each interval, ``(n_interval,)``; 0 if none."""
     t = (mesh.edges[:-1, None] + mesh.h[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)).ravel()
     angles, body = gait.angles(t), problem.body
+    stretched, limit = under_one_limit(angles, problem.joint_limit)
     rows = [
-        np.abs(body.limited @ angles).max(axis=0, initial=0.0) - problem.joint_limit,
+        np.abs(body.limited @ stretched).max(axis=0, initial=0.0) - limit,
         body.crossing_depth(angles, body.far_pairs),
     ]
     rows += [smooth_minimum(near.first, near.second, near.width)[0] for near in body.contacts(angles)]

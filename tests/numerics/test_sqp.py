@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,20 @@ def test_a_step_meets_its_limits_exactly():
     assert (slopes @ step.d).max() <= -0.1 + 1e-9
     free = np.abs(step.d) < 0.2 - 1e-9
     assert np.abs((b @ step.d + gradient + slopes.T @ step.on_rows)[free]).max() < 1e-9
+
+
+def test_steps_in_several_threads_are_those_of_one():
+    """Threads of a cluster's worker step at once; a solver that they shared crashed."""
+
+    def steps(seed):
+        rng, found = np.random.default_rng(seed), []
+        for _ in range(300):
+            q = rng.normal(size=(8, 8))
+            limits = (np.full(6, -1.0), np.full(6, 1.0), np.full(8, -1.0), np.full(8, 1.0))
+            found.append(quadratic_step(q @ q.T + np.eye(8), rng.normal(size=8), rng.normal(size=(6, 8)), *limits).d)
+        return np.array(found)
+
+    with ThreadPoolExecutor(3) as pool:
+        together = list(pool.map(steps, range(3)))
+    for seed, found in enumerate(together):
+        np.testing.assert_array_equal(found, steps(seed))

@@ -216,3 +216,28 @@ def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
 def test_driven_work_needs_the_forces_on_the_parts():
     with pytest.raises(ProblemError, match="formulation 'full'"):
         Problem("x", objective="driven efficiency", formulation="implicit velocity")
+
+
+def test_every_joint_has_a_limit_of_its_own():
+    problem = Problem("stiff", gait=Harmonic(1), joint_limit=(1.0, 2.0), friction=Friction(3, 1, 1), delta=1e-3)
+    solution = maximise_efficiency(problem)
+    assert solution.success
+    first, second = np.abs(solution.gait.angles(np.linspace(0, 1, 20_001))).max(axis=1)
+    assert first == pytest.approx(1.0, abs=1e-6)
+    assert 1.0 < second < 2.0
+    assert Problem.from_dict(problem.to_dict()).joint_limit == (1.0, 2.0)
+    same = [{"gait": Harmonic(1, "bilateral"), "joint_limit": limit} for limit in (1.0, (1.0, 1.0))]
+    values = [maximise_efficiency(problem.with_(guess=None, **changes)).value for changes in same]
+    assert values[0] == values[1]
+
+
+@pytest.mark.parametrize("limit", [(1.0,), (1.0, 4.0), (1.0, "x"), (True, 1.0)])
+def test_limits_that_cannot_be_kept_are_refused(limit):
+    with pytest.raises(ProblemError, match="joint_limit"):
+        Problem("x", joint_limit=limit)
+
+
+def test_mirrored_joints_of_a_bilateral_gait_have_one_limit():
+    """The half period that is solved would know of one of them only."""
+    with pytest.raises(ProblemError, match="mirrored joints"):
+        Problem("x", gait=Harmonic(1, "bilateral"), joint_limit=(1.0, 2.0))
