@@ -1,5 +1,7 @@
 """An objective is one expression: the same value, gradient and symbol for all who ask, and nothing of a file is executed."""
 
+import pickle
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -81,6 +83,7 @@ def test_a_problem_with_an_objective_comes_back_from_its_statement():
     assert again.objective == problem.objective
     assert again.rotation is None
     assert again.at_least == ((SPEED, 0.01),)
+    assert pickle.loads(pickle.dumps(problem)).hash == problem.hash  # as it goes to other processes
     assert again.hash == problem.hash == statement_hash(problem.to_dict()) != problem.with_(at_least={}).hash
 
 

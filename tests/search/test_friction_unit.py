@@ -43,3 +43,13 @@ def test_coefficients_of_any_size_are_solved_and_certified(usual, size):
     resumed = maximise_efficiency(stated(size, size, size), before=solution.levels)
     assert resumed.status == "solved"
     assert resumed.efficiency == pytest.approx(solution.efficiency, rel=1e-6)
+
+
+def test_what_must_be_reached_is_stated_in_units_of_friction_too():
+    light = Problem("light", friction=Friction(1e-3, 1e-3, 1e-3), at_least={"efficiency": 150.0, "distance": 0.2})
+    scaled, unit = in_friction_units(light)
+    assert (unit, scaled.friction.mu_t) == (1e-3, 1.0)
+    assert [value for _, value in scaled.at_least] == pytest.approx([0.15, 0.2])
+    # what is proportional to no power of friction is left as it is
+    mixed = light.with_(objective="distance / (work + length)")
+    assert in_friction_units(mixed) == (mixed, 1.0)

@@ -156,6 +156,7 @@ def test_a_turning_gait_turns_by_the_prescribed_angle():
     assert free.value > solution.value
 
 
+@pytest.mark.slow
 def test_an_efficient_gait_may_turn_as_well():
     solution = maximise_efficiency(Problem("arc", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.2))
     assert solution.success

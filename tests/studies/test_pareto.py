@@ -10,7 +10,7 @@ from colloc.commands.main import main
 from colloc.pictures.front_figure import front_figure
 from colloc.search.optimise import best_gait
 
-PROBLEM = Problem("wide", gait=Harmonic(1, "bilateral"), friction=Friction(10, 1, 1), delta=1e-3, mesh_tolerance=1e-4)
+PROBLEM = Problem("wide", gait=Harmonic(1, "bilateral"), friction=Friction(10, 1, 1), delta=1e-2, mesh_tolerance=1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -43,14 +43,15 @@ def test_one_objective_twice_is_no_front():
         pareto_front(PROBLEM, "speed", "distance/length")
 
 
+@pytest.mark.slow
 def test_the_command_leaves_a_table_a_figure_and_results(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('p', gait=Harmonic(1, 'bilateral'), delta=1e-2)\n")
-    assert main(["pareto", "p.py", "--points", "3", "--starts", "1", "--quiet"]) == 0
-    assert "p: speed against efficiency, 3 points" in capsys.readouterr().out
+    assert main(["pareto", "p.py", "--points", "2", "--starts", "1", "--quiet"]) == 0
+    assert "p: speed against efficiency, 2 points" in capsys.readouterr().out
     rows = list(csv.DictReader((tmp_path / "results/p.front.csv").read_text(encoding="utf-8").splitlines()))
-    middle = load(rows[1]["file"])
-    assert float(rows[1]["distance / length"]) == pytest.approx(middle.certificate.value, rel=1e-12)
+    fastest = load(rows[0]["file"])
+    assert float(rows[0]["distance / length"]) == pytest.approx(fastest.certificate.value, rel=1e-12)
     assert (tmp_path / "results/p.front.png").stat().st_size > 1000
 
 
