@@ -11,6 +11,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import rate_independent
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 
 CACHE = "bounds.sqlite"
@@ -43,7 +44,8 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
 
 
 def _bounded(problem: Problem) -> bool:
-    return problem.objective == EFFICIENCY and problem.rotation == 0
+    """Work that depends on the pace has no bound per distance: a slow gait pays as little as it likes."""
+    return problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.friction)
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:

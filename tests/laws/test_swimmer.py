@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks.peers import drag
+from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.solve import summary_lines
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.path_classes import FreePath, Polygon
@@ -97,6 +98,7 @@ def test_purcells_swimmer_is_solved_certified_kept_and_read(tmp_path):
     assert read.problem.friction == LAW
     assert "as work depends on the pace under drag (2, 1)" in "\n".join(summary_lines(solution, None))
     assert "the work depends on the pace" in report_page(solution)
+    assert "no upper bound" in gap_line(solution.problem.with_(objective="efficiency"), 0.1, None)
 
 
 def test_harmonics_settle_the_pace_and_more_of_them_come_closer_to_the_best_one_constant_power():
