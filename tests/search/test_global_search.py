@@ -25,7 +25,7 @@ def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside
     assert again.standing == solution.standing
     assert "best of 16 starts" in again.standing[0]
     # no distinct gait is told twice, and none of finite size is better than the one that is given
-    finite = [other.efficiency for other in again.others if not other.on_speed_floor and other.delta == solution.problem.delta]
+    finite = [other.value for other in again.others if not other.on_speed_floor and other.delta == solution.problem.delta]
     assert max(finite) == pytest.approx(solution.finite.efficiency, rel=1e-3)
 
 
