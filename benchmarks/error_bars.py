@@ -88,8 +88,10 @@ def solved_gait(number: int, own: bool) -> dict[str, list[float]] | None:
     if not solution.levels or not solution.last.optimal:
         return None
     breaks, body = solution.gait.corner_phases, problem.body
+    friction = problem.friction
     assert isinstance(body, Chain)  # the zoo has no others
-    return compared(body, problem.friction, gait_path(solution), solution.delta_per_period, breaks, own)
+    assert isinstance(friction, Friction)
+    return compared(body, friction, gait_path(solution), solution.delta_per_period, breaks, own)
 
 
 def summary(rows: list[dict[str, list[float]]]) -> str:

@@ -27,6 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Friction, Harmonic, Problem, ellipse
+from colloc.gaits.gait_fields import law_fields
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.sampling import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
@@ -103,9 +104,8 @@ def row(archive: Archive) -> dict:
     """What the table says about a case."""
     problem, outcomes = archive.problem, list(archive.of_search(LATIN_HYPERCUBE, 0).values())
     found = basins(problem, outcomes)
-    friction = problem.friction
     return {
-        "law": [friction.mu_t, friction.mu_f, friction.mu_b],
+        "law": list(law_fields(problem.friction).values()),
         "symmetry": problem.gait.symmetry,
         "delta": problem.delta,
         "starts": len(outcomes),

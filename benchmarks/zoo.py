@@ -52,8 +52,7 @@ def zoo_problem(number: int) -> Problem:
 
 def described(problem: Problem) -> str:
     """In one line."""
-    f = problem.friction
-    law = f"mu ({f.mu_t:.2f}, 1, {f.mu_b:.2f})"
+    law = problem.friction.label
     return f"{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}"
 
 

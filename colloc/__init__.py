@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from colloc.gaits.problem import Problem
     from colloc.gaits.problem_file import Reference, load_problem
     from colloc.gaits.relaxed import Relaxed
+    from colloc.laws.elliptic import Elliptic
+    from colloc.laws.own_law import OwnLaw
+    from colloc.laws.power_law import PowerLaw
+    from colloc.laws.viscous import Viscous
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
@@ -58,6 +62,10 @@ _HOME = {
     "smooth.concertina": ("Concertina",),
     "smooth.prescribed_body": ("Wave",),
     "mechanics.friction": ("Friction",),
+    "laws.elliptic": ("Elliptic",),
+    "laws.viscous": ("Viscous",),
+    "laws.power_law": ("PowerLaw",),
+    "laws.own_law": ("OwnLaw",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
     "gaits.path_classes": ("FreePath", "Polygon"),
     "gaits.relaxed": ("Relaxed",),
@@ -82,6 +90,7 @@ __all__ = [
     "CollocError",
     "Concertina",
     "Corners",
+    "Elliptic",
     "Fourier",
     "FreePath",
     "Friction",
@@ -89,7 +98,9 @@ __all__ = [
     "ModalBody",
     "NotConvergedError",
     "Objective",
+    "OwnLaw",
     "Polygon",
+    "PowerLaw",
     "Problem",
     "ProblemError",
     "Reference",
@@ -98,6 +109,7 @@ __all__ = [
     "Starts",
     "StoreError",
     "Study",
+    "Viscous",
     "Wave",
     "certify",
     "ellipse",

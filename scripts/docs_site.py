@@ -33,6 +33,7 @@ ORDER = (
         "How to",
         (
             *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "check", "starts")),
+            "laws.md",
             "objectives.md",
             "studies.md",
             "cluster.md",

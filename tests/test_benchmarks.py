@@ -7,10 +7,11 @@ from benchmarks.__main__ import PARTS, document
 from benchmarks.balance_solvers import newcomers_residual, random_instants
 from benchmarks.link_integrals import worst_errors
 from benchmarks.peer_table import OPTIMA, judged
-from benchmarks.peers import physics
+from benchmarks.peers import drag, physics
 from benchmarks.peers.nelder_mead import minus_efficiency
 from benchmarks.peers.slsqp_three_link import Reduced, solve
 from benchmarks.peers.starts import feasible_motion, starts
+from benchmarks.published import DIFFERS, number, scallop, small_stroke, small_wave
 from benchmarks.scaling import problem_of
 from benchmarks.smooth_panels import MOTION, loads
 from benchmarks.tables import interleaved_seconds, markdown_table
@@ -113,3 +114,16 @@ def test_tables_and_report():
     text = document({"cost": section})
     assert PARTS["cost"] in text
     assert PARTS["scaling"] not in text
+
+
+def test_rows_about_published_results_judge_by_the_printed_digits():
+    assert number("", "", 0.259, 0.2600, 1.5e-3).verdict == "agrees"
+    assert number("", "", 0.094, 0.1000, 1.5e-3, "why").verdict == f"{DIFFERS}; why"
+    assert scallop().verdict == small_stroke().verdict == small_wave().verdict == "agrees"
+
+
+def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():
+    assert drag.displacement_per_area() == pytest.approx(5 / 243, rel=1e-6)
+    # the connection does not depend on the heading, nor on the unit of drag
+    R, turned = drag.resistance(0.0, np.array([0.4, -0.9])), drag.resistance(1.1, np.array([0.4, -0.9]))
+    np.testing.assert_allclose(np.linalg.eigvalsh(R), np.linalg.eigvalsh(turned), atol=1e-15)

@@ -10,6 +10,8 @@ from colloc.gaits.guesses import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import rate_independent
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 
 CACHE = "bounds.sqlite"
@@ -19,18 +21,21 @@ CACHE = "bounds.sqlite"
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
-    None for bodies that are no chains, other objectives, and gaits that turn. A cache that cannot be read or written is left
-    as it is, with a `ChangedFileWarning`: no result depends on it.
+    None for bodies that are no chains, laws other than Coulomb's, other objectives, and gaits that turn. A cache that cannot be
+    read or written is left as it is, with a `ChangedFileWarning`: no result depends on it.
     """
-    if not isinstance(problem.body, Chain):
+    friction = problem.friction
+    if not isinstance(problem.body, Chain) or type(friction) is not Friction:
         if compute:
-            raise ProblemError("upper bounds are computed for chains of links only; for this body there is 1/min(mu).")
+            raise ProblemError(
+                "upper bounds are computed for chains of links under Coulomb friction only; for this one there is 1/min(mu)."
+            )
         return None
     if not _bounded(problem):
         if compute:
             raise ProblemError("upper bounds are of the efficiency of gaits that do not turn.")
         return None
-    domain, cache = (problem.body, problem.friction, widest(problem.joint_limit)), folder / CACHE
+    domain, cache = (problem.body, friction, widest(problem.joint_limit)), folder / CACHE
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:
@@ -39,7 +44,8 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
 
 
 def _bounded(problem: Problem) -> bool:
-    return problem.objective == EFFICIENCY and problem.rotation == 0
+    """Work that depends on the pace has no bound per distance: a slow gait pays as little as it likes."""
+    return problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.friction)
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
@@ -49,5 +55,6 @@ def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
     if not _bounded(problem):
         return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.friction.smallest
-    tighter = "; --bound computes a tighter one" if isinstance(problem.body, Chain) else ""
+    known = isinstance(problem.body, Chain) and type(problem.friction) is Friction
+    tighter = "; --bound computes a tighter one" if known else ""
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

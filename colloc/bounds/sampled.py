@@ -171,6 +171,8 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
     fields = {"version": VERSION, "domain": asdict(domain), "budget": asdict(budget)}
+    if type(domain.friction) is not Friction:  # a law with the same coefficients
+        fields["law"] = type(domain.friction).__name__
     return hash_of(fields)
 
 

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 
 _TOLERANCE, ACCEPTED = 1e-12, 1e3
 """Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
@@ -19,7 +19,7 @@ class ImplicitVelocity(ca.Callback):
     instant that does not converge gives NaN, which an optimiser takes as a step too far.
     """
 
-    def __init__(self, body: Body, friction: Friction, n_time: int) -> None:
+    def __init__(self, body: Body, friction: Law, n_time: int) -> None:
         ca.Callback.__init__(self)
         self._body, self._friction, self._n_time = body, friction, n_time
         self._last: tuple[np.ndarray, np.ndarray, float] | None = None

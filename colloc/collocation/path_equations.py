@@ -18,7 +18,7 @@ from colloc.collocation.point_equations import forward
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits import arcs
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
 
 OMEGA, ADVANCE, POWER = range(3)
@@ -70,7 +70,7 @@ def side(n_joint: int) -> Piece:
 
 
 @lru_cache(maxsize=32)
-def path_point(body: Body, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+def path_point(body: Body, friction: Law, kind: Callable[[int], Piece]) -> LocalFunction:
     """Rotation rate, velocity of the centre of mass along the lab's x, and power. Locals: theta, then the piece's shape.
 
     `kind` is `arc` or `side`. Differentiating takes most of the time in which a program is built, so it is done once.
@@ -83,7 +83,7 @@ def path_point(body: Body, friction: Friction, kind: Callable[[int], Piece]) -> 
 
 
 @lru_cache(maxsize=32)
-def full_path_point(body: Body, friction: Friction, kind: Callable[[int], Piece]) -> LocalFunction:
+def full_path_point(body: Body, friction: Law, kind: Callable[[int], Piece]) -> LocalFunction:
     """The same with everything as a variable. Outputs: the place of the point and its direction, then
     those of `colloc.mechanics.bodies.Lifted`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
     link forces, shape."""

@@ -27,7 +27,7 @@ from colloc.gaits.objective import QUANTITIES, Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.driven_power import driven_power
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, local_function, total_function
 from colloc.numerics.constraint_rows import Group, least_group, total_group
 from colloc.numerics.mesh import Mesh
@@ -39,7 +39,7 @@ _AT_REST = 1e-12
 
 
 @lru_cache(maxsize=32)
-def point_function(formulation: str, body: Body, friction: Friction) -> LocalFunction:
+def point_function(formulation: str, body: Body, friction: Law) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
 
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links.
@@ -58,7 +58,7 @@ def forward(theta: ca.SX, centre: ca.SX) -> ca.SX:
     return ca.cos(theta) * centre[0] - ca.sin(theta) * centre[1]
 
 
-def _full_point(body: Body, friction: Friction) -> LocalFunction:
+def _full_point(body: Body, friction: Law) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces = ca.SX.sym("forces", body.n_force)
     lifted = body.with_forces(friction, angles, rates, z, forces, delta)
@@ -66,7 +66,7 @@ def _full_point(body: Body, friction: Friction) -> LocalFunction:
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
 
 
-def _map_point(body: Body, friction: Friction) -> LocalFunction:
+def _map_point(body: Body, friction: Law) -> LocalFunction:
     """Outputs z - Z, rate of distance at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter).
 
     Derivatives of Z follow from balance(Z, y) = 0: dZ/dy = -R_z^-1 R_y. The Hessian of w.Z + w_P P(Z, y) is that of
@@ -123,7 +123,7 @@ def path_pace(n_joint: int) -> LocalFunction:
 
 
 def driven_point(
-    body: Body, friction: Friction, shape: ca.SX | None = None, given: ca.SX | None = None, gain: ca.SX | float = 1.0
+    body: Body, friction: Law, shape: ca.SX | None = None, given: ca.SX | None = None, gain: ca.SX | float = 1.0
 ) -> LocalFunction:
     """Driven power at a point of a full program, from joint angles, rates and forces; times a gain that depends on more
     locals, `shape`, and on what is `given`."""

@@ -151,7 +151,8 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body, far)
-    point = point_function(problem.formulation, problem.body, problem.friction)
+    friction = problem.friction.in_speeds_of(RADIANS)
+    point = point_function(problem.formulation, problem.body, friction)
     n_joint = problem.body.n_joint
     n_parameter = layout.parameters.shape[0]
 
@@ -172,7 +173,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     none, own = np.empty((0, mesh.n_point)), np.concatenate([layout.angles, layout.rates, layout.forces])
     densities: dict[str, Callable[[], BlockParts]] = {
         "length": lambda: (path_pace(n_joint), layout.rates, none),
-        "driven_work": lambda: (driven_point(problem.body, problem.friction), own, none),
+        "driven_work": lambda: (driven_point(problem.body, friction), own, none),
     }
     of_period = period_rows(problem, layout, mesh, densities, RADIANS)
     blocks |= {name: parts for name, (parts, _) in of_period.items()}
@@ -195,7 +196,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         ),
         *(group for _, group in of_period.values()),
     ]
-    velocity = ImplicitVelocity(problem.body, problem.friction, mesh.n_point)
+    velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)
 
     def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])

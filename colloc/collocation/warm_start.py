@@ -54,7 +54,7 @@ def balanced_variables(
     unit = gait.speed_unit
     slow = delta * gait.delta_unit / unit
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
-    body, friction = problem.body, problem.friction
+    body, friction = problem.body, problem.friction.in_speeds_of(unit)
     solved = body.solve(friction, angles, rates, slow, start=start, tolerance=_TOLERANCE)
     now, z = body.motion(friction, angles, rates, slow, solved), solved.z
 

@@ -16,6 +16,8 @@ import numpy as np
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
+from colloc.gaits.gait_fields import law_fields
+from colloc.mechanics.law import rate_independent
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -23,9 +25,9 @@ from colloc.system.replaced_file import replaced_file
 from colloc.verification.trajectory import Trajectory, timed
 
 _EPILOG = """\
-Pacing does not change what a gait does: distance and work per period are those of the result. With --max-speed the path
-is run through as evenly as the limits allow; without --period as fast as they allow. The period is rounded up to a whole
-number of samples, and the sample after the last is the first one again.
+Under dry friction pacing does not change what a gait does: distance and work per period are those of the result. With
+--max-speed the path is run through as evenly as the limits allow; without --period as fast as they allow. The period is rounded
+up to a whole number of samples, and the sample after the last is the first one again.
 
   colloc export results/three_link.h5 --period 4                          50 samples a second
   colloc export results/three_link.h5 --max-speed 2.0 --rate 100          as fast as 2 rad/s allow
@@ -50,7 +52,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Sequence[float] | None) -> dict:
     """What a reader of the samples has to know, as plain numbers and strings."""
-    measured = solution.measured
+    measured, law = solution.measured, solution.problem.friction
+    paced = {} if rate_independent(law) else {"pace": f"work is that of the gait's own pace in a period of 1 ({law.label})"}
     return {
         "name": solution.problem.name,
         "status": solution.status,
@@ -60,13 +63,14 @@ def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Seque
         "max_speed_rad_per_s": None if limits is None else list(limits),
         "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
         "body": solution.problem.body.describe(),
-        "friction": {key: getattr(solution.problem.friction, key) for key in ("mu_t", "mu_f", "mu_b")},
+        "friction": law_fields(solution.problem.friction),
         "efficiency": measured.efficiency,
         "objective": solution.problem.objective.name,
         "value": measured.value,
         "distance_per_period_body_lengths": measured.distance,
         "work_per_period_weight_times_length": measured.work,
         "problem_hash": solution.problem.hash,
+        **paced,
     }
 
 

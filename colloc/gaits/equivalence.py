@@ -23,7 +23,7 @@ import numpy as np
 
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 
 Image = Callable[[Fourier], Fourier]
 _GRID = 64
@@ -45,7 +45,7 @@ def swapped(gait: Fourier, body: Body) -> Fourier:
     return Fourier(*(body.swapped(rows) for rows in (gait.mean, gait.cos, gait.sin)))
 
 
-def images(gait: Fourier, body: Body, friction: Friction) -> list[Fourier]:
+def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
     """The gait and all gaits that differ from it by a symmetry of body and friction, but for the start phase."""
     result = []
     for mirror, reversal, swap in product((False, True), repeat=3):
@@ -79,7 +79,7 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
     return float(np.sqrt(np.sum((a.mean - b.mean) ** 2) + 0.5 * np.sum(np.abs(difference) ** 2)))
 
 
-def distance(a: Fourier, b: Fourier, body: Body, friction: Friction) -> float:
+def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
     """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body and friction."""
     return min(phase_distance(a, image) for image in images(b, body, friction))
 

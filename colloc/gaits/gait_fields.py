@@ -1,4 +1,7 @@
-"""Gaits, classes of gaits and bodies as plain dictionaries (JSON), and back. The names of the fields tell the kind."""
+"""Gaits, classes of gaits, bodies and laws of friction as plain dictionaries (JSON), and back.
+
+The names of the fields tell the kind; of laws other than Coulomb's their name does.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,14 @@ from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.relaxed import Relaxed
+from colloc.laws.elliptic import Elliptic
+from colloc.laws.own_law import OwnLaw
+from colloc.laws.power_law import PowerLaw
+from colloc.laws.viscous import Viscous
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
@@ -28,6 +37,8 @@ GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases)
 CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
 BODIES: list[type] = [Chain, ModalBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
+LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
+"""Laws of friction that files can hold, Coulomb's first; a law of your own making is added to the list."""
 
 
 def fields(value: Any) -> dict[str, Any]:
@@ -53,6 +64,22 @@ def gait_from(given: dict[str, Any]) -> AnyGait:
 def class_from(given: dict[str, Any]) -> AnyClass:
     """The class of gaits that `fields` described; as `gait_from`."""
     return _from(CLASSES, given)
+
+
+def law_fields(law: Law) -> dict[str, Any]:
+    """The fields of a law of friction, and its name unless it is Coulomb's."""
+    kind = type(law)
+    return fields(law) if kind is LAWS[0] else {"law": kind.__name__, **fields(law)}
+
+
+def law_from(given: dict[str, Any]) -> Law:
+    """The law that `law_fields` described; as `gait_from`."""
+    given = dict(given)
+    name = given.pop("law", LAWS[0].__name__)
+    kind = next((kind for kind in LAWS if kind.__name__ == name), None)
+    if kind is None:
+        raise KeyError(f"no law of friction is called {name}")
+    return kind(**given)
 
 
 def body_from(given: dict[str, Any]) -> Body:

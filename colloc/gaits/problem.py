@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait_fields import BODIES, CLASSES, GAITS, AnyClass, AnyGait, body_from, class_from, fields, gait_from
+from colloc.gaits import gait_fields
+from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import Limit, checked_limit, travelling_wave, under_one_limit
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
@@ -21,6 +22,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
@@ -54,6 +56,7 @@ class Problem:
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
+        Or any other `colloc.mechanics.law.Law` (docs/laws.md).
     gait : Harmonic, FreePath, Polygon or Relaxed
         The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md). By default one
         harmonic or, for a body whose motion is prescribed, that motion (`colloc.gaits.prescribed`).
@@ -108,7 +111,7 @@ class Problem:
     name: str
     guess: AnyGait = None
     body: Body = Chain()
-    friction: Friction = Friction()
+    friction: Law = Friction()
     gait: AnyClass = None
     delta: float = None  # type: ignore[assignment]
     delta_start: float = None  # type: ignore[assignment]
@@ -128,7 +131,7 @@ class Problem:
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
         self._check_parts()
         usual = self.body.usual
-        start = usual.delta_start if self.gait.delta_start is None else self.gait.delta_start
+        start = (self.gait.delta_start or usual.delta_start) if self.friction.regularised else usual.delta
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
@@ -136,8 +139,8 @@ class Problem:
         if self.guess is None:
             free = self.gait.free
             self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
-        if not isinstance(self.guess, GAITS):
-            raise ProblemError(f"guess must be a {_names(GAITS)}, not {type(self.guess).__name__}.")
+        if not isinstance(self.guess, gait_fields.GAITS):
+            raise ProblemError(f"guess must be a {_names(gait_fields.GAITS)}, not {type(self.guess).__name__}.")
         self._check_symmetry()
         self._check_guess()
 
@@ -149,7 +152,7 @@ class Problem:
 
     def _check_body(self) -> None:
         if isinstance(self.body, type) or not isinstance(self.body, Body):
-            raise ProblemError(f"body must be a {_names(BODIES)}, not {type(self.body).__name__}.")
+            raise ProblemError(f"body must be a {_names(gait_fields.BODIES)}, not {type(self.body).__name__}.")
 
     def _check_parts(self) -> None:
         if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
@@ -158,9 +161,10 @@ class Problem:
             raise ProblemError(
                 f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
             )
-        for field, kinds in (("friction", (Friction,)), ("gait", CLASSES)):
-            if not isinstance(getattr(self, field), kinds):
-                raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(getattr(self, field)).__name__}.")
+        for field, kind, kinds in (("friction", Law, gait_fields.LAWS), ("gait", gait_fields.CLASSES, gait_fields.CLASSES)):
+            value = getattr(self, field)
+            if isinstance(value, type) or not isinstance(value, kind):
+                raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(value).__name__}.")
         if self.gait.free == bool(self.body.schedule):
             what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
             raise ProblemError(f"{what}; leave gait out, or take another body.")
@@ -242,7 +246,10 @@ class Problem:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
             raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
-        if self.body.n_joint == 1 and self.friction.mu_f == self.friction.mu_b:
+        if self.gait.unit_speed and not rate_independent(self.friction):
+            what = f"the class {type(self.gait).__name__} leaves the pace open"
+            raise ProblemError(f"{what}, but under {self.friction.label} the work depends on it; use Harmonic (period 1).")
+        if self.body.n_joint == 1 and self.friction.reversible:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
                 "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
@@ -280,11 +287,10 @@ class Problem:
             raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def __repr__(self) -> str:
-        mu, coordinates = self.friction, f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
+        coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         return (
-            f"<Problem {self.name}: {best}{coordinates}, friction ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}), "
-            f"{self.gait.describe()}, delta {self.delta:.0e}>"
+            f"<Problem {self.name}: {best}{coordinates}, {self.friction.label}, {self.gait.describe()}, delta {self.delta:.0e}>"
         )
 
     def with_(self, **changes: object) -> Problem:
@@ -294,8 +300,9 @@ class Problem:
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON)."""
         stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        for name in ("guess", "gait", "body", "friction"):
-            stated[name] = fields(stated[name])
+        for name in ("guess", "gait", "body"):
+            stated[name] = gait_fields.fields(stated[name])
+        stated["friction"] = gait_fields.law_fields(self.friction)
         # what is as usual is left out, as files that know of nothing else leave it out
         usual = [f.name for f in dataclasses.fields(self)[-_AIMS:] if stated[f.name] == f.default]
         stated |= {"objective": self.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in self.at_least]}
@@ -312,10 +319,10 @@ class Problem:
         """
         try:
             stated = dict(stated)
-            stated["guess"] = gait_from(stated["guess"])
-            stated["body"] = body_from(stated["body"])
-            stated["friction"] = Friction(**stated["friction"])
-            stated["gait"] = class_from(stated["gait"])
+            stated["guess"] = gait_fields.gait_from(stated["guess"])
+            stated["body"] = gait_fields.body_from(stated["body"])
+            stated["friction"] = gait_fields.law_from(stated["friction"])
+            stated["gait"] = gait_fields.class_from(stated["gait"])
             stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
             return cls(**stated)
         except (KeyError, TypeError) as error:

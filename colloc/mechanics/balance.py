@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import LinkForce, link_force, link_force_jacobian, link_moments, power
+from colloc.mechanics.law import Law
+from colloc.mechanics.link_friction import LinkForce, power
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
 
@@ -26,7 +26,7 @@ class Instant(NamedTuple):
 
 def instant(
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: Array,
     rates: Array,
     z: Array,
@@ -36,7 +36,7 @@ def instant(
     """Posture, link velocities and friction for joint angles, joint rates ``(n_joint, n_time)`` and z ``(3, n_time)``."""
     posture = body.posture(angles, reference)
     velocity = body.velocity(posture, rates, z, reference)
-    return Instant(posture, velocity, link_force(*velocity, body.length_column(), delta, friction))
+    return Instant(posture, velocity, friction.link_force(*velocity, body.length_column(), delta))
 
 
 def net_force(posture: Posture, force: LinkForce) -> Array:
@@ -53,18 +53,6 @@ def total_power(velocity: LinkVelocity, force: LinkForce) -> Array:
     return namespace(velocity.vs, force.normal).sum_rows(power(*velocity, force))
 
 
-def scaled_laws(velocity: LinkVelocity, force: LinkForce, length: np.ndarray, delta: Array, friction: Friction) -> list[Array]:
-    """What vanishes where link forces obey the law of friction, scaled like velocities: ``F / I0 + mu v = 0`` and so on."""
-    vs, vn, w = velocity
-    I0, I1, I2 = link_moments(vs, vn, w, length, delta)
-    mu_s, mu_t = friction.tangential(vs), friction.mu_t
-    return [
-        force.tangential / I0 + mu_s * vs,
-        force.normal / I0 + mu_t * (vn + w * I1 / I0),
-        (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * (6 / length),
-    ]
-
-
 def _pulled_back(posture: Posture, blocks: tuple[tuple[Array, Array, Array], ...]) -> np.ndarray:
     """``sum over links of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn, w)/dz and K the given 3 x 3 of link arrays."""
     c, s, x, y = posture
@@ -79,20 +67,17 @@ def _pulled_back(posture: Posture, blocks: tuple[tuple[Array, Array, Array], ...
     return result
 
 
-def balance_jacobian(body: Links, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
+def balance_jacobian(body: Links, friction: Law, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """Minus the derivative of `net_force` with respect to z, ``(n_time, 3, 3)``.
 
-    Symmetric positive definite for isotropic friction: the Hessian of the dissipation potential.
+    Symmetric positive definite for an associated law: the Hessian of the dissipation potential.
     """
-    return _pulled_back(posture, link_force_jacobian(*velocity, body.length_column(), delta, friction))
+    return _pulled_back(posture, friction.link_jacobian(*velocity, body.length_column(), delta))
 
 
-def secant_matrix(body: Links, friction: Friction, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
+def secant_matrix(body: Links, friction: Law, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """Matrix A(z) with ``net_force(z') ~ net_force(z) - A(z) (z' - z)`` when link speeds are frozen, ``(n_time, 3, 3)``.
 
     One step of the paper's fixed point (eqs. ftbtilde to deltatilde) is ``z + A(z)^-1 net_force(z)``.
     """
-    I0, I1, I2 = link_moments(*velocity, body.length_column(), delta)
-    mu_s, mu_t = friction.tangential(velocity.vs), friction.mu_t
-    zero = np.zeros_like(I0)
-    return _pulled_back(posture, ((mu_s * I0, zero, zero), (zero, mu_t * I0, mu_t * I1), (zero, mu_t * I1, mu_t * I2)))
+    return _pulled_back(posture, friction.link_secant(*velocity, body.length_column(), delta))

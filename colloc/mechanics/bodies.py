@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.system.errors import NotConvergedError
 
@@ -222,21 +222,21 @@ class Body(Protocol):
         smooth in time. Its shape coordinates are the point (cos 2 pi t, sin 2 pi t). Empty for bodies that are free to move."""
 
     # mechanics
-    def sliding(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+    def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         """The balance at any tail velocity z ``(3, n_time)``: the one statement of it, for NumPy and CasADi."""
 
-    def with_forces(self, friction: Friction, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
+    def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
         """The same with the forces ``(n_force, n_time)`` on the body's parts as variables: only for the full formulation."""
 
-    def forces(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
+    def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
         """Their values, ``(n_force, n_time)``, for NumPy and CasADi."""
 
-    def largest_forces(self, friction: Friction) -> np.ndarray:
+    def largest_forces(self, friction: Law) -> np.ndarray:
         """Their largest magnitudes, ``(n_force, 1)``."""
 
     def solve(
         self,
-        friction: Friction,
+        friction: Law,
         angles: np.ndarray,
         rates: np.ndarray,
         delta: float,
@@ -247,17 +247,15 @@ class Body(Protocol):
         """Tail velocities that keep the balance, from `start` ``(3, n_time)`` or from anywhere; NumPy."""  # fmt: skip
 
     def motion(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
     ) -> BalancedMotion:
         """What follows from a balance."""
 
-    def slopes(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-    ) -> np.ndarray:
+    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
         """Derivatives ``(6, 2 n_joint, n_time)`` of tail velocity, velocity of the centre and power along (angles, rates)."""
 
     def replayed(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
     ) -> tuple[BalancedMotion, np.ndarray]:
         """The motion by the most accurate solver there is, and its residual ``(n_time,)``: what certificates are made of."""
 
@@ -265,10 +263,10 @@ class Body(Protocol):
     def looks_for_all_velocities(self) -> bool:
         """Whether `all_velocities` finds more than one."""
 
-    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches | None:
+    def all_velocities(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches | None:
         """Every tail velocity that keeps the balance, as far as they can be found; None where others are not looked for."""
 
-    def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
+    def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
         """What has to vanish for a kink of the velocities in time, ``(n_part, n_time)``; no rows where there are none."""
 
     # shapes
@@ -307,7 +305,7 @@ class Body(Protocol):
         """Centre of mass in the same axes, ``(2, n_time)``."""
 
     def rubbing(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
     ) -> tuple[np.ndarray, np.ndarray]:
         """About `count` points along the body and the force per length there, in its axes, ``(2, n_point, n_time)`` each."""
 

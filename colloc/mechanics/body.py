@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from colloc.mechanics.balance import instant, net_force, scaled_laws, total_power
+from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.bodies import (
     ARROWS,
     FULL,
@@ -31,7 +31,7 @@ from colloc.mechanics.contact import (
     passing_depth,
 )
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.law import Law
 from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
 from colloc.mechanics.solution_branches import all_balanced_velocities
@@ -80,59 +80,57 @@ class Chain(Links):
     def describe(self) -> str:
         return f"links of lengths {', '.join(f'{length:.4g}' for length in self.lengths)} from the tail [body lengths]"
 
-    def sliding(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+    def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         now = instant(self, friction, angles, rates, z, delta)
         centre = namespace(angles, z).stack(list(self.centre_velocity(now.posture, now.velocity)))
         return Sliding(net_force(now.posture, now.force), centre, total_power(now.velocity, now.force))
 
-    def with_forces(self, friction: Friction, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
-        """Laws F / I0 + mu v = 0 of the links, stretched by the moments of 1 / speed (see `colloc.mechanics.link_friction`)."""
+    def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
+        """Laws of the links, scaled like velocities (see `colloc.mechanics.law.Law.scaled_laws`)."""
         n, posture, length = self.n_link, self.posture(angles), self.length_column()
         velocity = self.velocity(posture, rates, z)
         force = LinkForce(forces[:n, :], forces[n : 2 * n, :], forces[2 * n :, :])
-        laws = scaled_laws(velocity, force, length, delta, friction)
+        laws = friction.scaled_laws(*velocity, length, delta, force)
         stack = namespace(angles, z, forces).stack
         centre = stack(list(self.centre_velocity(posture, velocity)))
         return Lifted(stack(laws), net_force(posture, force), centre, total_power(velocity, force))
 
-    def forces(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
+    def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
         return namespace(angles, rates, z).stack(list(instant(self, friction, angles, rates, z, delta).force))
 
-    def largest_forces(self, friction: Friction) -> np.ndarray:
-        length = self.length_column()
-        tangential = max(friction.mu_f, friction.mu_b) * length
-        return np.concatenate([tangential, friction.mu_t * length, friction.mu_t * length**2 / 4])
+    def largest_forces(self, friction: Law) -> np.ndarray:
+        return friction.largest_link_forces(self.length_column())
 
     def solve(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
         tolerance: float = 1e-11,
     ) -> BalanceSolution:  # fmt: skip
         return solve_balance(self, friction, angles, rates, delta, start=start, tolerance=tolerance)
 
     def motion(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
     ) -> BalancedMotion:
         return chain_motion(self, friction, angles, rates, delta, solved)
 
-    def slopes(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-    ) -> np.ndarray:
+    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
         return chain_slopes(self, friction, angles, rates, delta, solved)[1]
 
     def replayed(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
     ) -> tuple[BalancedMotion, np.ndarray]:
         """By the solver itself: forces on links are integrals in closed form."""
         solved = solve_balance(self, friction, angles, rates, delta, start=start).require()
         return chain_motion(self, friction, angles, rates, delta, solved), solved.residual
 
-    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
+    def all_velocities(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
         return all_balanced_velocities(self, friction, angles, rates, delta)
 
-    def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
-        """The speed of the slowest point of each link, or where mu_f and mu_b differ the tangential speed."""
+    def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
+        """Speed of the slowest point of each link, or tangential speed where directions differ; none where nothing is dry."""
         velocity = self.velocity(self.posture(angles), rates, z)
-        if friction.mu_f != friction.mu_b:
+        if not friction.regularised:
+            return velocity.vs[:0]
+        if not friction.reversible:
             return np.abs(velocity.vs)
         beyond = np.maximum(np.abs(velocity.vn) - 0.5 * self.length_column() * np.abs(velocity.w), 0.0)
         return np.hypot(velocity.vs, beyond)
@@ -180,14 +178,14 @@ class Chain(Links):
         return np.concatenate(self.centre_of_mass(self.posture(angles)))
 
     def rubbing(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
     ) -> tuple[np.ndarray, np.ndarray]:
         posture = self.posture(angles)
         velocity, many = self.velocity(posture, rates, z), max(2, count // self.n_link)
         places, forces = [], []
         for share in (np.arange(many) + 0.5) / many - 0.5:
             along = share * self.length_column()
-            fs, fn = force_density(velocity.vs, velocity.vn + along * velocity.w, delta, friction)
+            fs, fn = friction.density(velocity.vs, velocity.vn + along * velocity.w, delta)
             places.append([posture.x + along * posture.cos, posture.y + along * posture.sin])
             forces.append([fs * posture.cos - fn * posture.sin, fs * posture.sin + fn * posture.cos])
         return np.concatenate(places, axis=1), np.concatenate(forces, axis=1)

@@ -9,9 +9,8 @@ import numpy as np
 from colloc.mechanics.balance import balance_jacobian, instant, total_power
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
 from colloc.mechanics.compiled_balance import motion
-from colloc.mechanics.friction import Friction
 from colloc.mechanics.implicit_slopes import implicit_changes
-from colloc.mechanics.link_friction import link_force_jacobian
+from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import native_kernel
 
@@ -20,19 +19,25 @@ N_SLOPES = 6
 
 
 def chain_motion(
-    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> BalancedMotion:
     """The motion at instants that were solved for; arguments as for `colloc.mechanics.fixed_point.solve_balance`."""
-    library, arguments = native_kernel(body), (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity)
+    library, arguments = (
+        native_kernel(body, friction),
+        (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity),
+    )
     values = _numpy_values(*arguments) if library is None else motion(library, *arguments, with_slopes=False)[0]
     return _named(values)
 
 
 def chain_slopes(
-    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> tuple[BalancedMotion, np.ndarray]:
     """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates)."""
-    library, arguments = native_kernel(body), (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity)
+    library, arguments = (
+        native_kernel(body, friction),
+        (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity),
+    )
     if library is None:
         return _named(_numpy_values(*arguments)), _numpy_slopes(*arguments)
     values, slopes = motion(library, *arguments, with_slopes=True)
@@ -48,7 +53,7 @@ def _by_anchor(
     of_one: Callable[..., np.ndarray],
     rows: tuple[int, ...],
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -71,7 +76,7 @@ def _numpy_slopes(body: Links, *arguments) -> np.ndarray:
 
 
 def _values(
-    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, anchor: int, z: np.ndarray
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, anchor: int, z: np.ndarray
 ) -> np.ndarray:
     now = instant(body, friction, angles, rates, z, delta, anchor)
     (c, s, x, y), force = now.posture, now.force
@@ -88,7 +93,7 @@ def _values(
 
 
 def _slopes(
-    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, anchor: int, z: np.ndarray
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, anchor: int, z: np.ndarray
 ) -> np.ndarray:
     now = instant(body, friction, angles, rates, z, delta, anchor)
     n_joint, n_time = angles.shape
@@ -101,7 +106,7 @@ def _slopes(
         now.posture,
         now.velocity,
         now.force,
-        link_force_jacobian(*now.velocity, body.length_column(), delta, friction),
+        friction.link_jacobian(*now.velocity, body.length_column(), delta),
         balance_jacobian(body, friction, now.posture, now.velocity, np.full((1, n_time), delta)),
         lambda a: np.einsum("ik,kjt->ijt", path, a),
         dphi,

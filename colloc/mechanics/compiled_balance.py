@@ -7,20 +7,20 @@ import ctypes
 import numpy as np
 
 from colloc.mechanics.damped_newton import METHODS
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import address, each_piece
 
 
-def body_arguments(body: Links, friction: Friction) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths and coefficients as the kernel takes them."""
-    return np.array(body.lengths), np.array([friction.mu_t, friction.mu_f, friction.mu_b], dtype=float)
+def body_arguments(body: Links, friction: Law) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths and numbers of the law as the kernel takes them."""
+    return np.array(body.lengths), np.array(friction.kernel_numbers, dtype=float)
 
 
 def balance(
     library: ctypes.CDLL,
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -56,7 +56,7 @@ _ROWS, _DIFFERENTIATED_ROWS = 7, 6
 def motion(
     library: ctypes.CDLL,
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -81,7 +81,7 @@ def motion(
 def loaded(
     library: ctypes.CDLL,
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     load: np.ndarray,

@@ -1,8 +1,8 @@
 """Damped Newton with a fixed-point safeguard, batched over instants, for three rigid velocities. No CasADi.
 
-Isotropic friction is the gradient of a strictly convex, coercive dissipation potential, so Armijo-damped Newton on that
-potential converges from any start. Unequal coefficients have no potential; there Newton steps are taken while they
-reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
+An associated law (`colloc.mechanics.law`) is the gradient of a strictly convex, coercive dissipation potential, so
+Armijo-damped Newton on that potential converges from any start. Other laws have no potential; there Newton steps are taken
+while they reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
 reweighted least squares) is the safeguard when a Newton step fails.
 
 What a body is made of (links, panels of a smooth curve) is the business of the `Batch`. Velocities are those of a
@@ -18,7 +18,7 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 
 _ARMIJO = 1e-4
 _BACKTRACKING = (0.5,) * 4 + (0.1,) * 8
@@ -39,7 +39,8 @@ METHODS = ("auto", "newton", "fixed_point")
 class Batch(Protocol):
     """Instants that share a reference: what the iteration evaluates on subsets of them."""
 
-    friction: Friction
+    @property
+    def friction(self) -> Law: ...
 
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Body state ``(k, n_body, n)``, net force ``(3, n)`` and merit ``(n,)`` at z ``(3, n)`` of the selected instants.
@@ -63,13 +64,14 @@ def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
         return np.clip(delta / speed, _DRY, _VISCOUS)[None]
 
 
-def force_unit(friction: Friction, delta: np.ndarray) -> np.ndarray:
+def force_unit(friction: Law, delta: np.ndarray) -> np.ndarray:
     """Friction on a body that moves at unit speed: the largest coefficient where delta is small.
 
-    Above unit delta friction is viscous and falls with delta; a residual in units of the coefficient would then vanish
+    Above unit delta dry friction is viscous and falls with delta; a residual in units of the coefficient would then vanish
     whatever the velocity.
     """
-    return friction.largest / np.hypot(1.0, delta)
+    degree = 1.0 if friction.degree is None else friction.degree
+    return friction.largest * np.hypot(1.0, delta) ** (degree - 1.0)
 
 
 MakeBatch = Callable[[np.ndarray, int], Batch]
@@ -192,7 +194,7 @@ def iterate(
         active, links, force, merit = active[keep], links[:, :, keep], force[:, keep], merit[keep]
         d, newton = delta[:, active], fixed_point_steps_due[active] == 0
         step = batch.step(links, force, d, newton)
-        if batch.friction.isotropic:
+        if batch.friction.associated:
             slope, slack = -np.sum(force * step, axis=0), _ROUNDING * merit
         else:
             slope, slack = -2.0 * merit, np.zeros_like(merit)
@@ -200,7 +202,7 @@ def iterate(
         trial = z[:, active] + step
         new_links, new_force, new_merit = batch.evaluate(active, trial, d)
         failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
-        for shrink in _BACKTRACKING if batch.friction.isotropic else _SHORT_BACKTRACKING:
+        for shrink in _BACKTRACKING if batch.friction.associated else _SHORT_BACKTRACKING:
             retry = np.flatnonzero(failed)
             if not retry.size:
                 break

@@ -5,7 +5,7 @@ brakes: it gives nothing back. With forces on the body's parts, the power is bil
 are linear in the rates: so the moment of a shape coordinate is the power at its unit rate, all others and the body at rest.
 
 The positive part of a power P has a corner at 0, which is smoothed at the scale of the regularised friction: below the speed
-delta friction is viscous, and so a power of delta times friction tells nothing about who drives whom,
+delta friction is viscous, and so a power of delta times friction at that speed tells nothing about who drives whom,
 
     (P + sqrt(P^2 + (mu delta)^2)) / 2.
 
@@ -17,11 +17,11 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 
 
-def actuator_powers(body: Body, friction: Friction, angles: Array, rates: Array, forces: Array, delta: Array) -> Array:
+def actuator_powers(body: Body, friction: Law, angles: Array, rates: Array, forces: Array, delta: Array) -> Array:
     """Power of every shape coordinate's actuator, ``(n_joint, n_time)``, for a body with a full formulation.
 
     Parameters
@@ -40,15 +40,15 @@ def actuator_powers(body: Body, friction: Friction, angles: Array, rates: Array,
     return namespace(angles, rates, forces).stack(powers)
 
 
-def driven_power(body: Body, friction: Friction, angles: Array, rates: Array, forces: Array, delta: Array) -> Array:
+def driven_power(body: Body, friction: Law, angles: Array, rates: Array, forces: Array, delta: Array) -> Array:
     """Sum of the positive parts of the actuators' powers, ``(1, n_time)``; arguments as for `actuator_powers`."""
     powers = actuator_powers(body, friction, angles, rates, forces, delta)
-    xp, idle = namespace(powers, delta), friction.largest * delta
+    xp, idle = namespace(powers, delta), friction.largest * delta ** (1.0 + (friction.degree or 0.0))
     return xp.sum_rows(0.5 * (powers + xp.sqrt(powers**2 + idle**2)))
 
 
 def driven_power_in_balance(
-    body: Body, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
+    body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
 ) -> np.ndarray:
     """The same, ``(n_time,)``, for balanced tail velocities z ``(3, n_time)``."""
     forces = body.forces(friction, angles, rates, z, delta)

@@ -1,8 +1,8 @@
 """Solver of the balance, batched over instants: tail velocities from shape and shape rates. No CasADi.
 
-Isotropic friction is the gradient of a strictly convex, coercive dissipation potential, so Armijo-damped Newton on that
-potential converges from any start. Unequal coefficients have no potential; there Newton steps are taken while they
-reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
+An associated law (`colloc.mechanics.law`) is the gradient of a strictly convex, coercive dissipation potential, so
+Armijo-damped Newton on that potential converges from any start. Other laws have no potential; there Newton steps are taken
+while they reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
 reweighted least squares) is the safeguard when a Newton step fails.
 
 Velocities are solved for at the midpoint of the slowest link, the *anchor*: a link at stick moves at speeds of order
@@ -22,8 +22,7 @@ from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_for
 from colloc.mechanics.bodies import BalanceSolution
 from colloc.mechanics.compiled_balance import balance
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
-from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import link_dissipation
+from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.system.errors import ProblemError
@@ -32,7 +31,7 @@ from colloc.system.errors import ProblemError
 class _Batch:
     """Instants that share a reference link: what an iteration evaluates on subsets of them."""
 
-    def __init__(self, body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, reference: int | None) -> None:
+    def __init__(self, body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, reference: int | None) -> None:
         self.body, self.friction, self.reference = body, friction, reference
         self.angles, self.rates = angles, rates
 
@@ -46,9 +45,8 @@ class _Batch:
         """
         now = self.at(select, z, delta)
         force = net_force(now.posture, now.force)
-        if self.friction.isotropic:
-            potential = link_dissipation(*now.velocity, self.body.length_column(), delta)
-            merit = self.friction.mu_t * potential.sum(axis=0)
+        if self.friction.associated:
+            merit = self.friction.link_potential(*now.velocity, self.body.length_column(), delta).sum(axis=0)
         else:
             merit = 0.5 * np.sum(force * force, axis=0)
         return np.stack([*now.posture, *now.velocity]), force, merit
@@ -91,7 +89,7 @@ def _real(name: str, values: np.ndarray) -> np.ndarray:
 
 def solve_balance(
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -106,7 +104,7 @@ def solve_balance(
     Parameters
     ----------
     body : Links
-    friction : Friction
+    friction : Law
     angles, rates : (n_joint, n_time)
         Joint angles [rad] and their rates [rad/time].
     delta : float
@@ -158,7 +156,7 @@ def solve_balance(
         if start.shape != (3, n_time) or not np.isfinite(start).all():
             raise ProblemError(f"start must be finite with shape (3, {n_time}).")
     settings = float(tolerance), int(max_iterations), method
-    library = native_kernel(body)
+    library = native_kernel(body, friction)
 
     solved = _numpy_balance if library is None else partial(balance, library)
     found = solved(body, friction, angles, rates, float(delta), start, *settings)
@@ -179,7 +177,7 @@ def solve_balance(
 
 def _numpy_balance(
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -190,9 +188,9 @@ def _numpy_balance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Arguments and results as those of `colloc.mechanics.compiled_balance.balance`, which it is the reference of."""
     n_time = angles.shape[1]
-    # work in units of the largest rate: the law is homogeneous once delta scales along
+    # work in units of the largest rate, where the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
-    speed[speed == 0] = 1.0
+    speed[(speed == 0) | (friction.degree is None)] = 1.0
     scaled_rates, scaled_delta = rates / speed, relative_delta(delta, speed)
     anchor = np.full(n_time, body.n_link // 2)
     velocity = np.zeros((3, n_time))

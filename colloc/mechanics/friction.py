@@ -1,4 +1,4 @@
-"""The law: delta-regularised Coulomb friction per unit length, at a point that slides with velocity (vs, vn).
+"""The usual law: delta-regularised Coulomb friction per unit length, at a point that slides with velocity (vs, vn).
 
 With ``r = sqrt(vs^2 + vn^2 + delta^2)`` the force per length is ``-(mu_s vs, mu_t vn)/r`` (paper, eqs. frictiondelta and
 delta). Smooth bodies integrate it by quadrature; straight links have it in closed form (`mechanics.link_friction`). All arrays
@@ -11,15 +11,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.mechanics import link_friction
+from colloc.mechanics.law import Matrix
+from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
 
+def check_positive(law: object, *names: str) -> None:
+    """A `ProblemError` that names the first of some numbers of a law that is not positive and finite."""
+    for name in names:
+        value = getattr(law, name)
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not np.isfinite(value) or value <= 0:
+            raise ProblemError(f"friction.{name} must be a positive finite number, not {value!r}.")
+
+
 @named_arguments
 @dataclass(frozen=True)
 class Friction:
-    """Friction coefficients, in units of the weight.
+    """Coulomb friction coefficients, in units of the weight; a `colloc.mechanics.law.Law`.
 
     Parameters
     ----------
@@ -37,11 +48,11 @@ class Friction:
     mu_f: float = 1.0
     mu_b: float = 1.0
 
+    degree = 0.0
+    regularised = True
+
     def __post_init__(self) -> None:
-        for name in ("mu_t", "mu_f", "mu_b"):
-            value = getattr(self, name)
-            if not isinstance(value, (int, float, np.floating)) or not np.isfinite(value) or value <= 0:
-                raise ProblemError(f"friction.{name} must be a positive finite number, not {value!r}.")
+        check_positive(self, "mu_t", "mu_f", "mu_b")
 
     @property
     def smallest(self) -> float:
@@ -53,13 +64,35 @@ class Friction:
 
     @property
     def isotropic(self) -> bool:
-        """The law is the gradient of a convex dissipation potential, so the balance has exactly one solution."""
         return self.mu_t == self.mu_f == self.mu_b
 
     @property
+    def associated(self) -> bool:
+        """Only equal coefficients make the law the gradient of a convex dissipation potential."""
+        return self.isotropic
+
+    @property
     def reversible(self) -> bool:
-        """Reversing the rates reverses the motion (mu_b = mu_f)."""
         return self.mu_b == self.mu_f
+
+    @property
+    def kernel_numbers(self) -> tuple[float, ...]:
+        """Coefficients, stretches of the tangential velocity forwards and backwards, and whether there is a potential."""
+        stretches = [float(self.stretch(np.array(side))) for side in (1.0, -1.0)]
+        return self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)
+
+    @property
+    def label(self) -> str:
+        return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g})"
+
+    def describe(self) -> str:
+        return f"μt = {self.mu_t:g} sideways, μf = {self.mu_f:g} forwards, μb = {self.mu_b:g} backwards"
+
+    def in_units_of(self, unit: float) -> Friction:
+        return type(self)(self.mu_t / unit, self.mu_f / unit, self.mu_b / unit)
+
+    def in_speeds_of(self, unit: float) -> Friction:
+        return self
 
     def tangential(self, vs: Array) -> Array:
         """Coefficient mu_s of a link that slides along itself with velocity `vs`; no switch where mu_b = mu_f."""
@@ -67,31 +100,55 @@ class Friction:
             return self.mu_f
         return namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
 
+    def stretch(self, vs: Array) -> Array:
+        """How many times its value `vs` counts in the speed r: once."""
+        return 1.0
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
+        mu_s, vs = self.tangential(vs), self.stretch(vs) * vs
+        r = regularised_speed(vs, vn, delta)
+        return -mu_s * vs / r, -self.mu_t * vn / r
+
+    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        mu_s, stretch = self.tangential(vs), self.stretch(vs)
+        r = regularised_speed(stretch * vs, vn, delta)
+        zero = 0.0 * r
+        return (stretch * mu_s / r, zero), (zero, self.mu_t / r)
+
+    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        mu_s, mu_t, stretch = self.tangential(vs), self.mu_t, self.stretch(vs)
+        vs = stretch * vs
+        r = regularised_speed(vs, vn, delta)
+        es, en, ed = vs / r, vn / r, delta / r
+        # 1 - es^2 = en^2 + ed^2 without cancellation
+        return (
+            (stretch * mu_s * (en * en + ed * ed) / r, -mu_s * es * en / r),
+            (-stretch * mu_t * es * en / r, mu_t * (es * es + ed * ed) / r),
+        )
+
+    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
+        return self.mu_t * regularised_speed(self.stretch(vs) * vs, vn, delta)
+
+    def link_force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+        return link_friction.link_force(vs, vn, w, length, delta, self)
+
+    def link_jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return link_friction.link_force_jacobian(vs, vn, w, length, delta, self)
+
+    def link_secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return link_friction.link_secant(vs, vn, w, length, delta, self)
+
+    def link_potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+        return self.mu_t * link_friction.link_dissipation(self.stretch(vs) * vs, vn, w, length, delta)
+
+    def scaled_laws(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
+        return link_friction.scaled_laws(vs, vn, w, length, delta, self, force)
+
+    def largest_link_forces(self, length: np.ndarray) -> np.ndarray:
+        tangential = max(self.mu_f, self.mu_b) * length
+        return np.concatenate([tangential, self.mu_t * length, self.mu_t * length**2 / 4])
+
 
 def regularised_speed(vs: Array, vn: Array, delta: Array) -> Array:
     """r; it is also the density of the isotropic dissipation potential, whose gradient is minus the force at mu = 1."""
     return namespace(vs, vn, delta).sqrt(vs * vs + vn * vn + delta * delta)
-
-
-def force_density(vs: Array, vn: Array, delta: Array, friction: Friction) -> tuple[Array, Array]:
-    """Tangential and normal friction force per unit length."""
-    r = regularised_speed(vs, vn, delta)
-    return -friction.tangential(vs) * vs / r, -friction.mu_t * vn / r
-
-
-def secant_density(vs: Array, vn: Array, delta: Array, friction: Friction) -> tuple[tuple[Array, Array], ...]:
-    """Minus force over velocity with r frozen, as a 2 x 2 tuple: the law of the paper's fixed point (eq. deltatilde)."""
-    r = regularised_speed(vs, vn, delta)
-    zero = 0.0 * r
-    return (friction.tangential(vs) / r, zero), (zero, friction.mu_t / r)
-
-
-def density_jacobian(vs: Array, vn: Array, delta: Array, friction: Friction) -> tuple[tuple[Array, Array], ...]:
-    """Minus the derivative of `force_density` with respect to (vs, vn), as a 2 x 2 tuple; symmetric if isotropic."""
-    r = regularised_speed(vs, vn, delta)
-    mu_s, mu_t, es, en, ed = friction.tangential(vs), friction.mu_t, vs / r, vn / r, delta / r
-    # 1 - es^2 = en^2 + ed^2 without cancellation
-    return (
-        (mu_s * (en * en + ed * ed) / r, -mu_s * es * en / r),
-        (-mu_t * es * en / r, mu_t * (es * es + ed * ed) / r),
-    )

@@ -3,7 +3,8 @@ r"""Delta-regularised Coulomb friction on a straight link, integrated in closed 
 On a rigid link of length `l` the tangential velocity `vs` is constant and the normal velocity is ``y = vn + w sigma``,
 with ``sigma`` in [-l/2, l/2] measured from the midpoint. With ``r = sqrt(vs^2 + y^2 + delta^2)`` the friction force per
 unit length is ``-(mu_s vs, mu_t y)/r`` (paper, eqs. frictiondelta and delta); `vs` has one sign on a link, so the
-forward/backward switch is exact. Everything is expressed through
+forward/backward switch is exact. A law that measures speeds with the tangential one stretched (`Coefficients.stretch`) has the
+same integrals at the stretched velocity. Everything is expressed through
 
     r0, r1   the end values of r,       S = r0 + r1,      a^2 = vs^2 + delta^2
     q        = (w l / S)^2 in [0, 1)
@@ -16,14 +17,26 @@ They follow from integration by parts; tests/mechanics/test_friction.py holds th
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from colloc.mechanics.friction import Friction
 from colloc.numerics.arrays import Array, namespace
 
 _SERIES_LIMIT = 0.1
 _H_SERIES = tuple(1.0 / (2 * j + 3) for j in range(16))
 """h = sum q^j / (2j + 3); 16 terms leave less than 1e-16 below the limit, above it the closed form loses 10 eps."""
+
+
+class Coefficients(Protocol):
+    """What the closed forms ask of a law of friction."""
+
+    @property
+    def mu_t(self) -> float: ...
+
+    def tangential(self, vs: Array) -> Array:
+        """Coefficient mu_s of a link that slides along itself with velocity `vs`."""
+
+    def stretch(self, vs: Array) -> Array:
+        """How many times its value `vs` counts in the speed r."""
 
 
 class _Roots(NamedTuple):
@@ -103,11 +116,12 @@ def link_moments(vs: Array, vn: Array, w: Array, length: Array, delta: Array) ->
     )
 
 
-def link_force(vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Friction) -> LinkForce:
+def link_force(vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Coefficients) -> LinkForce:
     """Friction force and couple on links; arguments as for `link_moments` (paper, eq. frictiondelta, integrated)."""
+    mu_s, vs = friction.tangential(vs), friction.stretch(vs) * vs
     k = _roots(vs, vn, w, length, delta)
     return LinkForce(
-        -friction.tangential(vs) * vs * 2.0 * length * k.g / k.S,
+        -mu_s * vs * 2.0 * length * k.g / k.S,
         -friction.mu_t * 2.0 * vn * length / k.S,
         -friction.mu_t * w * length**3 / k.S * (0.5 * k.Q - k.a2 * k.h / (k.S * k.S)),
     )
@@ -125,15 +139,16 @@ def power(vs: Array, vn: Array, w: Array, force: LinkForce) -> Array:
 
 
 def link_force_jacobian(
-    vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Friction
+    vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Coefficients
 ) -> tuple[tuple[Array, Array, Array], ...]:
     """Minus the derivative of (tangential, normal, couple) with respect to (vs, vn, w), as a 3 x 3 tuple of arrays.
 
-    Isotropic friction makes it symmetric and positive definite: it is the Hessian of `link_dissipation`. The switch of a
+    An associated law makes it symmetric and positive definite: it is the Hessian of mu_t `link_dissipation`. The switch of a
     directional law is differentiated on its current side.
     """
+    mu_s, mu_t, stretch = friction.tangential(vs), friction.mu_t, friction.stretch(vs)
+    vs = stretch * vs
     k = _roots(vs, vn, w, length, delta)
-    mu_s, mu_t = friction.tangential(vs), friction.mu_t
     l3 = length**3
     # integrals of 1/r^3 (times a^2), y/r^3, sigma y/r^3, and (delta^2 + y^2)/r^3
     a2J0 = length * k.S * k.Q / k.r0r1
@@ -144,7 +159,30 @@ def link_force_jacobian(
     sy_r3 = w * l3 / k.S * (2.0 * k.h / (k.S * k.S) + (k.Q - 0.5) / k.r0r1)
     along = a2J0 * (delta * delta / k.a2) + vn * y_r3 + w * sy_r3
     return (
-        (mu_s * along, -mu_s * vs * y_r3, -mu_s * vs * sy_r3),
-        (-mu_t * vs * y_r3, mu_t * a2J0, mu_t * a2J1),
-        (-mu_t * vs * sy_r3, mu_t * a2J1, mu_t * a2J2),
+        (stretch * mu_s * along, -mu_s * vs * y_r3, -mu_s * vs * sy_r3),
+        (-stretch * mu_t * vs * y_r3, mu_t * a2J0, mu_t * a2J1),
+        (-stretch * mu_t * vs * sy_r3, mu_t * a2J1, mu_t * a2J2),
     )
+
+
+def link_secant(
+    vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Coefficients
+) -> tuple[tuple[Array, Array, Array], ...]:
+    """Minus force over velocity with r frozen, as a 3 x 3 tuple: the law of the paper's fixed point on links."""
+    mu_s, mu_t, stretch = friction.tangential(vs), friction.mu_t, friction.stretch(vs)
+    I0, I1, I2 = link_moments(stretch * vs, vn, w, length, delta)
+    zero = 0.0 * I0
+    return (stretch * mu_s * I0, zero, zero), (zero, mu_t * I0, mu_t * I1), (zero, mu_t * I1, mu_t * I2)
+
+
+def scaled_laws(
+    vs: Array, vn: Array, w: Array, length: Array, delta: Array, friction: Coefficients, force: LinkForce
+) -> list[Array]:
+    """What vanishes where given forces on links obey the law, scaled like velocities: ``F / I0 + mu v = 0`` and so on."""
+    mu_s, mu_t, vs = friction.tangential(vs), friction.mu_t, friction.stretch(vs) * vs
+    I0, I1, I2 = link_moments(vs, vn, w, length, delta)
+    return [
+        force.tangential / I0 + mu_s * vs,
+        force.normal / I0 + mu_t * (vn + w * I1 / I0),
+        (force.couple / I0 + mu_t * (vn * I1 / I0 + w * I2 / I0)) * (6 / length),
+    ]

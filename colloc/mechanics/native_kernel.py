@@ -26,6 +26,8 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.numerics.c_compiler import c_compiler, cache_folder, compile_library
 from colloc.system.errors import StoreError
@@ -48,13 +50,13 @@ _SIGNATURES = {
 }
 
 
-_ANY = Links()
+_ANY, _USUAL = Links(), Friction()
 _switched_off = False
 
 
-def native_kernel(body: Links = _ANY) -> ctypes.CDLL | None:
+def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
-    return library() if body.in_series and not _switched_off else None
+    return library() if body.in_series and friction.kernel_numbers and not _switched_off else None
 
 
 @contextlib.contextmanager

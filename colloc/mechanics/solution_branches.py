@@ -14,7 +14,7 @@ import numpy as np
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.bodies import BalanceSolution, Branches
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 
 DISTINCT = 1e-5
@@ -28,14 +28,14 @@ _BETWEEN = (0.5, 0.2, 0.8, 0.05, 0.95, 0.02, 0.98, 0.005, 0.995)
 """The same from one solution to another, as parts of the way: the third often lies next to one of them."""
 
 
-def all_balanced_velocities(body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
+def all_balanced_velocities(body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
     """Every balanced velocity that can be found, the one of `solve_balance` first.
 
     Parameters
     ----------
     body : Links
-    friction : Friction
-        With equal coefficients there is one, and it is solved for once.
+    friction : Law
+        An associated one has one balance, which is solved for once.
     angles, rates : (n_joint, n_time)
         Joint angles [rad] and their rates [rad/time].
     delta : float
@@ -56,7 +56,7 @@ def all_balanced_velocities(body: Links, friction: Friction, angles: np.ndarray,
     (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """
     at = (body, friction, angles, rates, delta)
-    if friction.isotropic:
+    if friction.associated:
         return Branches(*_solved(*at, np.zeros((1, 3, angles.shape[1]))))
     middle = body.n_link // 2
     order = (middle, *(link for link in range(body.n_link) if link != middle))
@@ -85,7 +85,7 @@ def _with_link_at_rest(body: Links, angles: np.ndarray, rates: np.ndarray, link:
 
 def _solved(
     body: Links,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -103,7 +103,7 @@ def _solved(
 
 
 def _determinant(
-    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> np.ndarray:
     """Of `balance_jacobian`, ``(n_time,)``; the reference does not matter, but the slowest link loses no digits."""
     result = np.empty(solved.anchor.size)
@@ -117,7 +117,7 @@ def _determinant(
 
 
 def _between_and_beside(
-    body: Links, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
 ) -> np.ndarray:
     """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest direction of each."""
     starts = [z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN]

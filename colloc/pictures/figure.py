@@ -205,11 +205,11 @@ def _key(axes: Axes, of: str = "") -> None:
 
 
 def _headline(solution: Solution) -> str:
-    problem, mu = solution.problem, solution.problem.friction
+    problem = solution.problem
     verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
     return (
         f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}   "
-        f"(μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  δ = {solution.last.delta:.0e}{verdict}\n"
+        f"{problem.friction.label},  δ = {solution.last.delta:.0e}{verdict}\n"
         f"class: {problem.gait.describe()}"
     )
 

@@ -84,7 +84,7 @@ def relaxed_figure(solution: RelaxedSolution) -> Figure:
     verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
     headline = (
         f"{problem.name}: efficiency d/W = {best.certificate.efficiency:.5f} with {best.corners} corners, relaxed "
-        f"{solution.certificate.efficiency:.5f}   (μt, μf, μb) = ({mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}),  "
+        f"{solution.certificate.efficiency:.5f}   {mu.label},  "
         f"δ = {problem.delta:.0e}{verdict}\nclass: {problem.gait.describe()}"
     )
     with styled():

@@ -12,11 +12,11 @@ import numpy as np
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.driven_power import driven_power
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 
 
 @lru_cache(maxsize=32)
-def _function(body: Body, friction: Friction) -> ca.Function:
+def _function(body: Body, friction: Law) -> ca.Function:
     """(y, z, delta) to the driven power and its total derivative along y."""
     angles, rates, z, delta = (ca.SX.sym(*s) for s in (("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1)))
     y, balance = ca.vertcat(angles, rates), body.sliding(friction, angles, rates, z, delta).force
@@ -27,7 +27,7 @@ def _function(body: Body, friction: Friction) -> ca.Function:
 
 
 def driven_slopes(
-    body: Body, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
+    body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Driven power ``(n_time,)`` at balanced tail velocities, and its derivatives ``(2 n_joint, n_time)``."""
     power, slope = _function(body, friction)(np.concatenate([angles, rates]), z, delta)

@@ -21,7 +21,7 @@ import numpy as np
 
 from colloc.gaits.symmetry import ANTIPODAL, BOTH, fraction
 from colloc.mechanics.bodies import BalanceSolution, Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 
 _TOLERANCE = 1e-12
@@ -82,7 +82,7 @@ class ReducedMotion:
     """
 
     def __init__(
-        self, body: Body, friction: Friction, symmetry: str, mesh: Mesh, shapes: Shapes, besides: Sequence[str] = ()
+        self, body: Body, friction: Law, symmetry: str, mesh: Mesh, shapes: Shapes, besides: Sequence[str] = ()
     ) -> None:
         self.body, self.friction, self.shapes, self.mesh = body, friction, shapes, mesh
         self._periods, self._besides = 1.0 / fraction(symmetry), besides

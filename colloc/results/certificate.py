@@ -10,7 +10,7 @@ from colloc.gaits.guesses import under_one_limit
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.reduced.program import ReducedProgram
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
@@ -164,7 +164,7 @@ class Measured(NamedTuple):
 
 def measured(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path | MixedPath,
     delta: float,
     *,
@@ -181,7 +181,8 @@ def measured(
     that turns by more depends on the point that is followed.
     """
     replays: list[Replay] = []
-    for part in (1.0, 0.1, 0.01):
+    smoothed = friction.regularised or "driven_work" in objective.uses
+    for part in (1.0, 0.1, 0.01) if smoothed else (1.0,):
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
         settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "near": near, "objective": objective}
@@ -191,7 +192,8 @@ def measured(
     for aim in (objective, EFFICIENCY):
         values = [aim(each.period) for each in replays]
         errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
-        known.append((errors[0], extrapolated_limit(values, errors)))
+        limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
+        known.append((errors[0], limit))
     fine = replays[0]
     distance_error = fine.distance_error + astray(fine, rotation) + fine.other_distance
     return Measured(fine, *known[0], *known[1], distance_error, fine.work_error + fine.other_work)
@@ -300,8 +302,8 @@ def _beyond(value: float, unknown: float) -> float:
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
     """How far the objective depends on which of several balanced motions the body takes."""
-    if problem.friction.isotropic:
-        meaning = "relative; equal coefficients leave one balanced motion"
+    if problem.friction.associated:
+        meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:
         meaning = "relative; other balanced motions of a smooth body are not looked for"
     elif fine.several == 0:

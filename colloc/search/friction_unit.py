@@ -13,11 +13,11 @@ import numpy as np
 
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.results.level import Level
 
 
-def friction_unit(friction: Friction) -> float:
+def friction_unit(friction: Law) -> float:
     """The power of ten nearest to the smallest coefficient, which bounds the efficiency: 1 for friction of usual size."""
     return float(10.0 ** np.rint(np.log10(friction.smallest)))
 
@@ -27,9 +27,8 @@ def in_friction_units(problem: Problem) -> tuple[Problem, float]:
     unit = friction_unit(problem.friction)
     if unit == 1.0 or any(aim.degree is None for aim in problem.aims):
         return problem, 1.0
-    friction = Friction(*(mu / unit for mu in (problem.friction.mu_t, problem.friction.mu_f, problem.friction.mu_b)))
     least = tuple((aim, in_unit(value, 1 / unit, aim)) for aim, value in problem.at_least)
-    return problem.with_(friction=friction, at_least=least), unit
+    return problem.with_(friction=problem.friction.in_units_of(unit), at_least=least), unit
 
 
 def restated(level: Level, unit: float, objective: Objective) -> Level:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
-from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.law import Law
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, Panels, bending_power, mean_velocity, node_velocity
 from colloc.smooth.motion import Motion
@@ -107,7 +107,7 @@ def _panel_integrals(body: Curve, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray
 
 def solve_smooth(
     motion: Motion,
-    friction: Friction,
+    friction: Law,
     t: np.ndarray,
     delta: float,
     *,
@@ -126,7 +126,7 @@ def solve_smooth(
     Parameters
     ----------
     motion : Motion
-    friction : Friction
+    friction : Law
     t : (n_time,)
     delta : float
         Regularisation speed [body lengths per period], > 0.
@@ -167,8 +167,9 @@ def solve_smooth(
     for level in range(refinements + 1):
         grid = Panels(edges, order)
         # work in units of the largest rate: the law is homogeneous once delta scales along
-        fields, speed = _motion_fields(motion, t[active], grid)
-        d = relative_delta(delta, speed)
+        unit = np.ones(active.size) if friction.degree is None else None
+        fields, speed = _motion_fields(motion, t[active], grid, unit)
+        d, spent = relative_delta(delta, speed), speed ** (1.0 + (friction.degree or 0.0))
 
         def make(members: np.ndarray, reference: int, fields: PanelFields = fields) -> PanelBatch:
             return PanelBatch(fields, friction, members, reference)
@@ -195,15 +196,15 @@ def solve_smooth(
             chosen, z = active[members], state.velocity[:, members]
             own, body = Panels(edges[:, members], order), Curve(*batch.curve)
             vs, vn = node_velocity(body, z)
-            fs, fn = force_density(vs, vn, d[:, members], friction)
+            fs, fn = friction.density(vs, vn, d[:, members])
             whole = _panel_integrals(body, vs, vn, fs, fn, own)
             out["centre"][:, chosen] = mean_velocity(body, vs, vn) * speed[members]
-            out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * speed[members]
+            out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * spent[members]
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
             inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
             out["force"][:, chosen] = whole[:3].sum(axis=1)
-            out["power"][chosen] = whole[3].sum(axis=0) * speed[members]
-            out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * speed[members]
+            out["power"][chosen] = whole[3].sum(axis=0) * spent[members]
+            out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * spent[members]
             out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]
             tail = batch.edge_velocity(z)[:, 0]
             tail[2] -= fields.edge_rate[0, members]
@@ -233,7 +234,7 @@ def _groups(anchor: np.ndarray, make):
 
 
 def _panel_error(
-    motion: Motion, friction: Friction, t: np.ndarray, batch: PanelBatch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
+    motion: Motion, friction: Law, t: np.ndarray, batch: PanelBatch, z: np.ndarray, delta: np.ndarray, speed: np.ndarray
 ) -> np.ndarray:
     """How far each panel is from its two halves, ``(n_panel, n_time)``.
 
@@ -252,7 +253,7 @@ def _panel_error(
         fields, _ = _motion_fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
         one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
         velocity = node_velocity(Curve(*one.curve), start)
-        force = force_density(*velocity, delta_many, friction)
+        force = friction.density(*velocity, delta_many)
         integrals = _panel_integrals(Curve(*one.curve), *velocity, *force, fields.panels).sum(axis=1)
         end = one.edge_velocity(start)[:2, -1] / slow_many
         results.append(np.concatenate([integrals / friction.largest, end]))

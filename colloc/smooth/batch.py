@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.damped_newton import solve3
-from colloc.mechanics.friction import Friction, density_jacobian, force_density, regularised_speed, secant_density
+from colloc.mechanics.law import Law
 from colloc.smooth.curve import Curve, Panels, curve, node_velocity, pulled_back, resultant
 
 
@@ -19,7 +19,7 @@ class PanelFields:
 class PanelBatch:
     """Instants on given panels that share a reference edge."""
 
-    def __init__(self, fields: PanelFields, friction: Friction, members: np.ndarray, reference: int) -> None:
+    def __init__(self, fields: PanelFields, friction: Law, members: np.ndarray, reference: int) -> None:
         self.fields, self.friction, self.members, self.reference = fields, friction, members, reference
         self.panels = Panels(fields.panels.edges[:, members], fields.panels.order)
         self.edge_rate = fields.edge_rate[:, members]
@@ -29,19 +29,19 @@ class PanelBatch:
     def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         body = Curve(*self.curve[:, :, select])
         vs, vn = node_velocity(body, z)
-        force = resultant(body, *force_density(vs, vn, delta, self.friction))
-        if self.friction.isotropic:
-            merit = self.friction.mu_t * np.sum(body.weight * regularised_speed(vs, vn, delta), axis=0)
+        force = resultant(body, *self.friction.density(vs, vn, delta))
+        if self.friction.associated:
+            merit = np.sum(body.weight * self.friction.density_potential(vs, vn, delta), axis=0)
         else:
             merit = 0.5 * np.sum(force * force, axis=0)
         return np.stack([*body, vs, vn]), force, merit
 
     def step(self, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
         step = np.empty_like(force)
-        for law, chosen in ((density_jacobian, newton), (secant_density, ~newton)):
+        for law, chosen in ((self.friction.density_jacobian, newton), (self.friction.density_secant, ~newton)):
             if chosen.any():
                 vs, vn = state[7:, :, chosen]
-                blocks = law(vs, vn, delta[:, chosen], self.friction)
+                blocks = law(vs, vn, delta[:, chosen])
                 left = pulled_back(Curve(*state[:7, :, chosen]), blocks)
                 matrix = np.array([[entry[0] for entry in row] for row in left]).transpose(2, 0, 1)
                 step[:, chosen] = solve3(matrix, force[:, chosen])

@@ -11,8 +11,8 @@ import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, net_force, secant_matrix, total_power
 from colloc.mechanics.damped_newton import State, solve, solve3, starting_state
-from colloc.mechanics.friction import Friction, density_jacobian, regularised_speed, secant_density
-from colloc.mechanics.link_friction import LinkForce, link_dissipation, link_force
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.bump_body import BumpBody
@@ -41,7 +41,7 @@ def bump_instant(body: BumpBody, friction: Friction, q: Array, rates: Array, z: 
     places = xp.stack([-0.5 * length[0:1, :], body.width * x + 0.5 * length[1:2, :]])
     posture = Posture(one, 0.0 * one, places, xp.stack([0.0 * y, body.width * y]))
     velocity = body.links(q, rates, z)
-    return BumpInstant(posture, velocity, link_force(*velocity, length, delta, friction), *body.bump(q, rates, z))
+    return BumpInstant(posture, velocity, friction.link_force(*velocity, length, delta), *body.bump(q, rates, z))
 
 
 def balance_and_power(body: BumpBody, friction: Friction, now: BumpInstant, delta: Array) -> tuple[Array, Array]:
@@ -80,11 +80,10 @@ class _Batch:
         velocity = LinkVelocity(*links[4:7])
         vs, vn = node_velocity(bump, np.stack([z[0], z[1], self.body.width * z[2]]))
         load, _ = self.body.bump_load(bump, vs, vn, delta, self.friction)
-        force = net_force(posture, link_force(*velocity, length, delta, self.friction)) + load
-        if self.friction.isotropic:
-            inner = np.sum(bump.weight * regularised_speed(vs, vn, delta), axis=0)
-            merit = link_dissipation(*velocity, length, delta).sum(axis=0) + self.body.width * inner
-            merit = self.friction.mu_t * merit
+        force = net_force(posture, self.friction.link_force(*velocity, length, delta)) + load
+        if self.friction.associated:
+            inner = np.sum(bump.weight * self.friction.density_potential(vs, vn, delta), axis=0)
+            merit = self.friction.link_potential(*velocity, length, delta).sum(axis=0) + self.body.width * inner
         else:
             merit = 0.5 * np.sum(force * force, axis=0)
         nodes = np.stack([*bump, vs, vn]).reshape(-1, z.shape[1])
@@ -94,8 +93,8 @@ class _Batch:
         links, nodes = state[0, :16].reshape(8, 2, -1), state[0, 16:].reshape(9, -1, state.shape[2])
         step = np.empty_like(force)
         for link_law, node_law, chosen in (
-            (balance_jacobian, density_jacobian, newton),
-            (secant_matrix, secant_density, ~newton),
+            (balance_jacobian, self.friction.density_jacobian, newton),
+            (secant_matrix, self.friction.density_secant, ~newton),
         ):
             if not chosen.any():
                 continue
@@ -103,7 +102,7 @@ class _Batch:
             a, b = links[:, :, chosen], nodes[:, :, chosen]
             lengths = _Lengths(a[7])
             left = link_law(lengths, self.friction, Posture(*a[:4]), LinkVelocity(*a[4:7]), d)  # type: ignore[arg-type]
-            inner = pulled_back(Curve(*b[:7]), node_law(b[7], b[8], d, self.friction))
+            inner = pulled_back(Curve(*b[:7]), node_law(b[7], b[8], d))
             # rotation rates reach the bump's nodes through arms measured in widths
             scale = np.array([1.0, 1.0, self.body.width])
             block = np.array([[entry[0] for entry in row] for row in inner]).transpose(2, 0, 1)

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.friction import Friction
 from colloc.mechanics.links import LinkVelocity
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.curve import Curve, Panels, curve, node_velocity, resultant
@@ -132,7 +132,7 @@ class BumpBody:
     def bump_load(self, body: Curve, vs: Array, vn: Array, delta: Array, friction: Friction) -> tuple[Array, Array]:
         """Net force and torque about the rear end ``(3, n)`` on the bump [weight, weight x length], and its power."""
         xp = namespace(vs, delta)
-        fs, fn = force_density(vs, vn, delta, friction)
+        fs, fn = friction.density(vs, vn, delta)
         net = self.width * resultant(body, fs, fn)
         power = -self.width * xp.sum_rows(body.weight * (fs * vs + fn * vn))
         return xp.stack([net[0:2, :], self.width * net[2:3, :]]), power

@@ -12,8 +12,8 @@ import numpy as np
 
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding
 from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
-from colloc.mechanics.friction import Friction, density_jacobian, force_density
 from colloc.mechanics.implicit_slopes import implicit_changes
+from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, Panels, bending_power, curve, mean_velocity, node_velocity, pulled_back, resultant
@@ -24,13 +24,13 @@ _ANCHOR_MOVES = 5
 _STEPS = 1000
 
 
-def modal_sliding(body: Modes, friction: Friction, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+def modal_sliding(body: Modes, friction: Law, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
     """The balance for amplitudes and their rates ``(modes, n_time)`` (paper, eqs. ftb and W); NumPy and CasADi."""
     xp, grid = namespace(q, rates, z), body.grid
     modes = body.modes_at(grid.nodes[:, 0])
     now: Curve = curve(grid, xp.matmul(modes, q), xp.matmul(modes, rates), TAIL, np.zeros((1, 1)))
     vs, vn = node_velocity(now, z)
-    fs, fn = force_density(vs, vn, delta, friction)
+    fs, fn = friction.density(vs, vn, delta)
     power = -xp.sum_rows(now.weight * (fs * vs + fn * vn))
     return Sliding(resultant(now, fs, fn), mean_velocity(now, vs, vn), power)
 
@@ -43,7 +43,7 @@ def _fields(body: Modes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
 
 def solve_modal(
     body: Modes,
-    friction: Friction,
+    friction: Law,
     q: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -55,7 +55,7 @@ def solve_modal(
     Parameters
     ----------
     body : Modes
-    friction : Friction
+    friction : Law
     q, rates : (modes, n_time)
     delta : float
         Regularisation speed in body lengths per unit of time of the rates.
@@ -66,7 +66,7 @@ def solve_modal(
     n = q.shape[1]
     # work in units of the largest rate: the law is homogeneous once delta scales along
     speed = np.abs(body.modes_at(body.grid.nodes[:, 0]) @ rates).max(axis=0)
-    speed[speed == 0] = 1.0
+    speed[(speed == 0) | (friction.degree is None)] = 1.0
     fields = _fields(body, q, rates / speed)
 
     def make(members: np.ndarray, reference: int) -> PanelBatch:
@@ -99,16 +99,16 @@ class _At(NamedTuple):
 
 
 def _at_anchor(
-    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
 ) -> _At:
     batch = PanelBatch(_fields(body, q, rates), friction, np.arange(q.shape[1]), reference)
     now = Curve(*batch.curve)
     vs, vn = node_velocity(now, z)
-    return _At(batch, now, vs, vn, *force_density(vs, vn, delta, friction))
+    return _At(batch, now, vs, vn, *friction.density(vs, vn, delta))
 
 
 def modal_motion(
-    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> BalancedMotion:
     """The motion at instants that were solved for."""
     n = q.shape[1]
@@ -124,7 +124,7 @@ def modal_motion(
 
 
 def modal_slopes(
-    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> np.ndarray:
     """Derivatives ``(6, 2 modes, n_time)`` of (z, centre, power) with respect to amplitudes and rates."""
     slopes = np.empty((6, 2 * body.modes, q.shape[1]))
@@ -136,7 +136,7 @@ def modal_slopes(
 
 
 def _slopes(
-    body: Modes, friction: Friction, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
 ) -> np.ndarray:
     """The nodes take the place of a chain's links: their weights that of lengths, without a couple."""
     batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q, rates, delta, reference, z)
@@ -152,7 +152,7 @@ def _slopes(
     def along_path(a: np.ndarray) -> np.ndarray:
         return panels.integrate((panels.widths[:, :1, None] * a).reshape(len(a), -1), reference).reshape(a.shape)
 
-    (k_ss, k_sn), (k_ns, k_nn) = density_jacobian(vs, vn, delta, friction)
+    (k_ss, k_sn), (k_ns, k_nn) = friction.density_jacobian(vs, vn, delta)
     left = np.array([[entry[0] for entry in row] for row in pulled_back(now, ((k_ss, k_sn), (k_ns, k_nn)))])
     stiffness = ((weight * k_ss, weight * k_sn, none), (weight * k_ns, weight * k_nn, none), (none, none, none))
     d = implicit_changes(

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.modal_balance import modal_motion, modal_sliding, modal_slopes, solve_modal
 from colloc.smooth.modes import Modes
@@ -75,23 +75,21 @@ class ModalBody(SmoothBody, Modes):
     def turning(self, s: np.ndarray, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
         return self.tangent(s, rates)
 
-    def sliding(self, friction: Friction, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+    def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         return modal_sliding(self, friction, angles, rates, z, delta)
 
     def solve(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
         tolerance: float = 1e-11,
     ) -> BalanceSolution:  # fmt: skip
         return solve_modal(self, friction, angles, rates, delta, start, tolerance)
 
     def motion(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
     ) -> BalancedMotion:
         return modal_motion(self, friction, angles, rates, delta, solved)
 
-    def slopes(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-    ) -> np.ndarray:
+    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
         return modal_slopes(self, friction, angles, rates, delta, solved)
 
     @property

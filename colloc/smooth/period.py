@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.schemes import scheme
 from colloc.smooth.balance import SmoothSolution, solve_smooth
 from colloc.smooth.motion import Motion
@@ -57,13 +57,13 @@ class Period:
         return self.W - self.W_inner
 
 
-def period(motion: Motion, friction: Friction, delta: float, *, intervals: int = 4, nodes: int = 6, **settings: Any) -> Period:
+def period(motion: Motion, friction: Law, delta: float, *, intervals: int = 4, nodes: int = 6, **settings: Any) -> Period:
     """Distance and work of one period.
 
     Parameters
     ----------
     motion : Motion
-    friction : Friction
+    friction : Law
     delta : float
         Regularisation speed [body lengths per period].
     intervals, nodes : int
@@ -113,7 +113,7 @@ def period(motion: Motion, friction: Friction, delta: float, *, intervals: int =
 
 
 def measured_period(
-    motion: Motion, friction: Friction, delta: float, *, intervals: int = 8, order: int = 8, **settings: Any
+    motion: Motion, friction: Law, delta: float, *, intervals: int = 8, order: int = 8, **settings: Any
 ) -> Period:
     """`period`, with its difference from half the intervals in time and two orders less in arc length as the error."""
     fine = period(motion, friction, delta, intervals=intervals, order=order, **settings)

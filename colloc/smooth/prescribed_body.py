@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.smooth.smooth_body import SmoothBody
 from colloc.system.errors import ProblemError
@@ -57,26 +57,24 @@ class PrescribedBody(SmoothBody):
         found = self.prescribed().breaks
         return super().breaks(angles) if found is None else found(_phase(angles))
 
-    def sliding(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Sliding:
+    def sliding(self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Sliding:
         slid = self.on_adaptive_panels(friction, angles, rates, float(np.max(delta)), slide=z)
         return Sliding(slid.force, slid.centre, slid.power[None])
 
     def solve(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
         tolerance: float = 1e-11,
     ) -> BalanceSolution:  # fmt: skip
         s = self.on_adaptive_panels(friction, angles, rates, delta, tolerance=tolerance)
         return BalanceSolution(s.z, s.residual, s.iterations, s.residual <= tolerance, np.zeros(s.t.size, dtype=int), s.z)
 
     def motion(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
     ) -> BalancedMotion:
         slid = self.on_adaptive_panels(friction, angles, rates, delta, slide=solved.z)
         return BalancedMotion(solved.z, slid.centre, slid.power, slid.bending_power)
 
-    def slopes(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-    ) -> np.ndarray:
+    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
         raise NotImplementedError("a prescribed motion has nothing to differentiate by.")
 
     def swapped(self, shape: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, IMPLICIT, BalancedMotion, Contact, Lifted, Pairs
-from colloc.mechanics.friction import Friction, force_density
+from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.balance import SmoothSolution, solve_smooth
 from colloc.smooth.curve import Curve, Panels, curve, node_velocity
@@ -59,7 +59,7 @@ class SmoothBody:
         )
 
     def on_adaptive_panels(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, **settings
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, **settings
     ) -> SmoothSolution:
         """The balance on panels that are halved until they resolve it; settings as for `solve_smooth`."""
         phases = np.arange(angles.shape[1])
@@ -67,26 +67,26 @@ class SmoothBody:
         return solve_smooth(self._motion_of(angles, rates), friction, phases, delta, **settings)
 
     def replayed(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, start: np.ndarray | None
     ) -> tuple[BalancedMotion, np.ndarray]:
         """On panels that adapt, whatever those of a search."""
         solved = self.on_adaptive_panels(friction, angles, rates, delta).require()
         return BalancedMotion(solved.z, solved.centre, solved.power, solved.bending_power), solved.residual
 
-    def all_velocities(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float) -> None:
+    def all_velocities(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float) -> None:
         """Not looked for."""
 
-    def slowness(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
+    def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
         """None: a point at rest moves along the body, and does not come and go."""
         return np.empty((0, angles.shape[1]))
 
-    def with_forces(self, friction: Friction, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
+    def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
         raise NotImplementedError("a smooth body has no full program.")
 
-    def forces(self, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
+    def forces(self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
         return np.empty((0, angles.shape[1]))
 
-    def largest_forces(self, friction: Friction) -> np.ndarray:
+    def largest_forces(self, friction: Law) -> np.ndarray:
         return np.empty((0, 1))
 
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
@@ -119,10 +119,10 @@ class SmoothBody:
         return np.stack([(now.weight * axis).sum(axis=0) for axis in _places(now)])
 
     def rubbing(
-        self, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
     ) -> tuple[np.ndarray, np.ndarray]:
         _, now = self._curve(max(1, count // _NODES), _NODES, angles, rates)
-        fs, fn = force_density(*node_velocity(now, z), delta, friction)
+        fs, fn = friction.density(*node_velocity(now, z), delta)
         return np.stack(_places(now)), np.stack([fs * now.cos - fn * now.sin, fs * now.sin + fn * now.cos])
 
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:

@@ -14,7 +14,7 @@ import numpy as np
 from colloc.gaits.equivalence import phase_distance, reversed_in_time, swapped
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
 _SAME, _STANDING = 0.02, 0.05
@@ -93,7 +93,7 @@ def wave_direction(gait: Fourier) -> float:
     return float(travel / size) if size > 0 else 0.0
 
 
-def headed_displacement(gait: Fourier, body: Body, friction: Friction) -> float:
+def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
     """Mean velocity of the centre of mass along the body's mean direction, over its mean velocity; 1 is head first.
 
     From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is enough for a sign.
@@ -109,7 +109,7 @@ def headed_displacement(gait: Fourier, body: Body, friction: Friction) -> float:
     return float((moved * np.conj(axis)).real / size) if size > 0 else 0.0
 
 
-def gait_class(gait: Fourier, body: Body, friction: Friction) -> GaitClass:
+def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     """The kind of a gait of a body with at least two joints or modes."""
     close = _SAME * max(_amplitude(gait), 1e-12)
     bilateral = body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait, body))) < close

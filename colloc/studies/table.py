@@ -10,6 +10,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.sampling import on_speed_floor
+from colloc.mechanics.law import rate_independent
 from colloc.results.distinct_optima import Outcome, fourier_series, series_class
 from colloc.results.solution import SOLVED
 from colloc.studies.gait_class import GaitClass, gait_class
@@ -130,7 +131,7 @@ def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]
     row: dict[str, Any] = {"problem_hash": problem.hash, "starts": len(outcomes), "status": NOT_TRIED}
     row["starts_certified"] = sum(o.status == SOLVED for o in outcomes)
     row["seconds"] = sum(o.seconds for o in outcomes)
-    row["trivial_bound"] = 1.0 / problem.friction.smallest
+    row["trivial_bound"] = 1.0 / problem.friction.smallest if rate_independent(problem.friction) else np.nan
     bound = known_bound(problem)
     row["upper_bound"] = np.nan if bound is None else bound
     row["neighbour_value"], row["below_neighbour"] = run.neighbour_value(cell), int(run.below_neighbour(cell))

@@ -15,7 +15,7 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.driven_power import driven_power_in_balance
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay import Path
 
@@ -39,7 +39,7 @@ class Rates:
 
 def rates_at(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path,
     delta: float,
     t: np.ndarray,
@@ -123,7 +123,7 @@ class FineMotion:
 
 def fine_motion(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path,
     delta: float,
     edges: np.ndarray,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.mechanics.bodies import Body, Branches
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 
 FORWARDS, BACKWARDS = 1, -1
 
@@ -37,7 +37,7 @@ class FollowedMotion(NamedTuple):
 
 def followed_motion(
     body: Body,
-    friction: Friction,
+    friction: Law,
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
@@ -89,7 +89,7 @@ def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
     return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
 
 
-def _ranges(body: Body, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float, found: Branches) -> np.ndarray:
+def _ranges(body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, found: Branches) -> np.ndarray:
     """`FollowedMotion.apart`."""
     rows = []
     for z, sign in zip(found.z, found.sign, strict=True):

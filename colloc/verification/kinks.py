@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.verification.adaptive_motion import FineMotion, rates_at
 from colloc.verification.replay import Path
 
@@ -21,7 +21,7 @@ _ZOOMS, _SAMPLES = 5, 9
 _SEPARATE = 1e-6
 
 
-def kink_phases(body: Body, friction: Friction, path: Path, delta: float, fine: FineMotion) -> np.ndarray:
+def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineMotion) -> np.ndarray:
     """Phases of kinks inside the solved part of a gait, ascending, to 1e-3 of the spacing of the panels of `fine` there.
 
     Parameters
@@ -55,6 +55,6 @@ def kink_phases(body: Body, friction: Friction, path: Path, delta: float, fine: 
     return found[np.concatenate([[True], np.diff(found) > _SEPARATE])] if found.size else found
 
 
-def _slowness(body: Body, friction: Friction, path: Path, delta: float, t: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _slowness(body: Body, friction: Law, path: Path, delta: float, t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """What has to vanish for a kink, ``(n_part, n_time)``."""
     return body.slowness(friction, *path(t), delta, z)

@@ -145,7 +145,7 @@ def planned_mesh(
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
     given = scheme(problem.scheme)
     kinks = kink_knots(problem, gait, delta, fine)
-    switches = problem.friction.mu_f != problem.friction.mu_b
+    switches = not problem.friction.reversible
     best: MeshPlan | None = None
     for rule in _family(given):
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself kinked

@@ -21,7 +21,7 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.driven_power import driven_power_in_balance
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
 from colloc.verification.panels import WHOLE, Panels, begun, differences, halves, increments, left_over
@@ -137,7 +137,7 @@ class Replay:
 
 def _evaluated(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path | MixedPath,
     delta: float,
     t: np.ndarray,
@@ -160,7 +160,7 @@ def _evaluated(
     delivered = np.zeros(t.size)
     for share, some in zip(shares, rates if mixed else rates[None], strict=True):
         start = near
-        if not friction.isotropic:
+        if not friction.associated:
             followed = followed_motion(body, friction, angles, some, delta, None if whole else near, sense)
             if followed is not None:
                 start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
@@ -186,7 +186,7 @@ def _evaluated(
 
 def replay(
     body: Body,
-    friction: Friction,
+    friction: Law,
     path: Path | MixedPath,
     delta: float,
     *,
@@ -310,10 +310,10 @@ def replay(
     )
 
 
-def _starts(z: np.ndarray, friction: Friction, sense: int) -> np.ndarray:
+def _starts(z: np.ndarray, friction: Law, sense: int) -> np.ndarray:
     """Velocities ``(n, 4, 3)`` to solve from half way between instants with velocities z ``(n, 5, 3)``: the mean, or where
     there may be several branches, that on which the body is before."""
-    if friction.isotropic:
+    if friction.associated:
         return 0.5 * (z[:, :-1] + z[:, 1:])
     return z[:, :-1] if sense == FORWARDS else z[:, 1:]
 

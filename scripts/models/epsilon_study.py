@@ -37,6 +37,7 @@ class Crawler:
     def of(cls, problem: Problem) -> Crawler:
         """The crawler of a problem."""
         assert isinstance(problem.body, Concertina)
+        assert isinstance(problem.friction, Friction)
         return cls(problem.body, problem.friction, problem.delta, problem.name)
 
     def with_(self, **changes: Any) -> Crawler:

@@ -6,7 +6,7 @@ from scipy import integrate, optimize
 
 from colloc.mechanics.body import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction, density_jacobian, force_density
+from colloc.mechanics.friction import Friction
 from colloc.mechanics.link_friction import link_force
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.curve import Panels, curve, node_velocity, resultant
@@ -51,9 +51,9 @@ def test_density_jacobian_is_the_derivative():
     v = rng.normal(size=(2, 6, 4))
     direction = rng.normal(size=(2, 6, 4))
     h = 1e-6
-    force = [np.array(force_density(*(v + sign * h * direction), 0.1, ANISOTROPIC)) for sign in (1, -1)]
+    force = [np.array(ANISOTROPIC.density(*(v + sign * h * direction), 0.1)) for sign in (1, -1)]
     numeric = -(force[0] - force[1]) / (2 * h)
-    matrix = np.array(density_jacobian(*v, 0.1, ANISOTROPIC))
+    matrix = np.array(ANISOTROPIC.density_jacobian(*v, 0.1))
     np.testing.assert_allclose(np.einsum("ij...,j...->i...", matrix, direction), numeric, atol=1e-8)
 
 
@@ -63,7 +63,7 @@ def test_straight_rotating_body_agrees_with_the_closed_form_of_a_link():
     body = curve(panels, zero, zero, 20, np.zeros((1, 1)))
     z = np.array([[0.3], [0.2], [-1.1]])
     vs, vn = node_velocity(body, z)
-    got = resultant(body, *force_density(vs, vn, 0.05, ANISOTROPIC))
+    got = resultant(body, *ANISOTROPIC.density(vs, vn, 0.05))
     link = link_force(z[:1], z[1:2], z[2:], np.ones((1, 1)), 0.05, ANISOTROPIC)
     np.testing.assert_allclose(got, np.concatenate(link), atol=1e-13)
 

@@ -110,17 +110,17 @@ static inline Total evaluate(
     Total total = {{0.0, 0.0, 0.0}, 0.0};
     find_velocities(n, link, k, reference, z);
     for (int i = 0; i < n; ++i) {
-        find_roots(&k[i], link[i].length, delta);
+        find_roots(&k[i], law, link[i].length, delta);
         find_force(&k[i], law, link[i].length);
         const double fx = k[i].fs * link[i].cos - k[i].fn * link[i].sin;
         const double fy = k[i].fs * link[i].sin + k[i].fn * link[i].cos;
         total.force[0] += fx;
         total.force[1] += fy;
         total.force[2] += link[i].x * fy - link[i].y * fx + k[i].couple;
-        if (law->isotropic)
+        if (law->associated)
             total.merit += dissipation(&k[i], link[i].length);
     }
-    if (law->isotropic)
+    if (law->associated)
         total.merit *= law->mu_t;
     else
         total.merit = 0.5 * (total.force[0] * total.force[0] + total.force[1] * total.force[1] + total.force[2] * total.force[2]);

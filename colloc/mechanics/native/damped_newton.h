@@ -80,8 +80,8 @@ static inline double force_unit(const Law *law, double delta)
 static inline void iterate(const int n, State *s, double delta, double tolerance, long long most, int method)
 {
     const Law *law = &s->law;
-    const double *shrink = law->isotropic ? BACKTRACKING : SHORT_BACKTRACKING;
-    const size_t tries = law->isotropic ? sizeof BACKTRACKING / sizeof *shrink : sizeof SHORT_BACKTRACKING / sizeof *shrink;
+    const double *shrink = law->associated ? BACKTRACKING : SHORT_BACKTRACKING;
+    const size_t tries = law->associated ? sizeof BACKTRACKING / sizeof *shrink : sizeof SHORT_BACKTRACKING / sizeof *shrink;
     const double unit = force_unit(law, delta);
     long long iterations = 0, fixed_point_due = method == FIXED_POINT ? -1 : 0;
     double *z = s->velocity;
@@ -97,7 +97,7 @@ static inline void iterate(const int n, State *s, double delta, double tolerance
         pull_back(n, s->link, s->now, law, delta, newton, left);
         solve3(left, at.force, 0.0, step);
         double slope = -2.0 * at.merit, slack = 0.0;
-        if (law->isotropic) {
+        if (law->associated) {
             slope = -(at.force[0] * step[0] + at.force[1] * step[1] + at.force[2] * step[2]);
             slack = ROUNDING * at.merit;
         }

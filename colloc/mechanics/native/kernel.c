@@ -56,14 +56,14 @@ static inline void balance_instants(
 
 /* Returns 0, or 1 without memory. */
 int colloc_balance(
-    int n, const double *length, const double mu[3], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    int n, const double *length, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
     const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
     double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     Link *link = malloc((size_t)n * sizeof *link);
     Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
     if (link && sliding) {
-        State s = {.law = law_of(mu), .link = link, .now = sliding, .trial = sliding + n};
+        State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n};
         balance_instants(
             n, &s, length, n_time, first, last, angles, rates, delta, start, tolerance, budget, method, z, residual, iterations,
             anchor, anchor_velocity);
@@ -76,10 +76,10 @@ int colloc_balance(
 /* Rows of `find_values`, (ROWS, n_time), for chains whose anchors move as given; and, unless `slopes` is NULL, the
    derivatives of the first of them with respect to joint angles and rates, (DIFFERENTIATED_ROWS, 2 (n - 1), n_time). */
 int colloc_motion(
-    int n, const double *length, const double mu[3], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    int n, const double *length, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
     const double *rates, double delta, const long long *anchor, const double *anchor_velocity, double *values, double *slopes)
 {
-    const Law law = law_of(mu);
+    const Law law = law_of(law_numbers);
     const int n_joint = n - 1;
     Link *link = malloc((size_t)n * sizeof *link);
     Sliding *k = malloc((size_t)n * sizeof *k);
@@ -126,7 +126,7 @@ int colloc_motion(
    velocities and loads in the middle link's axes. Then potential and power (n_time), minus the friction on each link in its own
    axes (n, 3, n_time), force and torque left over (2, n_time), and what power these have (n_time). */
 int colloc_loaded(
-    int n, const double *length, const double mu[3], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    int n, const double *length, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
     const double *rates, const double *load, const double *start, double delta, int steps, double *velocity, double *potential,
     double *power, double *forces, double *residual, double *leftover_power)
 {
@@ -134,7 +134,7 @@ int colloc_loaded(
     Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
     const int middle = n / 2;
     if (link && sliding) {
-        State s = {.law = law_of(mu), .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
+        State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
         for (ptrdiff_t t = first; t < last; ++t) {
             double own[3] = {load[t], load[n_time + t], load[2 * n_time + t]};
             find_directions(n, link, length, angles + t, rates + t, 1.0, n_time);

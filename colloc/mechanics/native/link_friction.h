@@ -8,28 +8,37 @@
 
 typedef struct {
     double mu_t, mu_f, mu_b;
-    bool isotropic, reversible;
+    double stretch_f, stretch_b; /* of the tangential velocity in the speed, forwards and backwards: 1 for Coulomb */
+    bool associated, reversible;
     double largest;
 } Law;
 
 /* Velocities of a link and everything that its friction is expressed through; then the friction itself. */
 typedef struct {
     double vs, vn, w;
+    double stretched; /* vs, as it counts in the speed */
     double a2, r0r1, S, Q, g, h;
     double fs, fn, couple;
 } Sliding;
 
 typedef double Matrix3[3][3];
 
-static Law law_of(const double mu[3])
+/* Of `kernel_numbers` in colloc/mechanics/friction.py. */
+static Law law_of(const double number[6])
 {
-    Law law = {mu[0], mu[1], mu[2], mu[0] == mu[1] && mu[1] == mu[2], mu[1] == mu[2], fmax(mu[0], fmax(mu[1], mu[2]))};
+    const double *mu = number;
+    Law law = {mu[0], mu[1], mu[2], number[3], number[4], number[5] != 0, mu[1] == mu[2], fmax(mu[0], fmax(mu[1], mu[2]))};
     return law;
 }
 
 static inline double tangential(const Law *law, double vs)
 {
     return law->reversible || vs > 0 ? law->mu_f : law->mu_b;
+}
+
+static inline double stretch(const Law *law, double vs)
+{
+    return law->reversible || vs > 0 ? law->stretch_f : law->stretch_b;
 }
 
 /* (g - 1)/q: sum of q^j / (2 j + 3) below the limit of 0.1, where the closed form would cancel. */
@@ -48,9 +57,10 @@ static inline double h_series(double q)
 }
 
 /* Fill in a2 to h from vs, vn, w. */
-static inline void find_roots(Sliding *k, double length, double delta)
+static inline void find_roots(Sliding *k, const Law *law, double length, double delta)
 {
-    const double a2 = k->vs * k->vs + delta * delta, half = 0.5 * length * k->w;
+    const double vs = k->stretched = stretch(law, k->vs) * k->vs;
+    const double a2 = vs * vs + delta * delta, half = 0.5 * length * k->w;
     const double y0 = k->vn - half, y1 = k->vn + half;
     const double r0 = sqrt(a2 + y0 * y0), r1 = sqrt(a2 + y1 * y1);
     const double S = r0 + r1, r0r1 = r0 * r1, T = a2 + y0 * y1;
@@ -71,7 +81,7 @@ static inline void find_roots(Sliding *k, double length, double delta)
 static inline void find_force(Sliding *k, const Law *law, double length)
 {
     const double per_S = 1.0 / k->S, l3 = length * length * length;
-    k->fs = -tangential(law, k->vs) * k->vs * 2.0 * length * k->g * per_S;
+    k->fs = -tangential(law, k->vs) * k->stretched * 2.0 * length * k->g * per_S;
     k->fn = -law->mu_t * 2.0 * k->vn * length * per_S;
     k->couple = -law->mu_t * k->w * l3 * per_S * (0.5 * k->Q - k->a2 * k->h * per_S * per_S);
 }
@@ -85,7 +95,8 @@ static inline double dissipation(const Sliding *k, double length)
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w). */
 static inline void find_slopes(const Sliding *k, const Law *law, double length, double delta, Matrix3 slopes)
 {
-    const double vs = k->vs, vn = k->vn, w = k->w, mu_s = tangential(law, vs), mu_t = law->mu_t;
+    const double vs = k->stretched, vn = k->vn, w = k->w;
+    const double mu_s = tangential(law, k->vs), mu_t = law->mu_t, more = stretch(law, k->vs);
     const double l3 = length * length * length, per_S = 1.0 / k->S, per_r = 1.0 / k->r0r1;
     const double a2J0 = length * k->S * k->Q * per_r;
     const double a2J1 = -vn * w * l3 * k->Q * per_r * per_S;
@@ -94,9 +105,9 @@ static inline void find_slopes(const Sliding *k, const Law *law, double length, 
     const double y_r3 = 2.0 * vn * length * per_S * per_r;
     const double sy_r3 = w * l3 * per_S * (2.0 * k->h * per_S * per_S + (k->Q - 0.5) * per_r);
     const double along = a2J0 * (delta * delta / k->a2) + vn * y_r3 + w * sy_r3;
-    slopes[0][0] = mu_s * along, slopes[0][1] = -mu_s * vs * y_r3, slopes[0][2] = -mu_s * vs * sy_r3;
-    slopes[1][0] = -mu_t * vs * y_r3, slopes[1][1] = mu_t * a2J0, slopes[1][2] = mu_t * a2J1;
-    slopes[2][0] = -mu_t * vs * sy_r3, slopes[2][1] = mu_t * a2J1, slopes[2][2] = mu_t * a2J2;
+    slopes[0][0] = more * mu_s * along, slopes[0][1] = -mu_s * vs * y_r3, slopes[0][2] = -mu_s * vs * sy_r3;
+    slopes[1][0] = -more * mu_t * vs * y_r3, slopes[1][1] = mu_t * a2J0, slopes[1][2] = mu_t * a2J1;
+    slopes[2][0] = -more * mu_t * vs * sy_r3, slopes[2][1] = mu_t * a2J1, slopes[2][2] = mu_t * a2J2;
 }
 
 /* Minus force over velocity with r frozen: the law of the paper's fixed point. */
@@ -106,7 +117,7 @@ static inline void find_secants(const Sliding *k, const Law *law, double length,
     const double I0 = 2.0 * length * k->g / S, I1 = -2.0 * k->vn * k->w * l3 * k->h / (S * S * S);
     const double I2 = l3 / S * (0.5 * k->Q + (2.0 * k->vn * k->vn - k->a2) * k->h / (S * S));
     (void)delta;
-    secants[0][0] = mu_s * I0, secants[0][1] = 0.0, secants[0][2] = 0.0;
+    secants[0][0] = stretch(law, k->vs) * mu_s * I0, secants[0][1] = 0.0, secants[0][2] = 0.0;
     secants[1][0] = 0.0, secants[1][1] = mu_t * I0, secants[1][2] = mu_t * I1;
     secants[2][0] = 0.0, secants[2][1] = mu_t * I1, secants[2][2] = mu_t * I2;
 }

@@ -1,0 +1,122 @@
+r"""Friction on a straight link by quadrature: for laws whose integrals have no closed form.
+
+Along a link the tangential velocity vs is constant and the normal one ``y = vn + w sigma``; a dry law changes within
+``a = sqrt(vs^2 + delta^2)`` of y = 0. So Gauss nodes are laid in tau, ``y = a sinh(tau)``, where that is a stretch of unit
+width. With tau = m + h x, x in [-1, 1], on a link of length l
+
+    d sigma = l/2 h/sinh(h) cosh(tau)/cosh(m) dx,
+    sigma   = l/2 [sinh(h x) - 2 tanh(m) sinh(h (1+x)/2) sinh(h (1-x)/2)]/sinh(h).
+
+h follows from the end values without cancellation, so a link that hardly turns is no special case. The nodes are those of two
+panels that meet at y = 0, or at the end nearest to it: a law may have a kink there, or change faster than within a.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.law import Law, Matrix
+from colloc.mechanics.link_friction import LinkForce
+from colloc.numerics.arrays import Array, namespace
+
+NODES = 20
+"""Of a panel: force and couple to 1e-9 of the largest at least, where a law does not change much faster than within a."""
+_X, _WEIGHT = np.polynomial.legendre.leggauss(NODES)
+_SMALL = 1e-8
+"""h^2 below which three terms of the series are exact."""
+
+
+class Node(NamedTuple):
+    """A Gauss node of links: distance from the midpoint, normal velocity, and weight; the weights add up to the length."""
+
+    sigma: Array
+    y: Array
+    weight: Array
+
+
+def link_nodes(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Iterator[Node]:
+    """The nodes of links; arguments as of `colloc.mechanics.link_friction.link_moments`.
+
+    With CasADi one after the other; with NumPy those of a panel at once, along a first axis (see `_gathered`).
+    """
+    xp = namespace(vs, vn, w, delta)
+    at_once = isinstance(vs, np.ndarray)
+    places = ((_X[:, None, None], _WEIGHT[:, None, None]),) if at_once else tuple(zip(_X, _WEIGHT, strict=True))
+    a = xp.sqrt(vs * vs + delta * delta)
+    half = 0.5 * length * w
+    y0, y1 = vn - half, vn + half
+    r0, r1 = xp.sqrt(a * a + y0 * y0), xp.sqrt(a * a + y1 * y1)
+    # sinh(2 h) = (y1 r0 - y0 r1)/a^2; where both ends have one sign that cancels
+    same = y0 * y1 > 0
+    both = xp.where(same, y1 * r0 + y0 * r1, 1.0)
+    h = 0.5 * xp.arcsinh(xp.where(same, (y1 - y0) * (y1 + y0) / both, (y1 * r0 - y0 * r1) / (a * a)))
+    m = xp.arcsinh(y0 / a) + h
+    tilt, square = xp.tanh(m), h * h
+    small = square < _SMALL
+    safe = xp.where(small, 1.0, h)
+    per_sinh = 1.0 / xp.sinh(safe)
+    width = 0.5 * length * xp.where(small, 1.0 - square / 6, safe * per_sinh) / xp.cosh(m)
+    slowest = -m * xp.where(small, 0.0, 1.0) / safe
+    slowest = xp.where(slowest > 1.0, 1.0, xp.where(slowest < -1.0, -1.0, slowest))
+    for reach, centre in ((0.5 * (slowest + 1.0), 0.5 * (slowest - 1.0)), (0.5 * (1.0 - slowest), 0.5 * (slowest + 1.0))):
+        for place, weight in places:
+            x = centre + reach * place
+            tau, rest = m + h * x, 1.0 - x * x
+            series = x * (1.0 - square * rest / 6) - 0.5 * tilt * h * rest * (1.0 - square * rest / 12)
+            product = xp.sinh(0.5 * safe * (1.0 + x)) * xp.sinh(0.5 * safe * (1.0 - x))
+            share = xp.where(small, series, (xp.sinh(safe * x) - 2.0 * tilt * product) * per_sinh)
+            yield Node(0.5 * length * share, a * xp.sinh(tau), weight * reach * width * xp.cosh(tau))
+
+
+def _gathered(values: Array) -> Array:
+    """What nodes add up to, where they lie along a first axis."""
+    return values.sum(axis=0) if getattr(values, "ndim", 2) > 2 else values
+
+
+class ByQuadrature:
+    """What a law says of links, from what it says of a point."""
+
+    kernel_numbers: ClassVar[tuple[float, ...]] = ()
+
+    def link_force(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+        tangential = normal = couple = 0.0 * (vs + vn + w)
+        for sigma, y, weight in link_nodes(vs, vn, w, length, delta):
+            fs, fn = self.density(vs, y, delta)
+            tangential, normal = tangential + _gathered(weight * fs), normal + _gathered(weight * fn)
+            couple = couple + _gathered(weight * sigma * fn)
+        return LinkForce(tangential, normal, couple)
+
+    def link_jacobian(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return _on_links([(n, self.density_jacobian(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
+
+    def link_secant(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return _on_links([(n, self.density_secant(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
+
+    def link_potential(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+        nodes = link_nodes(vs, vn, w, length, delta)
+        return sum(_gathered(weight * self.density_potential(vs, y, delta)) for _, y, weight in nodes)
+
+    def scaled_laws(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
+        """Differences over the secants of the link: velocities."""
+        own = self.link_force(vs, vn, w, length, delta)
+        secant = self.link_secant(vs, vn, w, length, delta)
+        return [
+            (force.tangential - own.tangential) / secant[0][0],
+            (force.normal - own.normal) / secant[1][1],
+            (force.couple - own.couple) / secant[1][1] * (6 / length),
+        ]
+
+    def largest_link_forces(self, length: np.ndarray) -> np.ndarray:
+        return np.full((3 * length.size, 1), np.inf)
+
+
+def _on_links(densities: list[tuple[Node, Matrix]]) -> Matrix:
+    """3 x 3 matrices of links from 2 x 2 ones at their nodes."""
+    total = [[0.0] * 3 for _ in range(3)]
+    for (sigma, _, weight), ((ss, sn), (ns, nn)) in densities:
+        rows = (ss, sn, sigma * sn), (ns, nn, sigma * nn), (sigma * ns, sigma * nn, sigma * sigma * nn)
+        total = [[t + _gathered(weight * e) for t, e in zip(*pair, strict=True)] for pair in zip(total, rows, strict=True)]
+    return tuple(tuple(row) for row in total)

@@ -1,0 +1,185 @@
+"""A law of friction of one's own, stated as two formulas; checked for what the solvers rely on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from colloc.laws.expression import Dual, differentiated, evaluated, parsed
+from colloc.laws.link_quadrature import ByQuadrature
+from colloc.mechanics.friction import check_positive, regularised_speed
+from colloc.mechanics.law import Matrix
+from colloc.numerics.arrays import Array
+from colloc.system.argument_names import named_arguments
+from colloc.system.errors import ProblemError
+
+VARIABLES = ("vs", "vn", "speed", "delta")
+_DIRECTIONS, _SPEEDS, _DELTAS = 48, np.geomspace(1e-4, 1e2, 13), (1e-6, 1e-2)
+_SAME, _LEAST = 1e-10, 1e-12
+_BESIDE, _JUMP = 1e-9, 1e-6
+"""Distance in delta, and change of the force over the largest, by which a jump is told from a slope of 1/delta."""
+
+
+@named_arguments
+@dataclass(frozen=True)
+class OwnLaw(ByQuadrature):
+    """Friction per length as formulas of the velocity of sliding; a `colloc.mechanics.law.Law`.
+
+    Parameters
+    ----------
+    tangential, normal : str
+        Force along the body and across it, in terms of ``vs`` and ``vn``, the velocity along (positive towards the head) and
+        across; ``speed``, which is ``sqrt(vs**2 + vn**2 + delta**2)``; numbers, ``+ - * / **``, ``sqrt``, ``exp``, ``log``,
+        ``tanh``, ``abs`` and ``where(condition, a, b)``. Where a dry law divides by the speed, let it be ``speed``: it is never
+        zero.
+    unit, speed_unit : float
+        Forces are divided by the first; velocities and delta multiplied by the second before the formulas see them.
+
+    Raises
+    ------
+    ProblemError
+        If a formula cannot be read, or the law gives energy to the body somewhere, does not vanish at rest, or differs between
+        left and right (the mirror image of a gait would be another gait).
+
+    Examples
+    --------
+    Friction that weakens when the body slides fast:
+
+    >>> from colloc import OwnLaw
+    >>> law = OwnLaw("-vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))")
+    >>> law.reversible, law.degree
+    (True, None)
+    """
+
+    tangential: str = "-vs/speed"
+    normal: str = "-vn/speed"
+    unit: float = 1.0
+    speed_unit: float = 1.0
+
+    associated = False
+    """Samples cannot tell whether a formula is the gradient of a convex function: several motions are reckoned with."""
+
+    def __post_init__(self) -> None:
+        check_positive(self, "unit", "speed_unit")
+        vs, vn, delta = _samples()
+        with np.errstate(all="ignore"):  # what is not finite is refused
+            fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
+        if not (np.isfinite(fs).all() and np.isfinite(fn).all()):
+            raise ProblemError("friction: a formula has no finite value somewhere; divide by speed, which is never zero.")
+        gain = fs * vs + fn * vn
+        if (gain >= 0).any():
+            worst = np.unravel_index(np.argmax(gain / np.hypot(vs, vn)), gain.shape)
+            raise ProblemError(
+                f"friction: at (vs, vn) = ({vs[worst]:.3g}, {vn[worst]:.3g}) the force ({fs[worst]:.3g}, {fn[worst]:.3g}) does "
+                "not oppose the motion, so friction would give energy to the body; look at the signs."
+            )
+        zero = np.zeros((1, 1))
+        if np.abs(self.density(zero, zero, zero + _DELTAS[0])).max() > 0:
+            raise ProblemError("friction: a formula does not vanish at rest (vs = vn = 0).")
+        left = self.density(vs, -vn, delta)
+        if not (_same(left[0], fs) and _same(left[1], -fn)):
+            raise ProblemError("friction: the law differs between left and right (vn and -vn), which the symmetries exclude.")
+
+        self._check_continuity()
+
+    def _check_continuity(self) -> None:
+        """A force that jumps has no balance where it does."""
+        vs, vn, delta = _samples()
+        for what, across in (("vs", (1.0, 0.0)), ("vn", (0.0, 1.0))):
+            at, step = (vs * across[1], vn * across[0]), _BESIDE * delta
+            sides = [self.density(at[0] + sign * across[0] * step, at[1] + sign * across[1] * step, delta) for sign in (1, -1)]
+            jump = np.hypot(*(a - b for a, b in zip(*sides, strict=True))) / np.hypot(*sides[0]).max()
+            if jump.max() > _JUMP:
+                raise ProblemError(f"friction: the force jumps where {what} changes its sign; let it vanish or agree there.")
+
+    @cached_property
+    def _codes(self):
+        return tuple(parsed(text, VARIABLES) for text in (self.tangential, self.normal))
+
+    @cached_property
+    def degree(self) -> float | None:
+        vs, vn, delta = _samples()
+        before, after = (np.hypot(*self.density(t * vs, t * vn, t * delta)) for t in (1.0, 2.0))
+        degrees = np.log2(after / before)
+        found = float(np.round(degrees.mean(), 9)) + 0.0
+        return found if np.abs(degrees - found).max() < _SAME else None
+
+    @cached_property
+    def reversible(self) -> bool:
+        vs, vn, delta = _samples()
+        forward, backward = self.density(vs, vn, delta), self.density(-vs, -vn, delta)
+        return all(_same(-b, f) for f, b in zip(forward, backward, strict=True))
+
+    @cached_property
+    def regularised(self) -> bool:
+        return any(name in code.co_names for code in self._codes for name in ("speed", "delta"))
+
+    @cached_property
+    def _at_unit_speed(self) -> tuple[np.ndarray, np.ndarray]:
+        angle = np.linspace(0, 2 * np.pi, 721)[None]
+        fs, fn = self.density(np.cos(angle), np.sin(angle), np.array([[1e-9]]))
+        return -(fs * np.cos(angle) + fn * np.sin(angle)), np.hypot(fs, fn)
+
+    @property
+    def smallest(self) -> float:
+        return float(self._at_unit_speed[0].min())
+
+    @property
+    def largest(self) -> float:
+        return float(self._at_unit_speed[1].max())
+
+    @property
+    def label(self) -> str:
+        return "own law of friction"
+
+    def describe(self) -> str:
+        scale = "" if self.unit == 1 else f", over {self.unit:g}"
+        return f"{self.tangential} along, {self.normal} across the body{scale}"
+
+    def in_units_of(self, unit: float) -> OwnLaw:
+        return replace(self, unit=self.unit * unit)
+
+    def in_speeds_of(self, unit: float) -> OwnLaw:
+        return replace(self, speed_unit=self.speed_unit * unit)
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
+        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta + 0.0 * vs))
+        at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta}
+        fs, fn = (evaluated(code, at) / self.unit for code in self._codes)
+        return fs, fn
+
+    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta))
+        zero = 0.0 * (vs + vn)
+        r = regularised_speed(vs, vn, delta)
+        at = {
+            "vs": Dual(vs, (1.0 + zero, zero)),
+            "vn": Dual(vn, (zero, 1.0 + zero)),
+            "speed": Dual(r, (vs / r, vn / r)),
+            "delta": Dual(delta + zero, (zero, zero)),
+        }
+        rows = [differentiated(code, at).slopes for code in self._codes]
+        return tuple(tuple(zero - self.speed_unit / self.unit * slope for slope in row) for row in rows)
+
+    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        """The trace of the Jacobian in every direction: no less than the secant of a law that grows with the speed."""
+        (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
+        zero = 0.0 * ss
+        trace = regularised_speed(ss + nn, zero, _LEAST + zero)  # positive for any law
+        return (trace, zero), (zero, trace)
+
+    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
+        raise NotImplementedError("only associated laws have a potential")
+
+
+def _samples() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Velocities in all directions, over many speeds and two deltas, ``(1, n)`` each."""
+    angle = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+    speed, angle, delta = (a.reshape(1, -1) for a in np.meshgrid(_SPEEDS, angle, _DELTAS))
+    return speed * np.cos(angle), speed * np.sin(angle), delta
+
+
+def _same(a: Array, b: Array) -> bool:
+    return bool(np.allclose(a, b, rtol=_SAME, atol=0.0))

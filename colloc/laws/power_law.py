@@ -1,0 +1,113 @@
+"""A power law between dry friction and viscous drag: the force grows like a power of the speed.
+
+With ``r = sqrt(vs^2 + vn^2 + delta^2)`` the force per length is ``-(mu_s vs, mu_t vn) r^(power - 1)``, with mu_s = mu_f or mu_b
+as vs > 0 or < 0: Coulomb friction at power 0, drag at power 1. Wet granular beds and yield-stress fluids lie between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.laws.link_quadrature import ByQuadrature
+from colloc.mechanics.friction import check_positive, regularised_speed
+from colloc.mechanics.law import Matrix
+from colloc.numerics.arrays import Array, namespace
+from colloc.system.argument_names import named_arguments
+from colloc.system.errors import ProblemError
+
+
+@named_arguments
+@dataclass(frozen=True)
+class PowerLaw(ByQuadrature):
+    """Friction that grows like a power of the speed; a `colloc.mechanics.law.Law`.
+
+    Parameters
+    ----------
+    power : float
+        From 0 (dry) to 2; 1 is viscous.
+    mu_t, mu_f, mu_b : float
+        Force per length at unit speed across the body, forwards and backwards; all positive.
+
+    Examples
+    --------
+    >>> from colloc import PowerLaw
+    >>> PowerLaw(power=0.5, mu_t=2.0).degree
+    0.5
+    """
+
+    power: float = 0.5
+    mu_t: float = 1.0
+    mu_f: float = 1.0
+    mu_b: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_positive(self, "mu_t", "mu_f", "mu_b")
+        if isinstance(self.power, bool) or not isinstance(self.power, (int, float, np.floating)) or not 0 <= self.power <= 2:
+            raise ProblemError(f"friction.power must lie in [0, 2], not {self.power!r}; friction that falls with speed sticks.")
+
+    @property
+    def degree(self) -> float:
+        return float(self.power)
+
+    @property
+    def reversible(self) -> bool:
+        return self.mu_b == self.mu_f
+
+    @property
+    def associated(self) -> bool:
+        return self.mu_t == self.mu_f == self.mu_b
+
+    @property
+    def regularised(self) -> bool:
+        return self.power != 1
+
+    @property
+    def smallest(self) -> float:
+        return min(self.mu_t, self.mu_f, self.mu_b)
+
+    @property
+    def largest(self) -> float:
+        return max(self.mu_t, self.mu_f, self.mu_b)
+
+    @property
+    def label(self) -> str:
+        return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g}) x speed^{self.power:g}"
+
+    def describe(self) -> str:
+        each = f"{self.mu_t:g} sideways, {self.mu_f:g} forwards, {self.mu_b:g} backwards"
+        return f"{each}, times the speed to the power {self.power:g}"
+
+    def in_units_of(self, unit: float) -> PowerLaw:
+        return PowerLaw(self.power, self.mu_t / unit, self.mu_f / unit, self.mu_b / unit)
+
+    def in_speeds_of(self, unit: float) -> PowerLaw:
+        return self.in_units_of(unit**-self.power)
+
+    def _tangential(self, vs: Array) -> Array:
+        return self.mu_f if self.reversible else namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
+        growth = regularised_speed(vs, vn, delta) ** (self.power - 1.0)
+        return -self._tangential(vs) * vs * growth, -self.mu_t * vn * growth
+
+    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        growth = regularised_speed(vs, vn, delta) ** (self.power - 1.0)
+        # above degree 1 the force outgrows its secant
+        growth = growth * max(1.0, self.power)
+        zero = 0.0 * growth
+        return (self._tangential(vs) * growth, zero), (zero, self.mu_t * growth)
+
+    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        r = regularised_speed(vs, vn, delta)
+        es, en, ed, growth, p = vs / r, vn / r, delta / r, r ** (self.power - 1.0), self.power
+        along, across = self._tangential(vs) * growth, self.mu_t * growth
+        oblique = (p - 1.0) * es * en
+        return (
+            (along * (p * es * es + en * en + ed * ed), along * oblique),
+            (across * oblique, across * (es * es + p * en * en + ed * ed)),
+        )
+
+    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
+        return self.mu_t / (self.power + 1.0) * regularised_speed(vs, vn, delta) ** (self.power + 1.0)

@@ -1,0 +1,267 @@
+"""What every law of friction has to be: dissipative, the same in any frame, integrated along links as at points."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from colloc.bounds.sampled import QUICK, bound_key
+from colloc.bounds.sampling import Domain
+from colloc.gaits.gait_fields import LAWS, law_fields, law_from
+from colloc.laws.elliptic import Elliptic
+from colloc.laws.own_law import OwnLaw
+from colloc.laws.power_law import PowerLaw
+from colloc.laws.viscous import Viscous
+from colloc.mechanics.balance import balance_jacobian, instant
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.smooth.modal_body import ModalBody
+
+LENGTHS = Chain().length_column()
+OWN = OwnLaw("-where(vs > 0, 1, 1.5)*vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))")
+EVERY = [Friction(2.0, 1.0, 1.5), Elliptic(2.0, 1.0, 1.5), Viscous(1.8, 1.0), PowerLaw(0.4, 2.0, 1.0, 1.5), OWN]
+ASSOCIATED = [Elliptic(0.3, 1.0, 4.0), Viscous(1.8, 1.0), PowerLaw(0.4, 1.5, 1.5, 1.5)]
+each = pytest.mark.parametrize("law", EVERY, ids=lambda law: type(law).__name__)
+each_associated = pytest.mark.parametrize("law", ASSOCIATED, ids=lambda law: type(law).__name__)
+
+
+def moving_links(seed, count=40):
+    """Velocities of three links over some decades, ``(3, count)`` each."""
+    rng = np.random.default_rng(seed)
+    return 10 ** rng.uniform(-3, 1, (3, 3, count)) * rng.choice([-1, 1], (3, 3, count))
+
+
+def instants(seed, count=12):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1.5, 1.5, (2, count)), rng.normal(size=(2, count))
+
+
+@each
+def test_friction_opposes_the_motion_and_does_not_tell_left_from_right(law):
+    vs, vn, _ = moving_links(1)
+    fs, fn = law.density(vs, vn, 1e-3)
+    assert (fs * vs + fn * vn < 0).all()
+    np.testing.assert_array_equal(law.density(vs, -vn, 1e-3), [fs, -fn])
+
+
+@each
+def test_a_law_in_other_units_is_the_same_law(law):
+    vs, vn, _ = moving_links(2)
+    force = np.array(law.density(vs, vn, 1e-2))
+    np.testing.assert_allclose(law.in_speeds_of(4.0).density(vs / 4, vn / 4, 1e-2 / 4), force, rtol=1e-13)
+    np.testing.assert_allclose(law.in_units_of(3.0).density(vs, vn, 1e-2), force / 3, rtol=1e-13)
+    if law.degree is not None:
+        np.testing.assert_allclose(law.density(2 * vs, 2 * vn, 2e-2), 2**law.degree * force, rtol=1e-13)
+    if law.reversible:
+        np.testing.assert_allclose(law.density(-vs, -vn, 1e-2), -force, rtol=1e-13)
+
+
+@each
+def test_forces_on_links_are_integrals_of_the_force_on_points(law):
+    velocity = moving_links(3, 4)
+    force = law.link_force(*velocity, LENGTHS, 1e-3)
+    for link, t in np.ndindex(3, 4):
+        vs, vn, w = velocity[:, link, t]
+        half = 0.5 * LENGTHS[link, 0]
+        kinks = [p for p in (-vn / w,) if abs(p) < half]
+
+        def at(sigma, vs=vs, vn=vn, w=w):
+            fs, fn = law.density(np.array([[vs]]), np.array([[vn + w * sigma]]), 1e-3)
+            return np.array([fs[0, 0], fn[0, 0], sigma * fn[0, 0]])
+
+        for k, whole in enumerate(force):
+            scale, settings = max(abs(f[link, t]) for f in force), {"points": kinks or None, "limit": 400}
+            expected = quad(lambda s, k=k, at=at: at(s)[k], -half, half, epsabs=1e-12 * scale, full_output=1, **settings)[0]
+            assert abs(whole[link, t] - expected) < 1e-8 * scale
+
+
+@each
+def test_jacobians_are_the_derivatives(law):
+    velocity, step = moving_links(4), 1e-6
+    for matrix, force, v in (
+        (law.density_jacobian(*velocity[:2], 0.05), lambda v: law.density(*v, 0.05), velocity[:2]),
+        (law.link_jacobian(*velocity, LENGTHS, 0.05), lambda v: law.link_force(*v, LENGTHS, 0.05), velocity),
+    ):
+        for j, shift in enumerate(step * np.eye(len(v))[:, :, None, None] * np.abs(v).max(axis=0)):
+            numeric = (np.array(force(v - shift)) - np.array(force(v + shift))) / (2 * np.abs(shift[j]))
+            found = np.array([np.broadcast_to(row[j], v[0].shape) for row in matrix])
+            np.testing.assert_allclose(found, numeric, atol=1e-6 * max(1.0, np.abs(found).max()))
+
+
+@each
+def test_numpy_and_casadi_evaluate_one_statement(law):
+    velocity = moving_links(5, 1)
+    given = [ca.DM(v) for v in velocity]
+    names = [ca.SX.sym(name, 3) for name in ("vs", "vn", "w")]
+    force = ca.Function("force", names, list(law.link_force(*names, LENGTHS, 1e-3)))(*given)
+    np.testing.assert_allclose([f.full() for f in force], law.link_force(*velocity, LENGTHS, 1e-3), rtol=1e-11, atol=1e-13)
+    held = law.scaled_laws(*names, LENGTHS, 1e-3, law.link_force(*names, LENGTHS, 1e-3))
+    assert np.abs(np.array([f.full() for f in ca.Function("held", names, held)(*given)])).max() < 1e-9
+
+
+@each
+def test_a_balanced_body_pays_with_its_joints_what_friction_takes_whatever_end_it_is_named_from(law):
+    body, (angles, rates) = Chain(), instants(6)
+
+    def moved(angles, rates):
+        solved = body.solve(law, angles, rates, 1e-3).require()
+        return body.motion(law, angles, rates, 1e-3, solved)
+
+    now = moved(angles, rates)
+    np.testing.assert_allclose(now.actuator_power, now.power, rtol=1e-8)
+    assert (now.power > 0).all()
+    mirrored = moved(-angles, -rates)
+    np.testing.assert_allclose(mirrored.power, now.power, rtol=1e-7)
+    if law.reversible:
+        swapped = moved(-angles[::-1], -rates[::-1])
+        np.testing.assert_allclose(swapped.power, now.power, rtol=1e-7)
+        np.testing.assert_allclose(np.linalg.norm(swapped.centre, axis=0), np.linalg.norm(now.centre, axis=0), rtol=1e-7)
+
+
+@each
+def test_slopes_of_the_motion_are_those_of_finite_differences(law):
+    body, (angles, rates), h = Chain(), instants(7, 3), 1e-6
+    y = np.concatenate([angles, rates])
+
+    def motion(y):
+        solved = body.solve(law, y[:2], y[2:], 1e-2, tolerance=1e-13)
+        now = body.motion(law, y[:2], y[2:], 1e-2, solved)
+        return solved, np.concatenate([now.z, now.centre, now.power[None]])
+
+    slopes = body.slopes(law, y[:2], y[2:], 1e-2, motion(y)[0])
+    for j, step in enumerate(h * np.eye(4)[:, :, None]):
+        numeric = (motion(y + step)[1] - motion(y - step)[1]) / (2 * h)
+        np.testing.assert_allclose(slopes[:, j], numeric, atol=2e-5 * np.abs(slopes).max())
+
+
+@each_associated
+def test_an_associated_law_is_the_gradient_of_a_convex_function(law):
+    velocity, h = moving_links(8), 1e-6
+    jacobian = np.array(
+        [[np.broadcast_to(e, velocity[0].shape) for e in row] for row in law.link_jacobian(*velocity, LENGTHS, 0.1)]
+    )
+    np.testing.assert_allclose(jacobian, jacobian.swapaxes(0, 1), atol=1e-12 * np.abs(jacobian).max())
+    assert np.linalg.eigvalsh(np.moveaxis(jacobian, (0, 1), (-2, -1))).min() > 0
+    force = law.link_force(*velocity, LENGTHS, 0.1)
+    for j, shift in enumerate(h * np.eye(3)[:, :, None, None] * np.abs(velocity).max(axis=0)):
+        ahead, behind = (law.link_potential(*(velocity + sign * shift), LENGTHS, 0.1) for sign in (1, -1))
+        np.testing.assert_allclose((ahead - behind) / (2 * np.abs(shift[j])), -force[j], atol=1e-6 * np.abs(force[j]).max())
+
+
+def test_where_coulomb_friction_leaves_three_motions_the_elliptic_law_leaves_one():
+    body, angles, rates = Chain(), np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
+    several = body.all_velocities(Friction(1, 0.01, 100), angles, rates, 1e-4)
+    assert several.number.tolist() == [3]
+    law = Elliptic(1, 0.01, 100)
+    found = [body.solve(law, angles, rates, 1e-4, start=z).require() for z in several.z]
+    for one in found:
+        np.testing.assert_allclose(one.z, found[0].z, atol=1e-6)
+    at = instant(body, law, angles, rates, found[0].z, 1e-4)
+    assert np.linalg.eigvalsh(balance_jacobian(body, law, at.posture, at.velocity, np.full((1, 1), 1e-4))).min() > 0
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.7])
+def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_last_digit(mu):
+    body, (angles, rates) = Chain(), instants(9, 40)
+    for law_of in (Friction, Elliptic):
+        law = law_of(mu, mu, mu)
+        solved = body.solve(law, angles, rates, 1e-6).require()
+        found = [solved.z, body.motion(law, angles, rates, 1e-6, solved).power, body.slopes(law, angles, rates, 1e-6, solved)]
+        if law_of is Friction:
+            expected = found
+    for a, b in zip(expected, found, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_bounds_of_the_two_laws_are_kept_apart():
+    keys = {bound_key(Domain(Chain(), law, 3.0), QUICK) for law in (Friction(2, 1, 1), Elliptic(2, 1, 1))}
+    assert len(keys) == 2
+
+
+def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
+    for vs, vn in ((2.0, 0.0), (-2.0, 0.0), (0.0, 3.0)):
+        at = np.array([[vs]]), np.array([[vn]]), 1e-12
+        np.testing.assert_allclose(Elliptic(2, 1, 5).density(*at), Friction(2, 1, 5).density(*at), rtol=1e-14)
+
+
+@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
+def test_the_kernel_knows_the_elliptic_law():
+    body, law, (angles, rates) = Chain(), Elliptic(3.0, 1.0, 2.0), instants(10, 60)
+    assert native_kernel(body, law) is not None
+    assert native_kernel(body, Viscous()) is None
+
+    def found():
+        solved = body.solve(law, angles, rates, 1e-5, tolerance=1e-13)
+        return solved.z, body.slopes(law, angles, rates, 1e-5, solved)
+
+    compiled = found()
+    with numpy_instead():
+        for a, b in zip(compiled, found(), strict=True):
+            np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("law", [Viscous(), PowerLaw(0.5, 2.0), OWN], ids=lambda law: type(law).__name__)
+def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
+    body, rng = ModalBody(), np.random.default_rng(14)
+    at = law, 0.3 * rng.normal(size=(body.n_joint, 2)), 5.0 * rng.normal(size=(body.n_joint, 2)), 0.1
+    solved = body.motion(*at, body.solve(*at).require())
+    replayed = body.replayed(*at, None)[0]
+    # fixed panels resolve an instant like these to some 1e-3, whatever the law
+    np.testing.assert_allclose(replayed.power, solved.power, rtol=5e-3)
+    for motion in (solved, replayed):
+        np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-6)
+
+
+def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
+    """The kernel treats it alone; no law is asked in Python but for its coefficients."""
+    angles, rates = np.array([[0.5, -1.2], [0.2, 0.7]]), np.array([[1.0, 0.3], [-2.0, 1.5]])
+    law, body = Friction(1.7, 1.0, 1.3), Chain()
+    expected = [  # before other laws were known
+        [0.0111061444960639, 0.0153392649399081],
+        [0.0299279046686109, 0.1135819154364744],
+        [-0.2696918937274128, -0.5554178355603785],
+    ]
+    with numpy_instead():
+        by_numpy = body.solve(law, angles, rates, 1e-4).require()
+    np.testing.assert_allclose(by_numpy.z, expected, rtol=1e-12)
+    if native_kernel() is not None:
+        for name in ("link_force", "link_jacobian", "link_secant", "link_potential", "density"):
+            monkeypatch.delattr(Friction, name)
+        compiled = body.solve(law, angles, rates, 1e-4).require()
+        np.testing.assert_allclose(compiled.z, expected, rtol=1e-12)
+        assert body.slopes(law, angles, rates, 1e-4, compiled).shape == (6, 4, 2)
+
+
+def test_viscous_motion_is_linear_in_the_rates():
+    body, law, (angles, rates) = Chain(), Viscous(), instants(11)
+    other = np.random.default_rng(12).normal(size=rates.shape)
+    one, two, both = (body.solve(law, angles, r, 1e-4) for r in (rates, other, rates - 3 * other))
+    np.testing.assert_allclose(both.z, one.z - 3 * two.z, atol=1e-13)
+    assert both.iterations.max() == 1
+
+
+def test_the_power_law_ends_in_drag_and_in_coulomb_friction():
+    body, (angles, rates) = Chain(), instants(13)
+    mu = {"mu_t": 2.0, "mu_f": 1.0, "mu_b": 1.0}
+
+    def power(law, delta=1e-6):
+        return body.motion(law, angles, rates, delta, body.solve(law, angles, rates, delta).require()).power
+
+    drag, dry = power(Viscous(2.0, 1.0)), power(Friction(**mu))
+    np.testing.assert_allclose(power(PowerLaw(1.0, **mu)), drag, rtol=1e-12)
+    np.testing.assert_allclose(power(PowerLaw(0.0, **mu)), dry, rtol=1e-9)
+    # smooth across 1: differences on both sides are equal and opposite to first order
+    above, below = (power(PowerLaw(1.0 + h, **mu)) - drag for h in (1e-4, -1e-4))
+    np.testing.assert_allclose(above, -below, atol=1e-3 * np.abs(above).max())
+    ratio = (power(PowerLaw(2e-3, **mu)) - dry) / (power(PowerLaw(1e-3, **mu)) - dry)
+    np.testing.assert_allclose(ratio, 2.0, atol=0.05)
+
+
+@pytest.mark.parametrize("law", [*EVERY, Friction()], ids=lambda law: type(law).__name__)
+def test_a_law_is_kept_in_files(law):
+    assert isinstance(law, Law)
+    assert type(law) in LAWS
+    assert law_from(law_fields(law)) == law
+    assert ("law" in law_fields(law)) == (type(law) is not Friction)

@@ -1,0 +1,122 @@
+"""Purcell's swimmer, the body whose pace matters: strokes against an independent integration, and a certified optimum."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from benchmarks.peers import drag
+from colloc.bounds.optimality_gap import gap_line
+from colloc.commands.solve import summary_lines
+from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.problem import Problem
+from colloc.gaits.problem_file import load_problem
+from colloc.laws.power_law import PowerLaw
+from colloc.laws.viscous import Viscous
+from colloc.mechanics.body import Chain
+from colloc.pictures.report_page import report_page
+from colloc.results.store import load, save
+from colloc.search.optimise import maximise_efficiency
+from colloc.system.errors import ProblemError
+from colloc.verification.replay import replay
+
+ROOT = Path(__file__).resolve().parents[2]
+LAW, CORNERS = Viscous(normal=drag.NORMAL, tangential=drag.TANGENTIAL), (0.25, 0.5, 0.75)
+
+
+def square(amplitude):
+    """Purcell's stroke: the joints take turns, so that the angles run round a square."""
+
+    def path(t):
+        side = np.minimum((np.asarray(t) * 4).astype(int), 3)
+        s = np.asarray(t) * 4 - side
+        ramps = np.array([[1, 1 - 2 * 0, -1, -1], [1, -1, -1, 1]])
+        start = amplitude * np.array([[-1, 1, 1, -1], [1, 1, -1, -1]])[:, side]
+        step = 2 * amplitude * np.array([[1, 0, -1, 0], [0, -1, 0, 1]])[:, side]
+        del ramps
+        return start + step * s, 4 * step
+
+    return path
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 0.9])
+def test_purcells_square_stroke_goes_as_far_as_an_independent_integration_says(amplitude):
+    path = square(amplitude)
+    measured = replay(Chain(), LAW, path, 1e-4, breaks=CORNERS, instants=160, tolerance=1e-9)
+
+    def rates(t, state):
+        angles, turning = (a[:, 0] for a in path(np.array([t])))
+        R = drag.resistance(state[2], angles)
+        rigid = -np.linalg.solve(R[:3, :3], R[:3, 3:] @ turning)
+        whole = np.concatenate([rigid, turning])
+        return [*rigid, whole @ R @ whole]
+
+    def centre(state, t):
+        angles, theta = path(np.array([t]))[0][:, 0], state[2]
+        ends = [np.array([np.cos(a), np.sin(a)]) / 6 for a in (theta - angles[0], theta, theta + angles[1])]
+        return state[:2] + (-(ends[1] + ends[0]) + (ends[1] + ends[2])) / 3
+
+    state = np.zeros(4)
+    begin = centre(state, 0.0)
+    for a, b in zip((0.0, *CORNERS), (*CORNERS, 1.0), strict=True):
+        inside = solve_ivp(lambda t, y, a=a, b=b: rates(min(max(t, a), b - 1e-12), y), (a, b), state, rtol=1e-10, atol=1e-12)
+        state = inside.y[:, -1]
+    assert np.linalg.norm(centre(state, 0.0) - begin) == pytest.approx(measured.distance, rel=1e-7)
+    assert state[3] == pytest.approx(measured.work, rel=1e-7)
+    assert state[2] == pytest.approx(measured.rotation, abs=1e-8)
+
+
+def test_the_path_decides_how_far_a_viscous_body_goes_and_the_pace_what_it_costs():
+    gait = ellipse(0.2, 0.9, 0.7)
+
+    def at_pace(wobble):
+        def path(t):
+            phase = t + wobble * np.sin(2 * np.pi * t) / (2 * np.pi)
+            return gait.angles(phase), gait.rates(phase) * (1 + wobble * np.cos(2 * np.pi * t))
+
+        return replay(Chain(), LAW, path, 1e-4, instants=160, tolerance=1e-9)
+
+    even, uneven = at_pace(0.0), at_pace(0.6)
+    assert uneven.distance == pytest.approx(even.distance, rel=1e-8)
+    assert uneven.work > 1.1 * even.work
+
+
+def test_a_retraced_stroke_goes_nowhere():
+    measured = replay(Chain(), LAW, lambda t: (np.sin(2 * np.pi * t) * np.array([[1.0], [0.4]]),
+                                               2 * np.pi * np.cos(2 * np.pi * t) * np.array([[1.0], [0.4]])), 1e-4)  # fmt: skip
+    assert measured.distance < 1e-14
+
+
+def test_purcells_swimmer_is_solved_certified_kept_and_read(tmp_path):
+    solution = maximise_efficiency(load_problem(ROOT / "problems/purcell.py"))
+    assert solution.status == "solved"
+    assert solution.measured.value == pytest.approx(0.0115705, abs=1e-7)
+    read = load(save(solution, tmp_path / "purcell.h5"))
+    assert read.problem.hash == solution.problem.hash
+    assert read.problem.friction == LAW
+    assert "as work depends on the pace under drag (2, 1)" in "\n".join(summary_lines(solution, None))
+    assert "the work depends on the pace" in report_page(solution)
+    assert "no upper bound" in gap_line(solution.problem.with_(objective="efficiency"), 0.1, None)
+
+
+def test_harmonics_settle_the_pace_and_more_of_them_come_closer_to_the_best_one_constant_power():
+    problem = load_problem(ROOT / "problems/purcell.py")
+    spread = []
+    for harmonics, best in ((1, 0.0115705), (3, 0.0123108)):
+        solution = maximise_efficiency(problem.with_(gait=Harmonic(harmonics, "antipodal")))
+        assert solution.status == "solved"
+        assert solution.measured.value == pytest.approx(best, abs=1e-7)
+        power = solution.power(solution.sample(np.arange(64) / 64))
+        spread.append(power.std() / power.mean())
+    assert spread[1] < 0.5 * spread[0]
+
+
+def test_classes_that_leave_the_pace_open_are_refused_where_it_matters():
+    for law in (LAW, PowerLaw(0.5)):
+        for gait in (FreePath(2.0), Polygon(6)):
+            with pytest.raises(ProblemError, match="the work depends on it; use Harmonic"):
+                Problem("paced", friction=law, gait=gait)
+    with pytest.raises(ProblemError, match="scallop theorem"):
+        Problem("scallop", body=Chain((0.5, 0.5)), friction=LAW, gait=Harmonic(2))
