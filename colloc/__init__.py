@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
     from colloc.smooth.concertina import Concertina
+    from colloc.smooth.crawler_body import CrawlerBody
     from colloc.smooth.modal_body import ModalBody
     from colloc.smooth.prescribed_body import Wave
     from colloc.studies.calls import Starts, multistart, solve, sweep
@@ -53,6 +54,7 @@ _HOME = {
     "mechanics.body": ("Chain",),
     "smooth.modal_body": ("ModalBody",),
     "smooth.concertina": ("Concertina",),
+    "smooth.crawler_body": ("CrawlerBody",),
     "smooth.prescribed_body": ("Wave",),
     "mechanics.friction": ("Friction",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
@@ -78,6 +80,7 @@ __all__ = [
     "CollocError",
     "Concertina",
     "Corners",
+    "CrawlerBody",
     "Fourier",
     "FreePath",
     "Friction",

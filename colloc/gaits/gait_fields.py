@@ -17,6 +17,7 @@ from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
 from colloc.smooth.concertina import Concertina
+from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
 
@@ -26,7 +27,7 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases)
 CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
-BODIES: list[type] = [Chain, ModalBody, Concertina, Wave]
+BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 
 

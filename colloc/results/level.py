@@ -39,6 +39,8 @@ class Level:
     program : str
         What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
         formulation; "prescribed" where nothing is free.
+    panels : int
+        Of the body's quadrature, which refinement may have doubled; 0 for the problem's.
     """
 
     delta: float
@@ -59,6 +61,7 @@ class Level:
     evaluation_seconds: float
     scheme: str = ""
     program: str = REDUCED
+    panels: int = 0
 
     def __repr__(self) -> str:
         verdict = "" if self.optimal else f", {self.status}"

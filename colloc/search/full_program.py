@@ -53,6 +53,7 @@ def level_found(found: Found) -> Level:
         found.seconds,
         found.seconds,
         space.mesh.scheme.name,
+        panels=problem.body.panels,
     )
 
 
@@ -79,6 +80,7 @@ def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -
         result.evaluation_seconds,
         program.mesh.scheme.name,
         name,
+        program.problem.body.panels,
     )
 
 
@@ -96,7 +98,7 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     """
     space, delta = found.space, found.delta
     problem = space.problem.with_(scheme=space.mesh.scheme.name)
-    program = transcribed(problem, found.gait, space.mesh.edges, space.far)
+    program = transcribed(problem, found.gait, space.phase_mesh(found.gait).edges, space.far)
     x = feasible_point(program, space.full_parameters(found.v), delta)
     program = heading(program, x)
     solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
