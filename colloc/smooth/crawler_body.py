@@ -4,10 +4,11 @@ On an arc of length ``w = 2 epsilon share``, centred at ``1/2 + w C``, the tange
 
     Theta = sum_m b_m phi_m(x),    phi_m = (1 - x^2)^3 T_m(x),    x = 2 (s - 1/2)/w - 2 C in [-1, 1],
 
-and zero elsewhere. The bump's place is a point on a circle, ``C = reach cos(pi p / LAP)``: it stays in its region whatever p
-is, at the rear end for p = LAP and -LAP, at the front end for p = 0. So a crawler is a closed path of ``(p, b_0, b_1, ...)``
-whose second half mirrors the first, ``q(t + 1/2) = -q(t)``: a bump grows at the rear (p = LAP), travels (p falls to 0) and is
-flattened at the front; while the body is straight, p falls to -LAP, at no cost; there the mirrored bump begins.
+and zero elsewhere; phi_1 is scaled to be `colloc.smooth.concertina.odd_profile`. The bump's place is a point on a circle,
+``C = reach cos(pi p / LAP)``: it stays in its region whatever p is, at the rear end for p = LAP and -LAP, at the front end for
+p = 0. So a crawler is a closed path of ``(p, b_0, b_1, ...)`` whose second half mirrors the first, ``q(t + 1/2) = -q(t)``: a
+bump grows at the rear (p = LAP), travels (p falls to 0) and is flattened at the front; while the body is straight, p falls to
+-LAP, at no cost; there the mirrored bump begins.
 """
 
 from __future__ import annotations
@@ -17,14 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
+from colloc.smooth.concertina import ODD_SCALE
 from colloc.smooth.curve import Panels
 from colloc.smooth.panel_body import PanelBody
 from colloc.system.errors import ProblemError
 
 LAP = 1.3
 """What the way through the region counts, against radians of amplitude, in the length of a path."""
-ODD = -(7**3.5) / 6**3
-"""Scale of the first odd profile, whose largest value becomes 1 (`colloc.smooth.concertina.odd_profile`)."""
 _PLACES = 95
 """Along the bump, at which its tangent angle is bounded: modes of low degree exceed the bound little in between."""
 
@@ -112,7 +112,7 @@ class CrawlerBody(PanelBody):
         value = slope = curvature = 0.0
         for m in range(self.modes):
             t, dt, ddt = (_chebyshev(m, order, xp.where(inside, x, 0.0 * x)) for order in (0, 1, 2))
-            amplitude = b[m : m + 1, :] * (ODD if m == 1 else 1.0)
+            amplitude = b[m : m + 1, :] * (-ODD_SCALE if m == 1 else 1.0)
             value += amplitude * y**3 * t
             slope += amplitude * (y**3 * dt - 6 * x * y**2 * t)
             curvature += amplitude * (y**3 * ddt - 12 * x * y**2 * dt + (24 * x * x * y - 6 * y**2) * t)

@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.modes import Modes
-from colloc.smooth.motion import Motion
 from colloc.smooth.panel_body import PanelBody
 
 _PLACES_A_MODE = 4
 """Where on the body |Theta| is bounded."""
-
-
-class Shapes(Protocol):
-    """A gait of the modes' amplitudes."""
-
-    def angles(self, t: np.ndarray) -> np.ndarray: ...
-
-    def rates(self, t: np.ndarray) -> np.ndarray: ...
 
 
 class ModalBody(Modes, PanelBody):
@@ -94,16 +83,3 @@ class ModalBody(Modes, PanelBody):
     @property
     def bending(self) -> np.ndarray:
         return np.diff(self.limited, axis=0)
-
-    def gait_motion(self, gait: Shapes, antipodal: bool) -> Motion:
-        """The motion Theta(s, t) of a gait of the modes' amplitudes."""
-
-        def wide(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-            return np.broadcast_to(s, (len(s), t.size))
-
-        return Motion(
-            lambda s, t: self.tangent(wide(s, t), gait.angles(t)),
-            lambda s, t: self.tangent(wide(s, t), gait.rates(t)),
-            stages=(0.0, 0.5) if antipodal else (0.0, 1.0),
-            antipodal=antipodal,
-        )
