@@ -124,7 +124,7 @@ def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
     solution = optimum(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
     assert solution.last.optimal
     assert not is_trivial(solution)
-    assert irreversibility(solution.gait) > 0.1
+    assert phase_distance(solution.gait, reversed_in_time(solution.gait)) > 0.1
 
 
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
