@@ -1,7 +1,8 @@
 """Optimised against prescribed concertina crawlers, epsilon falling: python -m scripts.optimise_crawlers [epsilon ...].
 
 Both may use tangent angles up to 1.5 rad within the same region, and both are replayed at the delta that belongs to epsilon.
-The optimum is that at a softer delta; every one starts from the optimum at the epsilon before, so delta falls along.
+The optimum is that at a softer delta, on the class's coarsest mesh; every one starts from the optimum at the epsilon before, so
+delta falls along. `colloc solve problems/crawler.py` refines and certifies one of them.
 """
 
 import argparse
@@ -12,15 +13,18 @@ import numpy as np
 
 from colloc.gaits.paths import Corners
 from colloc.mechanics.friction import Friction
-from colloc.search.optimise import maximise_efficiency
+from colloc.reduced.spaces import space_near
+from colloc.search.reduced_search import FIRST_RADIUS, ROUGH, settled
 from colloc.smooth.concertina import Concertina
-from colloc.smooth.crawler_body import CrawlerBody
+from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.verification.replay import Replay, replay
 from problems import crawler
 from scripts.figures_smooth import crawler_comparison
 from scripts.models.epsilon_study import Crawler, delta_for
 
-EPSILONS, ANGLE, SOFTER, ACCURACY = (0.1, 0.05, 0.02, 0.01), 1.5, 16, 1e-4
+EPSILONS, ANGLE, SOFTER, ACCURACY = (0.1, 0.05, 0.02, 0.01), 1.5, 32, 1e-4
+LENGTH = 2 * (LAP + 2 * ANGLE)
+"""Of the paper's crawler in shape space, less its return while straight: delta per period over it is that at unit speed."""
 
 
 def replayed(body: CrawlerBody, gait: Corners, delta: float) -> Replay:
@@ -38,20 +42,25 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("results/figures"), help="folder of the figure")
     options = parser.parse_args()
     rows, gait = [], crawler.PROBLEM.guess
-    print(f"{'epsilon':>8} {'prescribed':>11} {'+-':>8} {'optimised':>11} {'+-':>8} {'loss ratio':>10} {'CPU s':>8}  optimum")
+    print(
+        f"{'epsilon':>8} {'prescribed':>11} {'+-':>8} {'optimised':>11} {'+-':>8} {'loss ratio':>10} {'KKT error':>9} "
+        f"{'softer':>11} {'replay gap':>10} {'CPU s':>6}"
+    )
     for epsilon in options.epsilons:
         body, delta = CrawlerBody(epsilon), delta_for(epsilon)
         prescribed = Crawler(Concertina(epsilon=epsilon, amplitude=ANGLE), Friction(), delta).measured_period(intervals=2)
-        clock, soft = time.process_time(), SOFTER * delta / gait.length
-        stated = crawler.PROBLEM.with_(body=body, guess=gait, delta=soft, delta_start=soft, joint_limit=ANGLE)
-        found = maximise_efficiency(stated)
+        clock, soft = time.process_time(), SOFTER * delta / LENGTH
+        sides = crawler.PROBLEM.gait.corners
+        stated = crawler.PROBLEM.with_(body=body, guess=gait, delta=soft, delta_start=soft, joint_limit=ANGLE, intervals=sides)
+        space, v = space_near(stated, gait)
+        found = settled(space, v, soft, FIRST_RADIUS, ROUGH)
         seconds, gait = time.process_time() - clock, found.gait
-        best = replayed(body, gait, delta)
+        near, best = (replayed(body, gait, at) for at in (SOFTER * delta, delta))
         ratio = (1 / best.efficiency - 1) / (1 / prescribed.efficiency - 1)
         print(
             f"{epsilon:8.3g} {prescribed.efficiency:11.7f} {prescribed.errors['efficiency']:8.1e} {best.efficiency:11.7f} "
-            f"{best.efficiency * best.error:8.1e} {ratio:10.4f} {seconds:8.1f}  {found.status} at delta = "
-            f"{found.delta_per_period:.1e} {found.message}",
+            f"{best.efficiency * best.error:8.1e} {ratio:10.4f} {found.conditions.kkt_error:9.1e} {near.efficiency:11.7f} "
+            f"{-found.objective / near.efficiency - 1:10.1e} {seconds:6.1f}",
             flush=True,
         )
         rows.append((epsilon, prescribed.efficiency, best.efficiency))
