@@ -17,3 +17,4 @@ PROBLEM = Problem(
     delta=5e-5,
     delta_start=5e-5,
 )
+STARTS = 1  # the optimum that this guess leads to
