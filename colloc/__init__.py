@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
     from colloc.smooth.concertina import Concertina
+    from colloc.smooth.crawler_body import CrawlerBody
     from colloc.smooth.modal_body import ModalBody
     from colloc.smooth.prescribed_body import Wave
     from colloc.studies.calls import Starts, multistart, solve, sweep
@@ -60,6 +61,7 @@ _HOME = {
     "mechanics.body": ("Chain",),
     "smooth.modal_body": ("ModalBody",),
     "smooth.concertina": ("Concertina",),
+    "smooth.crawler_body": ("CrawlerBody",),
     "smooth.prescribed_body": ("Wave",),
     "mechanics.friction": ("Friction",),
     "laws.elliptic": ("Elliptic",),
@@ -90,6 +92,7 @@ __all__ = [
     "CollocError",
     "Concertina",
     "Corners",
+    "CrawlerBody",
     "Elliptic",
     "Fourier",
     "FreePath",

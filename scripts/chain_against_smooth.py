@@ -11,9 +11,9 @@ import numpy as np
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import sine_wave
-from colloc.smooth.period import measured_period
 from scripts.figures_smooth import chain_convergence
 from scripts.models.chain_study import chain_period
+from scripts.models.period import measured_period
 
 LINKS = (10, 20, 40, 80, 160, 320)
 FRICTIONS = (Friction(), Friction(10.0, 1.0, 1.0), Friction(100.0, 1.0, 1.0))

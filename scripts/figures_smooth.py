@@ -7,23 +7,23 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 
+from colloc.gaits.paths import Corners
 from colloc.pictures.style import BLUE, GREEN, VERMILION, save, styled, subplots
-from colloc.smooth.bump_body import BumpBody
-from colloc.smooth.motion import Motion
+from colloc.smooth.crawler_body import CrawlerBody
 
 
-def _region_curves(motion: Motion, body: BumpBody, times: np.ndarray) -> np.ndarray:
+def _region_curves(body: CrawlerBody, gait: Corners, times: np.ndarray) -> np.ndarray:
     """The bump region at some times seen from its rear end, in units of epsilon, ``(n, n_time)`` complex."""
     s = np.linspace(0.5 - body.epsilon, 0.5 + body.epsilon, 801)
-    angle = motion.angle(s[:, None] * np.ones((1, times.size)), times)
+    angle = body.angle(s, gait.angles(times))
     steps = 0.5 * (np.exp(1j * angle[1:]) + np.exp(1j * angle[:-1])) * (s[1] - s[0]) / body.epsilon
     return np.concatenate([np.zeros((1, times.size)), np.cumsum(steps, axis=0)])
 
 
 def crawler_comparison(
-    body: BumpBody,
-    prescribed: np.ndarray,
-    optimised: np.ndarray,
+    body: CrawlerBody,
+    prescribed: Corners,
+    optimised: Corners,
     epsilons: np.ndarray,
     efficiencies: dict[str, np.ndarray],
     folder: Path,
@@ -32,9 +32,9 @@ def crawler_comparison(
 
     Parameters
     ----------
-    body : BumpBody
-    prescribed, optimised : (body.n, n + 1)
-        Coordinates at the nodes of the two crawlers to draw.
+    body : CrawlerBody
+    prescribed, optimised : Corners
+        The two crawlers to draw.
     epsilons : (k,)
     efficiencies : dict of str to (k,)
         For "prescribed" and "optimised".
@@ -45,8 +45,8 @@ def crawler_comparison(
         figure.suptitle("The bump region at phases from 0 to 1/2", x=0.02, ha="left", fontsize=9)
         times = np.linspace(0.0, 0.4999, 9)
         colours = colormaps["viridis"](np.linspace(0.0, 0.9, times.size))
-        for ax, vertices, title in zip(axes, (prescribed, optimised), ("A  prescribed", "B  optimised"), strict=False):
-            curves = _region_curves(body.motion(vertices), body, times)
+        for ax, gait, title in zip(axes, (prescribed, optimised), ("A  prescribed", "B  optimised"), strict=False):
+            curves = _region_curves(body, gait, times)
             for k, colour in enumerate(colours):
                 ax.plot(curves[:, k].real, curves[:, k].imag - 0.75 * k, color=colour, lw=1.6)
                 ax.text(-0.12, -0.75 * k, f"{times[k]:.2f}", ha="right", va="center", fontsize=7)

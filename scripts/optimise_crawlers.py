@@ -1,7 +1,8 @@
 """Optimised against prescribed concertina crawlers, epsilon falling: python -m scripts.optimise_crawlers [epsilon ...].
 
-Both may use tangent angles up to 1.5 rad within the same region, and both are replayed by the general smooth-body solver at
-the delta that belongs to epsilon. The optimum is that at a softer delta, where first-order conditions can be met.
+Both may use tangent angles up to 1.5 rad within the same region, and both are replayed at the delta that belongs to epsilon.
+The optimum is that at a softer delta, on the class's coarsest mesh; every one starts from the optimum at the epsilon before, so
+delta falls along. `colloc solve problems/crawler.py` refines and certifies one of them.
 """
 
 import argparse
@@ -10,14 +11,29 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.gaits.paths import Corners
 from colloc.mechanics.friction import Friction
-from colloc.search.bump_optimum import best_start, optimise_bump, prescribed_vertices
-from colloc.smooth.bump_body import BumpBody
+from colloc.reduced.spaces import space_near
+from colloc.search.reduced_search import FIRST_RADIUS, ROUGH, settled
 from colloc.smooth.concertina import Concertina
+from colloc.smooth.crawler_body import LAP, CrawlerBody
+from colloc.verification.replay import Replay, replay
+from problems import crawler
 from scripts.figures_smooth import crawler_comparison
 from scripts.models.epsilon_study import Crawler, delta_for
 
-EPSILONS, PIECES, ANGLE, SOFTER = (0.1, 0.05, 0.02, 0.01), 12, 1.5, 32
+EPSILONS, ANGLE, SOFTER, ACCURACY = (0.1, 0.05, 0.02, 0.01), 1.5, 32, 1e-4
+LENGTH = 2 * (LAP + 2 * ANGLE)
+"""Of the paper's crawler in shape space, less its return while straight: delta per period over it is that at unit speed."""
+
+
+def replayed(body: CrawlerBody, gait: Corners, delta: float) -> Replay:
+    """What a gait achieves on isotropic friction at a delta per period."""
+
+    def path(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return gait.angles(t), gait.rates(t)
+
+    return replay(body, Friction(), path, delta, instants=200, tolerance=ACCURACY, breaks=gait.corner_phases)
 
 
 def main() -> None:
@@ -25,37 +41,32 @@ def main() -> None:
     parser.add_argument("epsilons", nargs="*", type=float, default=EPSILONS, help="half-widths of the region, falling")
     parser.add_argument("--output", type=Path, default=Path("results/figures"), help="folder of the figure")
     options = parser.parse_args()
-    friction, rows = Friction(), []
-    starts: list[np.ndarray] = []
-    print(f"{'epsilon':>8} {'prescribed':>11} {'+-':>8} {'optimised':>11} {'+-':>8} {'loss ratio':>10} {'CPU s':>8}  optimum")
+    rows, gait = [], crawler.PROBLEM.guess
+    print(
+        f"{'epsilon':>8} {'prescribed':>11} {'+-':>8} {'optimised':>11} {'+-':>8} {'loss ratio':>10} {'KKT error':>9} "
+        f"{'softer':>11} {'replay gap':>10} {'CPU s':>6}"
+    )
     for epsilon in options.epsilons:
-        body, delta = BumpBody(epsilon, modes=4, panels=6), delta_for(epsilon)
-        prescribed = Crawler(Concertina(epsilon=epsilon, amplitude=ANGLE), friction, delta).measured_period(intervals=2)
-        clock = time.process_time()
-        above = 2 if starts else 8  # the optimum before is a better start than the prescribed crawler
-        start = best_start(body, friction, [prescribed_vertices(body, ANGLE, PIECES), *starts], above * SOFTER * delta)
-        found = optimise_bump(body, friction, start, SOFTER * delta, delta_start=above * SOFTER * delta, largest_angle=ANGLE)
-        seconds = time.process_time() - clock
-        starts = [found.vertices]
-        failed = ", ".join(f"{c.name} {c.value:.1e}" for c in found.checks(ANGLE) if not c.passed)
-        verdict = f"not certified: {failed}" if failed else f"certified at delta = {found.delta:.1e}"
-        replay = found.replay(delta=delta)
-        ratio = (1 / replay.efficiency - 1) / (1 / prescribed.efficiency - 1)
+        body, delta = CrawlerBody(epsilon), delta_for(epsilon)
+        prescribed = Crawler(Concertina(epsilon=epsilon, amplitude=ANGLE), Friction(), delta).measured_period(intervals=2)
+        clock, soft = time.process_time(), SOFTER * delta / LENGTH
+        sides = crawler.PROBLEM.gait.corners
+        stated = crawler.PROBLEM.with_(body=body, guess=gait, delta=soft, delta_start=soft, joint_limit=ANGLE, intervals=sides)
+        space, v = space_near(stated, gait)
+        found = settled(space, v, soft, FIRST_RADIUS, ROUGH)
+        seconds, gait = time.process_time() - clock, found.gait
+        near, best = (replayed(body, gait, at) for at in (SOFTER * delta, delta))
+        ratio = (1 / best.efficiency - 1) / (1 / prescribed.efficiency - 1)
         print(
-            f"{epsilon:8.3g} {prescribed.efficiency:11.7f} {prescribed.errors['efficiency']:8.1e} {replay.efficiency:11.7f} "
-            f"{replay.errors['efficiency']:8.1e} {ratio:10.4f} {seconds:8.1f}  {verdict}",
+            f"{epsilon:8.3g} {prescribed.efficiency:11.7f} {prescribed.errors['efficiency']:8.1e} {best.efficiency:11.7f} "
+            f"{best.efficiency * best.error:8.1e} {ratio:10.4f} {found.conditions.kkt_error:9.1e} {near.efficiency:11.7f} "
+            f"{-found.objective / near.efficiency - 1:10.1e} {seconds:6.1f}",
             flush=True,
         )
-        rows.append((epsilon, prescribed.efficiency, replay.efficiency))
+        rows.append((epsilon, prescribed.efficiency, best.efficiency))
     column = np.array(rows).T
-    crawler_comparison(
-        body,
-        prescribed_vertices(body, ANGLE, PIECES),
-        found.vertices,
-        column[0],
-        {"prescribed": column[1], "optimised": column[2]},
-        options.output,
-    )
+    efficiencies = {"prescribed": column[1], "optimised": column[2]}
+    crawler_comparison(body, Corners(body.concertina(ANGLE), "antipodal"), gait, column[0], efficiencies, options.output)
 
 
 if __name__ == "__main__":

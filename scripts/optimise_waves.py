@@ -5,7 +5,7 @@ import argparse
 import numpy as np
 
 from colloc.mechanics.friction import Friction
-from colloc.smooth.period import measured_period
+from scripts.models.period import measured_period
 from scripts.models.wave_optimum import odd_wave, optimise_wave
 
 

@@ -4,7 +4,7 @@ import argparse
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import sine_wave, standing_wave, tanh_wave
-from colloc.smooth.period import measured_period
+from scripts.models.period import measured_period
 
 ISOTROPIC, SIDEWAYS, ALONG = Friction(), Friction(1.0, 100.0, 100.0), Friction(100.0, 1.0, 1.0)
 CASES = [

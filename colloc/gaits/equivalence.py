@@ -82,9 +82,3 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
 def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
     """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body and friction."""
     return min(phase_distance(a, image) for image in images(b, body, friction))
-
-
-def irreversibility(gait: Fourier) -> float:
-    """How far a path is from being retraced, ``distance to its own reversal / root-mean-square amplitude``; 0 if it is."""
-    amplitude = np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2))
-    return phase_distance(gait, reversed_in_time(gait)) / float(amplitude) if amplitude > 0 else 0.0

@@ -26,6 +26,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.smooth.concertina import Concertina
+from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
 
@@ -35,7 +36,7 @@ AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases)
 CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
-BODIES: list[type] = [Chain, ModalBody, Concertina, Wave]
+BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 """Laws of friction that files can hold, Coulomb's first; a law of your own making is added to the list."""

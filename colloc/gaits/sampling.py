@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.guesses import SAFE, largest_factor, under_one_limit
+from colloc.gaits.guesses import largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
@@ -28,14 +28,6 @@ _PHASES = 200
 _ATTEMPTS = 200
 _CLEARLY_MOVING = 1.5
 _ON_FLOOR = 1e-4
-
-
-def is_admissible(problem: Problem, gait: Fourier) -> bool:
-    """Whether a gait keeps clear of its joint limits and its links apart, at phases spread over the period."""
-    angles = gait.angles(np.arange(_PHASES) / _PHASES)
-    stretched, limit = under_one_limit(angles, problem.joint_limit)
-    largest = problem.body.largest_angles(stretched).max()
-    return bool(largest <= limit * SAFE) and not problem.body.crossing_depth(angles / SAFE).any()
 
 
 def largest_amplitude(problem: Problem, gait: Fourier) -> float:

@@ -221,6 +221,13 @@ class Body(Protocol):
         """Of a body whose motion is prescribed: phases from 0 to the part of the period that is solved, between which it is
         smooth in time. Its shape coordinates are the point (cos 2 pi t, sin 2 pi t). Empty for bodies that are free to move."""
 
+    @property
+    def panels(self) -> int:
+        """Panels of its quadrature, which a search doubles until they no longer matter; 0 where there is none to refine."""
+
+    def on_panels(self, panels: int) -> Body:
+        """The same body on so many."""
+
     # mechanics
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         """The balance at any tail velocity z ``(3, n_time)``: the one statement of it, for NumPy and CasADi."""

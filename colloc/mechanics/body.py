@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
@@ -58,6 +59,7 @@ class Chain(Links):
     formulations = (FULL, IMPLICIT)
     coordinate, quantity = "joint", "joint angle"
     schedule: tuple[float, ...] = ()
+    panels = 0
     looks_for_all_velocities = True
     usual = Usual(
         delta=1e-4, delta_start=0.1, limit=float(np.pi), largest_limit=float(np.pi), limit_name="joint limits", excess=1e-6,
@@ -76,6 +78,9 @@ class Chain(Links):
 
     def swapped(self, shape: np.ndarray) -> np.ndarray:
         return -shape[::-1]
+
+    def on_panels(self, panels: int) -> Self:
+        return self
 
     def describe(self) -> str:
         return f"links of lengths {', '.join(f'{length:.4g}' for length in self.lengths)} from the tail [body lengths]"

@@ -53,12 +53,11 @@ def _packed(
     jacobian, upper = ca.sparsify(jacobian), ca.sparsify(upper)
     jac_row, jac_col = (np.array(a, dtype=int) for a in jacobian.sparsity().get_triplet())
     hess_row, hess_col = (np.array(a, dtype=int) for a in upper.sparsity().get_triplet())
-    options = {"cse": True}
     arguments = [local, parameter, delta]
     functions = (
-        ca.Function(name, arguments, [ca.densify(out)], options),
-        ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))], options),
-        ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))], options),
+        ca.Function(name, arguments, [ca.densify(out)]),
+        ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))]),
+        ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))]),
     )
     value, jac, hess = functions
     return LocalFunction(

@@ -43,8 +43,9 @@ class HarmonicSpace:
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
-        # a function bounded by L has Fourier coefficients of at most 4 L / pi
-        self.upper = np.full(self.n, 4 * widest(limit) / np.pi)
+        # a function bounded by L has Fourier coefficients of at most 4 L / pi; coordinates may be larger than what is bounded
+        largest = max(1.0, np.abs(np.linalg.pinv(problem.body.limited)).sum(axis=1).max())
+        self.upper = np.full(self.n, 4 * widest(limit) / np.pi * largest)
         self.lower = -self.upper
         self.own = np.arange(self.n)
         self.move_checks(np.zeros(self.n))

@@ -66,7 +66,7 @@ def certify(
     >>> colloc.certify(colloc.solve(problem, starts=1), tolerance=1e-7).passed
     True
     """
-    problem = solution.problem
+    problem = solution.resolved
     path = gait_path(solution)
     if instants is None:
         usual = problem.body.usual
@@ -224,7 +224,7 @@ def _optimality(solution: Solution) -> list[Check]:
 
 def _second_order(solution: Solution) -> Check:
     """Whether the gait is a local optimum and no other critical point, in the space of its class."""
-    problem, level = solution.problem, solution.last
+    problem, level = solution.resolved, solution.last
     if not problem.gait.free:
         return Check("second order", 0.0, SADDLE, "nothing is free in a prescribed motion")
     from colloc.reduced.second_order import curvature  # both load CasADi
@@ -320,7 +320,7 @@ def _class(solution: Solution) -> list[Check]:
 
 def _mesh(solution: Solution) -> list[Check]:
     """The error estimate from the scheme's own defect; it has to pass only if the problem requests an accuracy."""
-    problem = solution.problem
+    problem = solution.resolved
     tolerance = problem.mesh_tolerance
     if tolerance == 0:
         return []

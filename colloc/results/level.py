@@ -43,6 +43,8 @@ class Level:
         formulation; "prescribed" where nothing is free.
     knots : (n_arc + 1,), optional
         Phases where the arcs of a free path meet; they are among the edges. By default they are the edges.
+    panels : int
+        Of the body's quadrature, which refinement may have doubled; 0 for the problem's.
     """
 
     delta: float
@@ -65,6 +67,7 @@ class Level:
     program: str = REDUCED
     knots: np.ndarray | None = None
     objective: float = float("nan")
+    panels: int = 0
 
     @property
     def value(self) -> float:

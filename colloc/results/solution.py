@@ -162,6 +162,12 @@ class Solution:
         return Mesh(scheme(self.last.scheme or self.problem.scheme), self.last.edges)
 
     @property
+    def resolved(self) -> Problem:
+        """The problem, its body on the panels of the last level."""
+        panels = self.last.panels
+        return self.problem.with_(body=self.problem.body.on_panels(panels)) if panels else self.problem
+
+    @property
     def layout(self) -> Layout:
         return problem_layout(self.problem, self.mesh, self.last.knots)
 
@@ -179,14 +185,14 @@ class Solution:
 
     def at_points(self) -> tuple[np.ndarray, Sliding]:
         """Phases of the collocation points and the body there, from the variables of the last level (per period)."""
-        problem = self.problem
+        problem = self.resolved
         angles, rates, z = self._point_motion()
         delta = np.full((1, z.shape[1]), self.delta_per_period)
         return self.mesh.times, problem.body.sliding(problem.friction, angles, rates, z, delta)
 
     def _point_motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates and tail velocities per period at the collocation points."""
-        x, layout, problem = self.last.x, self.layout, self.problem
+        x, layout, problem = self.last.x, self.layout, self.resolved
         if layout.z.size:
             unit = self.gait.speed_unit
             return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
@@ -254,7 +260,7 @@ class Solution:
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
-        problem = self.problem
+        problem = self.resolved
         delta = np.full((1, motion.t.size), self.delta_per_period)
         return problem.body.sliding(problem.friction, motion.angles, motion.rates, motion.z, delta).power[0]
 

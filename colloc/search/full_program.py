@@ -55,6 +55,7 @@ def level_found(found: Found) -> Level:
         space.mesh.scheme.name,
         knots=space.knots,
         objective=_stated(problem, -found.objective),
+        panels=problem.body.panels,
     )
 
 
@@ -91,6 +92,7 @@ def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -
         name,
         program.knots,
         _stated(program.problem, -result.objective),
+        program.problem.body.panels,
     )
 
 
@@ -108,7 +110,7 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     """
     space, delta = found.space, found.delta
     problem = space.problem.with_(scheme=space.mesh.scheme.name)
-    program = transcribed(problem, found.gait, space.mesh.edges, space.far)
+    program = transcribed(problem, found.gait, space.phase_mesh(found.gait).edges, space.far)
     x = feasible_point(program, space.full_parameters(found.v), delta)
     program = heading(program, x)
     solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})

@@ -83,7 +83,8 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
 
     if before:
         done = Solution(problem, before)
-        space, v = space_near(scaled, done.gait, done.last.edges, done.last.scheme)
+        stated = scaled.with_(body=done.resolved.body)
+        space, v = space_near(stated, done.gait, done.last.edges, done.last.scheme)
         found, lacks = refined(descended(Found.at(space, v, done.last.delta), scaled, ended), ended)
     else:
         found, lacks = searched(scaled, scaled.guess, ended)

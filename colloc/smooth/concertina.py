@@ -38,19 +38,20 @@ from colloc.smooth.motion import Motion
 from colloc.smooth.prescribed_body import PrescribedBody
 from colloc.system.errors import ProblemError
 
-_ODD_SCALE = 7**3.5 / 6**3
+ODD_SCALE = 7**3.5 / 6**3
+"""By which the largest value of `odd_profile` is 1."""
 _CHORD_NODES, _CHORD_WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
 def odd_profile(x: np.ndarray) -> np.ndarray:
     """``-k x (1 - x^2)^3`` on [-1, 1], zero outside; its largest value is 1."""
-    return -_ODD_SCALE * x * np.clip(1 - x * x, 0.0, None) ** 3
+    return -ODD_SCALE * x * np.clip(1 - x * x, 0.0, None) ** 3
 
 
 def odd_slope(x: np.ndarray) -> np.ndarray:
     """Derivative of `odd_profile`."""
     y = np.clip(1 - x * x, 0.0, None)
-    return -_ODD_SCALE * (y**3 - 6 * x * x * y**2)
+    return -ODD_SCALE * (y**3 - 6 * x * x * y**2)
 
 
 def even_profile(x: np.ndarray) -> np.ndarray:

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
-from colloc.mechanics.law import Law
-from colloc.numerics.arrays import Array
-from colloc.smooth.modal_balance import modal_motion, modal_sliding, modal_slopes, solve_modal
+from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.modes import Modes
-from colloc.smooth.motion import Motion
-from colloc.smooth.smooth_body import SmoothBody
+from colloc.smooth.panel_body import PanelBody
 
 _PLACES_A_MODE = 4
 """Where on the body |Theta| is bounded."""
 
 
-class Shapes(Protocol):
-    """A gait of the modes' amplitudes."""
-
-    def angles(self, t: np.ndarray) -> np.ndarray: ...
-
-    def rates(self, t: np.ndarray) -> np.ndarray: ...
-
-
-class ModalBody(SmoothBody, Modes):
+class ModalBody(Modes, PanelBody):
     """A smooth body of unit length with a few bending modes; its shape coordinates are their amplitudes [rad].
 
     Parameters
@@ -48,15 +34,7 @@ class ModalBody(SmoothBody, Modes):
     """
 
     coordinate, quantity = "mode", "mode"
-    symmetries = ("none", "antipodal")
     symmetric = True
-    usual = Usual(
-        delta=1e-2, delta_start=0.3, limit=1.5, largest_limit=0.5 * np.pi, limit_name="tangent angle", excess=1e-3,
-        delta_influence=2e-2, instants=400,
-    )  # fmt: skip
-    """A smooth body has a point at rest at nearly every instant. So its panels have to resolve delta over the rotation rate,
-    and the influence of delta is of first order and larger than for links. Below pi/2 the body advances along its mean
-    direction and cannot cross itself."""
 
     @property
     def n_joint(self) -> int:
@@ -75,22 +53,16 @@ class ModalBody(SmoothBody, Modes):
     def turning(self, s: np.ndarray, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
         return self.tangent(s, rates)
 
-    def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
-        return modal_sliding(self, friction, angles, rates, z, delta)
+    def angle(self, s: np.ndarray, q: Array) -> Array:
+        return namespace(q).matmul(self.modes_at(s), q)
 
-    def solve(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
-        tolerance: float = 1e-11,
-    ) -> BalanceSolution:  # fmt: skip
-        return solve_modal(self, friction, angles, rates, delta, start, tolerance)
+    def angle_rate(self, s: np.ndarray, q: Array, rates: Array) -> Array:
+        return self.angle(s, rates)
 
-    def motion(
-        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-    ) -> BalancedMotion:
-        return modal_motion(self, friction, angles, rates, delta, solved)
-
-    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
-        return modal_slopes(self, friction, angles, rates, delta, solved)
+    def angle_slopes(self, s: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        modes = self.modes_at(s)
+        none = np.zeros_like(modes)
+        return np.concatenate([modes, none], axis=1)[..., None], np.concatenate([none, modes], axis=1)[..., None]
 
     @property
     def limited(self) -> np.ndarray:
@@ -111,16 +83,3 @@ class ModalBody(SmoothBody, Modes):
     @property
     def bending(self) -> np.ndarray:
         return np.diff(self.limited, axis=0)
-
-    def gait_motion(self, gait: Shapes, antipodal: bool) -> Motion:
-        """The motion Theta(s, t) of a gait of the modes' amplitudes."""
-
-        def wide(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-            return np.broadcast_to(s, (len(s), t.size))
-
-        return Motion(
-            lambda s, t: self.tangent(wide(s, t), gait.angles(t)),
-            lambda s, t: self.tangent(wide(s, t), gait.rates(t)),
-            stages=(0.0, 0.5) if antipodal else (0.0, 1.0),
-            antipodal=antipodal,
-        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
@@ -33,6 +34,11 @@ class SmoothBody:
     far_pairs: Pairs = ()
     schedule: tuple[float, ...] = ()
     first_panels = 16
+    panels: int = 0
+    """Where nothing is searched for, panels adapt."""
+
+    def on_panels(self, panels: int) -> Self:
+        return self
 
     def tangent(self, s: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """Theta ``(n_node, n_time)`` at arc lengths s ``(n_node, n_time)`` of shapes ``(n_joint, n_time)``."""

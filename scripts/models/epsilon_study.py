@@ -14,8 +14,8 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.smooth.concertina import Concertina
-from colloc.smooth.period import Period, measured_period, period
 from colloc.system.errors import ProblemError
+from scripts.models.period import Period, measured_period, period
 
 DELTA_0, EPSILON_0 = 1e-4, 0.2
 
@@ -52,11 +52,11 @@ class Crawler:
         return 1.0 / self.friction.smallest
 
     def period(self, **settings: Any) -> Period:
-        """Distance and work of one period; settings as for `colloc.smooth.period.period`."""
+        """Distance and work of one period; settings as for `scripts.models.period.period`."""
         return period(self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings)
 
     def measured_period(self, **settings: Any) -> Period:
-        """The same with an error estimate, see `colloc.smooth.period.measured_period`."""
+        """The same with an error estimate, see `scripts.models.period.measured_period`."""
         return measured_period(self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings)
 
 

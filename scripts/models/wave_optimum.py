@@ -15,8 +15,8 @@ from scipy import optimize
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import Motion, travelling_wave
-from colloc.smooth.period import Period, measured_period, period
 from colloc.system.errors import ProblemError
+from scripts.models.period import Period, measured_period, period
 
 
 def odd_wave(amplitudes: np.ndarray, waves: float, direction: float = 1.0) -> Motion:

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
-from colloc.smooth.period import measured_period, period
+from scripts.models.period import measured_period, period
 from scripts.models.smooth_record import snapshots
 from scripts.paper.parallel import parallel_map
 from scripts.paper.study import Arrays, Context

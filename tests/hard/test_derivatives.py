@@ -1,7 +1,6 @@
 """Jacobian and Hessian of every block of the nonlinear program against differences, at random and at hard points.
 
-Differences are central, of fourth order, with steps in proportion to delta, over which the law changes. The bump
-crawler's point function is held to differences in tests/smooth/test_smooth_bump.py.
+Differences are central, of fourth order, with steps in proportion to delta, over which the law changes.
 """
 
 import casadi as ca
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 from cases import HARD
 
-from colloc.collocation.bump_transcription import transcribe_bump
 from colloc.collocation.point_equations import point_function
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.harmonic import Fourier, Harmonic
@@ -18,7 +16,6 @@ from colloc.mechanics.balance import instant
 from colloc.mechanics.body import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.smooth.bump_body import BumpBody
 
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
 THREE, FOUR = Chain(), Chain((0.2, 0.35, 0.3, 0.15))
@@ -109,17 +106,13 @@ def test_point_function_where_nothing_moves(formulation):
 
 
 def other_blocks():
-    """Every block but the point function, by name, from a transcription of three unequal links and of a bump crawler."""
+    """Every block but the point function, by name, from a transcription of three unequal links."""
     guess = Fourier([0.2, -0.1], [[0.8, 0.1], [-0.5, 0.2]], [[0.1, 0.3], [0.6, -0.2]])
     problem = Problem("p", guess, body=Chain((0.3, 0.45, 0.25)), gait=Harmonic(2), intervals=8)
     chain = transcribe(problem).assembly
-    vertices = np.array([[0.0, 0.3, 0.5, 0.2], [0.0, 0.4, 0.1, 0.0], [0.0, -0.2, 0.3, 0.0]])
-    bump = transcribe_bump(BumpBody(0.1, modes=2), Friction(), vertices).assembly
     chain_names = ["joint 1", "joint 2", "links (left)", "links (right)", "shape speed"]
     yield "objective", chain.objective
     yield from zip(chain_names, chain.blocks[1:], strict=True)
-    yield "loss of a bump", bump.objective
-    yield "piece of a bump", bump.blocks[1]
 
 
 @pytest.mark.parametrize(("name", "block"), [pytest.param(n, b, id=n) for n, b in other_blocks()])
@@ -127,7 +120,7 @@ def test_every_other_block(name, block):
     rng = np.random.default_rng(9)
     for instance in range(0, block.n_instance, 3):
         own = block.parameters[:, instance : instance + 1]
-        x = rng.normal(size=block.function.n_local) + (3.0 if "objective" in name or "loss" in name else 0.0)
+        x = rng.normal(size=block.function.n_local) + (3.0 if "objective" in name else 0.0)
         check(block.function, x, 1e-3, 1e-3, lambda at, own=own: own, 1e-8)
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import sine_wave
-from colloc.smooth.period import period
 from colloc.system.errors import ProblemError
+from scripts.models.period import period
 from scripts.models.smooth_record import snapshots
 
 ALONG_EASY = Friction(mu_t=20.0, mu_f=1.0, mu_b=1.0)

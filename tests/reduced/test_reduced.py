@@ -1,16 +1,19 @@
 """The reduced space: exact gradients, the same numbers as the full program, and answers that solve the full program."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
-from colloc import Chain, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse, load, replay, save
+from colloc import Chain, Fourier, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse, load, replay, save
 from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
 from colloc.results.solution import Solution
-from colloc.search.full_program import level_found
+from colloc.search.full_program import answer, level_found
 from colloc.search.optimise import optimum
-from colloc.search.reduced_search import Found
+from colloc.search.reduced_search import FINE, Found, settled
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}
@@ -113,3 +116,26 @@ def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     assert answer.efficiency == pytest.approx(found.efficiency, rel=1e-7)
     assert solution.layout.forces.size == 9 * solution.mesh.n_point
     assert solution.message == ""
+
+
+def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since():
+    problem = Problem("p", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), delta=3e-2, delta_start=3e-2, intervals=24)
+    space, v = space_near(problem, problem.guess)
+    ends = space.member(v).phases
+    graded = np.concatenate([a + (b - a) * np.linspace(0, 1, 9)[:-1] ** 2 for a, b in pairwise(ends)] + [ends[-1:]])
+    space = space.remeshed(space.member(v), graded, "gauss-3")
+    found = settled(space, space.parameters(space.member(v)), 3e-2, 0.5, FINE)
+    level, message = answer(found)
+    assert message == ""
+    assert np.abs(found.gait.phases - ends).max() > 1e-6
+    np.testing.assert_allclose(level.edges, space.phase_mesh(found.gait).edges, atol=1e-4)
+
+
+def test_amplitudes_of_modes_may_exceed_the_bound_on_the_tangent():
+    """Steep sides are large coefficients: within 1.5 rad everywhere, a Legendre mode may have an amplitude of 2.5."""
+    body = ModalBody(4)
+    rows = np.vstack([body.limited, -body.limited])
+    largest = [-linprog(-e, rows, np.full(len(rows), 1.5), bounds=[(None, None)] * 4).fun for e in np.eye(4)]
+    problem = Problem("p", body=body, gait=Harmonic(1, "antipodal"))
+    space, _ = space_near(problem, problem.guess)
+    assert 2.5 < max(largest) < space.upper.min()

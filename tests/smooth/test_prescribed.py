@@ -19,9 +19,9 @@ from colloc.results.store import load, save
 from colloc.search.optimise import best_gait, measured
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_body import ModalBody
-from colloc.smooth.period import measured_period, period
 from colloc.smooth.prescribed_body import Wave
 from colloc.system.errors import ProblemError
+from scripts.models.period import measured_period, period
 
 ALONG = Friction(100.0, 1.0, 1.0)
 BODIES = [Wave(), Wave("tanh", 1.3, 2.0), Wave("standing"), Concertina(epsilon=0.2), Concertina(epsilon=0.1, bumps=2)]

@@ -5,9 +5,9 @@ import pytest
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
-from colloc.smooth.period import measured_period, period
 from colloc.system.errors import ProblemError
 from scripts.models.chain_study import chain_period
+from scripts.models.period import measured_period, period
 from scripts.models.wave_optimum import odd_wave, optimise_wave
 
 ALONG = Friction(100.0, 1.0, 1.0)

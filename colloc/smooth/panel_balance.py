@@ -1,4 +1,4 @@
-"""The balance of a smooth body of few modes, on its panels: the velocities that keep it, and what follows from them.
+"""The balance of a smooth body of a few shape coordinates, on its panels: the velocities that keep it, and what follows.
 
 The velocity ``z = (u, v, omega)`` is that of the tail, in the axes in which Theta is measured, and the rotation rate of those
 axes; ``(3, n_time)``. A batch's omega, and that of an anchor, is the rotation rate of the tangent there.
@@ -6,7 +6,7 @@ axes; ``(3, n_time)``. A batch's omega, and that of an anchor, is the rotation r
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -17,32 +17,49 @@ from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, Panels, bending_power, curve, mean_velocity, node_velocity, pulled_back, resultant
-from colloc.smooth.modes import Modes
 
 TAIL = 0
 _ANCHOR_MOVES = 5
 _STEPS = 1000
 
 
-def modal_sliding(body: Modes, friction: Law, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
-    """The balance for amplitudes and their rates ``(modes, n_time)`` (paper, eqs. ftb and W); NumPy and CasADi."""
+class Shapes(Protocol):
+    """Tangent angles on fixed panels, as functions of a few shape coordinates."""
+
+    @property
+    def grid(self) -> Panels:
+        """The panels, the same at all times."""
+
+    def angle(self, s: np.ndarray, q: Array) -> Array:
+        """Theta ``(n_place, n_time)`` at places s ``(n_place,)`` of shapes ``(n_joint, n_time)``; NumPy and CasADi."""
+
+    def angle_rate(self, s: np.ndarray, q: Array, rates: Array) -> Array:
+        """Its rate; NumPy and CasADi."""
+
+    def angle_slopes(self, s: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of both along (shape, rates), ``(n_place, 2 n_joint, n_time)`` each, or 1 where the same at all times."""
+
+
+def panel_sliding(body: Shapes, friction: Law, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+    """The balance for shapes and their rates ``(n_joint, n_time)`` (paper, eqs. ftb and W); NumPy and CasADi."""
     xp, grid = namespace(q, rates, z), body.grid
-    modes = body.modes_at(grid.nodes[:, 0])
-    now: Curve = curve(grid, xp.matmul(modes, q), xp.matmul(modes, rates), TAIL, np.zeros((1, 1)))
+    s = grid.nodes[:, 0]
+    now: Curve = curve(grid, body.angle(s, q), body.angle_rate(s, q, rates), TAIL, np.zeros((1, 1)))
     vs, vn = node_velocity(now, z)
     fs, fn = friction.density(vs, vn, delta)
     power = -xp.sum_rows(now.weight * (fs * vs + fn * vn))
     return Sliding(resultant(now, fs, fn), mean_velocity(now, vs, vn), power)
 
 
-def _fields(body: Modes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
-    grid = Panels(np.broadcast_to(body.grid.edges, (body.panels + 1, q.shape[1])), body.order)
-    modes, at_edges = body.modes_at(body.grid.nodes[:, 0]), body.modes_at(body.grid.edges[:, 0])
-    return PanelFields(grid, modes @ q, modes @ rates, at_edges @ rates)
+def _fields(body: Shapes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
+    own = body.grid
+    s, ends = own.nodes[:, 0], own.edges[:, 0]
+    grid = Panels(np.broadcast_to(own.edges, (ends.size, q.shape[1])), own.order)
+    return PanelFields(grid, body.angle(s, q), body.angle_rate(s, q, rates), body.angle_rate(ends, q, rates))
 
 
-def solve_modal(
-    body: Modes,
+def solved_on_panels(
+    body: Shapes,
     friction: Law,
     q: np.ndarray,
     rates: np.ndarray,
@@ -50,13 +67,13 @@ def solve_modal(
     start: np.ndarray | None = None,
     tolerance: float = 1e-11,
 ) -> BalanceSolution:
-    """Velocities z that balance the body at amplitudes and rates ``(modes, n_time)``.
+    """Velocities z that balance the body at shapes and rates ``(n_joint, n_time)``.
 
     Parameters
     ----------
-    body : Modes
+    body : Shapes
     friction : Law
-    q, rates : (modes, n_time)
+    q, rates : (n_joint, n_time)
     delta : float
         Regularisation speed in body lengths per unit of time of the rates.
     start : (3, n_time), optional
@@ -65,7 +82,7 @@ def solve_modal(
     """
     n = q.shape[1]
     # work in units of the largest rate: the law is homogeneous once delta scales along
-    speed = np.abs(body.modes_at(body.grid.nodes[:, 0]) @ rates).max(axis=0)
+    speed = np.abs(body.angle_rate(body.grid.nodes[:, 0], q, rates)).max(axis=0)
     speed[(speed == 0) | (friction.degree is None)] = 1.0
     fields = _fields(body, q, rates / speed)
 
@@ -99,7 +116,7 @@ class _At(NamedTuple):
 
 
 def _at_anchor(
-    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
 ) -> _At:
     batch = PanelBatch(_fields(body, q, rates), friction, np.arange(q.shape[1]), reference)
     now = Curve(*batch.curve)
@@ -107,8 +124,8 @@ def _at_anchor(
     return _At(batch, now, vs, vn, *friction.density(vs, vn, delta))
 
 
-def modal_motion(
-    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+def panel_motion(
+    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> BalancedMotion:
     """The motion at instants that were solved for."""
     n = q.shape[1]
@@ -123,11 +140,11 @@ def modal_motion(
     return BalancedMotion(solved.z, centre, power, bending)
 
 
-def modal_slopes(
-    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+def panel_slopes(
+    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> np.ndarray:
-    """Derivatives ``(6, 2 modes, n_time)`` of (z, centre, power) with respect to amplitudes and rates."""
-    slopes = np.empty((6, 2 * body.modes, q.shape[1]))
+    """Derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to shapes and rates."""
+    slopes = np.empty((6, 2 * len(q), q.shape[1]))
     for reference in np.unique(solved.anchor):
         at = solved.anchor == reference
         velocity = solved.anchor_velocity[:, at]
@@ -136,7 +153,7 @@ def modal_slopes(
 
 
 def _slopes(
-    body: Modes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
 ) -> np.ndarray:
     """The nodes take the place of a chain's links: their weights that of lengths, without a couple."""
     batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q, rates, delta, reference, z)
@@ -145,9 +162,8 @@ def _slopes(
     x, y = now.arm_s * s + now.arm_n * c, now.arm_n * s - now.arm_s * c
     none = np.zeros_like(vs)
     turning = batch.fields.rate - batch.edge_rate[reference] + z[2]
-    modes, anchor = body.modes_at(body.grid.nodes[:, 0]), body.modes_at(body.grid.edges[reference])[0]
-    dphi = np.concatenate([modes, np.zeros_like(modes)], axis=1)[:, :, None]
-    dw = np.concatenate([np.zeros_like(modes), modes - anchor], axis=1)[:, :, None]
+    dphi, turned = body.angle_slopes(body.grid.nodes[:, 0], q, rates)
+    anchor = body.angle_slopes(body.grid.edges[reference], q, rates)[1][0]
 
     def along_path(a: np.ndarray) -> np.ndarray:
         return panels.integrate((panels.widths[:, :1, None] * a).reshape(len(a), -1), reference).reshape(a.shape)
@@ -157,12 +173,12 @@ def _slopes(
     stiffness = ((weight * k_ss, weight * k_sn, none), (weight * k_ns, weight * k_nn, none), (none, none, none))
     d = implicit_changes(
         (c, s, x, y), (vs, vn, turning), (weight * fs, weight * fn, none), stiffness, left.transpose(2, 0, 1), along_path,
-        dphi * np.ones(n_time), dw * np.ones(n_time),
+        dphi * np.ones(n_time), (turned - anchor) * np.ones(n_time),
     )  # fmt: skip
     back = (panels.edge_path(reference)[TAIL] * panels.widths[:, 0])[:, None, None]
     full = d.w  # the change of the tangents' rotation rate, that of the anchor included
     swing_x = -(back * (full * s[:, None] + (turning * c)[:, None] * dphi)).sum(axis=0)
     swing_y = (back * (full * c[:, None] - (turning * s)[:, None] * dphi)).sum(axis=0)
-    axes = d.anchor[2] - np.concatenate([np.zeros(body.modes), anchor])[:, None]
+    axes = d.anchor[2] - anchor
     centre_x, centre_y = ((weight[:, None] * v).sum(axis=0) for v in (d.vx, d.vy))
     return np.stack([d.anchor[0] + swing_x, d.anchor[1] + swing_y, axes, centre_x, centre_y, d.power])

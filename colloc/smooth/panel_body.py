@@ -1,0 +1,65 @@
+"""A smooth body that is solved on fixed panels, as a `colloc.mechanics.bodies.Body`: what such bodies answer alike."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+
+from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
+from colloc.mechanics.law import Law
+from colloc.numerics.arrays import Array
+from colloc.smooth.curve import Panels
+from colloc.smooth.panel_balance import panel_motion, panel_sliding, panel_slopes, solved_on_panels
+from colloc.smooth.smooth_body import SmoothBody
+
+
+class PanelBody(SmoothBody):
+    """A body with a few shape coordinates; it answers `colloc.smooth.panel_balance.Shapes`."""
+
+    symmetries = ("none", "antipodal")
+    usual = Usual(
+        delta=1e-2, delta_start=0.3, limit=1.5, largest_limit=0.5 * np.pi, limit_name="tangent angle", excess=1e-3,
+        delta_influence=2e-2, instants=400,
+    )  # fmt: skip
+    """A smooth body has a point at rest at nearly every instant. So its panels have to resolve delta over the rotation rate,
+    and the influence of delta is of first order and larger than for links. Below pi/2 the body advances along its mean
+    direction and cannot cross itself."""
+
+    def on_panels(self, panels: int) -> Self:
+        return dataclasses.replace(self, panels=panels)  # type: ignore[type-var]
+
+    @property
+    def grid(self) -> Panels:
+        """The panels, the same at all times."""
+        raise NotImplementedError
+
+    def angle(self, s: np.ndarray, q: Array) -> Array:
+        """Theta at fixed places."""
+        raise NotImplementedError
+
+    def angle_rate(self, s: np.ndarray, q: Array, rates: Array) -> Array:
+        """Its rate."""
+        raise NotImplementedError
+
+    def angle_slopes(self, s: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of both."""
+        raise NotImplementedError
+
+    def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+        return panel_sliding(self, friction, angles, rates, z, delta)
+
+    def solve(
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
+        tolerance: float = 1e-11,
+    ) -> BalanceSolution:  # fmt: skip
+        return solved_on_panels(self, friction, angles, rates, delta, start, tolerance)
+
+    def motion(
+        self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    ) -> BalancedMotion:
+        return panel_motion(self, friction, angles, rates, delta, solved)
+
+    def slopes(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution) -> np.ndarray:
+        return panel_slopes(self, friction, angles, rates, delta, solved)

@@ -1,0 +1,110 @@
+"""Crawlers with one travelling bump: the paper's is one of them, balance and slopes hold, and optimising helps."""
+
+import runpy
+
+import numpy as np
+import pytest
+
+from colloc.gaits.path_classes import Polygon
+from colloc.gaits.paths import Corners
+from colloc.gaits.problem import Problem
+from colloc.mechanics.friction import Friction
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near
+from colloc.results.store import load, save
+from colloc.search.optimise import maximise_efficiency
+from colloc.search.reduced_search import ROUGH, settled
+from colloc.smooth.concertina import Concertina
+from colloc.smooth.crawler_body import LAP, CrawlerBody
+from colloc.system.errors import ProblemError
+
+BODY = CrawlerBody(0.05, panels=16)
+
+
+def shapes(n, seed=5):
+    rng = np.random.default_rng(seed)
+    q = np.stack([rng.uniform(-LAP, LAP, n), *rng.normal(scale=0.4, size=(BODY.modes, n))])
+    return q, rng.normal(size=q.shape)
+
+
+def differences(function, at, h=1e-6):
+    unit = np.eye(len(at))[:, :, None]
+    return np.stack([(function(at + h * e) - function(at - h * e)) / (2 * h) for e in unit], axis=1)
+
+
+def test_the_paper_s_crawler_is_one_of_them():
+    crawler, corners = Concertina(epsilon=0.05, amplitude=1.3), BODY.concertina(1.3, sides=6)
+    s = np.linspace(0.4, 0.6, 201)[:, None] * np.ones((1, 3))
+    phases = np.array([1 / 12, 1 / 6, 1 / 3])  # half grown, grown, at the front
+    shown = np.array([[p, 0.0, a, 0.0, 0.0] for p, a in ((LAP, 0.65), (LAP, 1.3), (0.0, 1.3))]).T
+    assert {tuple(shape) for shape in shown.T} <= {tuple(vertex) for vertex in corners.T}
+    np.testing.assert_allclose(BODY.tangent(s, shown), crawler.prescribed().angle(s, phases), atol=1e-12)
+
+
+def test_the_mirrored_half_is_the_negative_shape():
+    (q, _), s = shapes(4), np.linspace(0.44, 0.56, 60)[:, None]
+    np.testing.assert_allclose(BODY.tangent(s, -q), -BODY.tangent(s, q), atol=1e-13)
+    assert np.abs(BODY.tangent(np.array([[0.1], [0.449], [0.551]]), q)).max() == 0.0
+
+
+def test_angle_rate_and_slopes_are_those_of_finite_differences():
+    (q, rates), s, n = shapes(4), np.linspace(0.44, 0.56, 25), BODY.n_joint
+    h, at = 1e-6, np.concatenate([q, rates])
+    moved = (BODY.angle(s, q + h * rates) - BODY.angle(s, q - h * rates)) / (2 * h)
+    np.testing.assert_allclose(BODY.angle_rate(s, q, rates), moved, atol=1e-6)
+    angle, rate = BODY.angle_slopes(s, q, rates)
+    np.testing.assert_allclose(angle, differences(lambda y: BODY.angle(s, y[:n]), at), atol=1e-7)
+    np.testing.assert_allclose(rate, differences(lambda y: BODY.angle_rate(s, y[:n], y[n:]), at), atol=1e-5)
+
+
+@pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1.0, 1.3)])
+def test_balance_and_power_agree_with_adaptive_panels(friction):
+    (q, rates), delta = shapes(3), 1e-2
+    solved = BODY.solve(friction, q, rates, delta)
+    motion, (other, _) = BODY.motion(friction, q, rates, delta, solved), BODY.replayed(friction, q, rates, delta, None)
+    np.testing.assert_allclose(motion.z, other.z, atol=1e-4)
+    np.testing.assert_allclose(motion.centre, other.centre, atol=1e-4)
+    np.testing.assert_allclose(motion.power, other.power, rtol=1e-3)
+    stated = BODY.sliding(friction, q, rates, solved.z, delta)
+    assert np.abs(stated.force).max() < 1e-9
+    np.testing.assert_allclose(stated.power[0], motion.power, rtol=1e-11)
+
+
+def test_slopes_of_the_motion_are_those_of_finite_differences():
+    (q, rates), delta, n = shapes(3), 0.1, BODY.n_joint
+
+    def motion(y):
+        solved = BODY.solve(Friction(), y[:n], y[n:], delta, tolerance=1e-13)
+        now = BODY.motion(Friction(), y[:n], y[n:], delta, solved)
+        return np.concatenate([now.z, now.centre, now.power[None]])
+
+    numeric = differences(motion, np.concatenate([q, rates]))
+    slopes = BODY.slopes(Friction(), q, rates, delta, BODY.solve(Friction(), q, rates, delta, tolerance=1e-13))
+    np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
+
+
+def test_optimising_beats_the_paper_s_crawler():
+    """On one coarse mesh and few panels, which are enough to tell them apart."""
+    body = CrawlerBody(0.1, modes=2, panels=4)
+    guess = Corners(body.concertina(1.499), "antipodal")
+    space, v = space_near(Problem("crawler", guess, body, gait=Polygon(8, "antipodal"), intervals=8), guess)
+    paper = -ReducedProgram(space, 1e-3).objective(v)
+    found = settled(space, v, 1e-3, 1.0, ROUGH, rounds=2)
+    assert 0.5 < paper + 0.005 < -found.objective < 1.0
+
+
+@pytest.mark.slow
+def test_the_problem_file_is_certified_beats_the_paper_s_crawler_and_is_kept(tmp_path):
+    found = maximise_efficiency(runpy.run_path("problems/crawler.py")["PROBLEM"])
+    assert found.status == "solved", found.message
+    assert found.certificate.efficiency_at_zero_delta > 0.9069  # what equal sides of the path allow
+    assert found.last.panels > found.problem.body.panels
+    read = load(save(found, tmp_path / "crawler.h5"))
+    assert (read.problem.hash, read.last.panels) == (found.problem.hash, found.last.panels)
+    np.testing.assert_array_equal(read.sample(0.3).tail, found.sample(0.3).tail)
+
+
+@pytest.mark.parametrize("changes", [{"epsilon": 0.7}, {"share": 0.0}, {"modes": 1}])
+def test_unusable_bodies_are_refused(changes):
+    with pytest.raises(ProblemError, match="must lie between"):
+        CrawlerBody(**({"epsilon": 0.1} | changes))
