@@ -17,6 +17,7 @@ from colloc.mechanics.contact import crossing_bounds
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.mechanics.width import gap
 
 DELTA = 1e-9
 """Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
@@ -106,11 +107,12 @@ def _motion(
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:
-    """Shapes where links i and i + 2 do not cross (to within an angle `margin`), a mask ``(n,)``."""
+    """Shapes where links i and i + 2 do not cross (to within an angle `margin`), and all keep their width, a mask ``(n,)``."""
     bounds = crossing_bounds(body, angles)
     if bounds is None:
         return np.ones(angles.shape[1], dtype=bool)
-    return (bounds <= np.pi + margin).all(axis=0)
+    uncrossed = (bounds <= np.pi + margin).all(axis=0)
+    return uncrossed & (gap(body, angles) >= body.width - margin) if body.width else uncrossed
 
 
 def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from colloc.bounds.coulomb_motion import swaps_ends
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampling import Domain
+from colloc.gaits.gait_fields import fields
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
@@ -170,8 +171,8 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
 
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
-    fields = {"version": VERSION, "domain": asdict(domain), "budget": asdict(budget)}
-    return hash_of(fields)
+    stated = {"body": fields(domain.body), "friction": fields(domain.friction), "joint_limit": domain.joint_limit}
+    return hash_of({"version": VERSION, "domain": stated, "budget": asdict(budget)})
 
 
 def known_bound(
@@ -187,8 +188,8 @@ def known_bound(
     if entry is None:
         return None
     try:
-        fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
-        return Bound(**fields)
+        stored: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+        return Bound(**stored)
     except (TypeError, AttributeError):
         raise StoreError(f"{cache} holds something else than bounds; move it away.") from None
 
