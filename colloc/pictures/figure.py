@@ -68,7 +68,8 @@ def strips(ends: np.ndarray, width: float) -> np.ndarray:
 def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body) -> None:
     """One body from its outline, ``(2, n_point)``: links of their width, if they have one, joints hollow, the head a disc."""
     if body.drawn_width:
-        axes.add_collection(PolyCollection(list(strips(ends, body.drawn_width)), facecolors=[colour], edgecolors="white", lw=0.2))
+        links = list(strips(ends, body.drawn_width))
+        axes.add_collection(PolyCollection(links, facecolors=[colour], edgecolors="white", lw=0.2))
     else:
         axes.plot(*ends, "-", color=colour, lw=2.4, solid_capstyle="round", solid_joinstyle="round")
     axes.plot(*ends[:, body.hinges], "o", color="white", mec=colour, ms=3.5)
