@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from colloc.mechanics.friction import Friction
     from colloc.results.certificate import certify
     from colloc.results.solution import Solution
-    from colloc.results.store import load, save
+    from colloc.results.solution_file import load, save
     from colloc.search.optimise import maximise_efficiency
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.modal_body import ModalBody
@@ -63,7 +63,7 @@ _HOME = {
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
     "results.solution": ("Solution",),
-    "results.store": ("load", "save"),
+    "results.solution_file": ("load", "save"),
     "results.certificate": ("certify",),
     "verification.replay": ("replay",),
     "mechanics.fixed_point": ("solve_balance",),

@@ -128,6 +128,15 @@ def swaps_ends(body: Chain) -> bool:
     return body.symmetric and body.n_link % 2 == 1
 
 
+def one_joint(n_joint: int, half: bool) -> np.ndarray:
+    """Rates of each joint turning alone, forwards, and unless `half` backwards, ``(n_joint, count)``.
+
+    The other links may stick then, and the ratio of gain to power has a peak with a kink there, which falls so steeply (by 3
+    a radian and more) that no lattice of directions sees it.
+    """
+    return np.eye(n_joint) if half else np.concatenate([np.eye(n_joint), -np.eye(n_joint)], axis=1)
+
+
 def unit_directions(n_joint: int, count: int, half: bool) -> np.ndarray:
     """About `count` directions of joint rates spread evenly over the sphere, or over half of it, ``(n_joint, count)``."""
     if n_joint == 1:

@@ -149,6 +149,16 @@ class RelaxedSolution:
         return SOLVED if self.measured.passed else CERTIFICATE_FAILED
 
     @property
+    def success(self) -> bool:
+        """Whether the best finite gait is certified."""
+        return self.status == SOLVED
+
+    @property
+    def efficiency(self) -> float:
+        """Of the best finite gait; what it tends to is ``certificate.efficiency``."""
+        return self.measured.efficiency
+
+    @property
     def delta_per_period(self) -> float:
         """Regularisation speed of the best finite gait in body lengths per period."""
         return self.problem.delta * self.gait.delta_unit

@@ -24,6 +24,8 @@ from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
 from colloc.system.errors import CollocError, NotConvergedError
 
+RELAXED_STARTS = 8
+"""Starts where none are asked for."""
 _COARSE, _MOST = 0.4, 0.7
 """Pieces on which starts are told apart, and are followed, as shares of those of the answer."""
 _FOLLOWED, _PROMISING, _SAME = 3, 0.8, 4e-3

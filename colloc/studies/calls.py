@@ -13,13 +13,16 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
+from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sampling import LATIN_HYPERCUBE
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, Outcome, basins, counts
 from colloc.results.level import Level
+from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait, maximise_efficiency
+from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.studies.campaign import run_starts
 from colloc.studies.run import Progress, StudyRun
 from colloc.studies.study import Study, read_study_file
@@ -37,8 +40,8 @@ def solve(
     *,
     seconds: float = np.inf,
     verbose: bool = False,
-    progress: Callable[[Level], object] | None = None,
-) -> Solution:
+    progress: Callable[[Level | str], object] | None = None,
+) -> Solution | RelaxedSolution:
     """The most efficient gait of a problem, certified: what ``colloc solve`` finds.
 
     Parameters
@@ -46,17 +49,17 @@ def solve(
     problem : Problem or path-like
         A problem, or a problem file.
     starts : int, optional
-        Starts to find the best gait of; 1 is the guess alone. By default what the problem file says, else 16.
+        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 16 (relaxed gaits: 8).
     seconds : float
         Wall time after which no other start is begun.
     verbose : bool
         Print a line for every level of delta as it ends.
     progress : callable, optional
-        Called with every `colloc.results.level.Level` as it ends.
+        Called with every `colloc.results.level.Level` as it ends; of relaxed gaits with what is under way, in words.
 
     Returns
     -------
-    Solution
+    Solution, or of a class of relaxed gaits RelaxedSolution
         Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that does not converge.
 
     Raises
@@ -75,7 +78,12 @@ def solve(
     stated = _stated(problem)
     if starts is not None and starts < 1:
         raise ProblemError(f"starts must be at least 1, not {starts}.")
-    solution = best_gait(stated.problem, starts or stated.starts or STARTS, _told(verbose, progress), seconds)
+    told, count = _told(verbose, progress), starts or stated.starts
+    solution: Solution | RelaxedSolution
+    if isinstance(stated.problem.gait, Relaxed):
+        solution = best_relaxed_gait(stated.problem, count or RELAXED_STARTS, seconds=seconds, report=told)
+    else:
+        solution = best_gait(stated.problem, count or STARTS, told, seconds)
     solution.source = stated.source
     return solution
 

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+import colloc
 from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency, replay
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import relaxed_solution
 from colloc.results.relaxed_solution import Optimality, finite_certificate, realised_gaits, relaxed_certificate
 from colloc.results.relaxed_store import is_relaxed, load_relaxed, save_relaxed
 from colloc.search.reduced_search import VERY_ROUGH, Found, settled
-from colloc.search.relaxed_search import best_relaxed_gait, prices, readied
+from colloc.search.relaxed_search import prices, readied
 
 
 def problem(directions=3, delta=3e-4, pieces=14):
@@ -20,7 +21,7 @@ def problem(directions=3, delta=3e-4, pieces=14):
 
 @pytest.fixture(scope="module")
 def solution():
-    return best_relaxed_gait(problem(), 1, repeats=(1, 2, 4))
+    return colloc.solve(problem(), starts=1)
 
 
 def test_the_isotropic_body_reaches_more_than_any_class_of_smooth_gaits(solution):
@@ -117,6 +118,12 @@ def test_the_motion_that_is_drawn_goes_as_far_as_the_replay_says(solution):
     motion = solution.sample(np.array([0.0, 1.0]))
     assert motion.centre[0, 1] - motion.centre[0, 0] == pytest.approx(solution.measured.distance, rel=2e-3)
     assert abs(motion.centre[1, 1]) < 1e-3
+
+
+def test_the_face_of_the_library_keeps_and_reads_relaxed_gaits(solution, tmp_path):
+    assert solution.success
+    again = colloc.load(colloc.save(solution, tmp_path / "relaxed.h5"))
+    assert again.efficiency == solution.efficiency == solution.best.certificate.efficiency
 
 
 def test_other_searches_say_that_relaxed_gaits_are_not_for_them():
