@@ -17,6 +17,9 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError
 
+_FINE = 1e-3
+"""Steps of the search for the best shape at which it ends [rad]: a width of links or a limit binds somewhere between."""
+
 
 class SmallGait(NamedTuple):
     """The best small gait at a shape.
@@ -152,7 +155,7 @@ def best_small_gait(
     found = []
     for start in np.argsort(-values)[:refined]:
         shape, value, size = shapes[:, start], rough(shapes[:, start]), joint_limit / steps
-        while size > 0.01:
+        while size > _FINE:
             tried = np.clip(shape + size * moves, -joint_limit, joint_limit)
             tried = tried[admissible(body, tried.T, 1e-9)]
             tried = tried[np.abs(tried - shape).max(axis=1) > 1e-9]

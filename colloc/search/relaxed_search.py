@@ -215,9 +215,16 @@ def best_relaxed_gait(
     """
     begin = time.perf_counter()
     best, *others = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
+    solution = certified(best, repeats, report)
+    solution.seconds, solution.starts = time.perf_counter() - begin, starts
+    solution.others = tuple((-other.objective, other.gait.extent) for other in others)
+    return solution
+
+
+def certified(best: Found, repeats: tuple[int, ...] = (1,), report: Callable[[str], None] = lambda _: None) -> RelaxedSolution:
+    """A relaxed gait, and finite gaits near it, with their certificates."""
     report("certifying the relaxed gait")
-    conditions = best.conditions
-    gait = best.gait
+    problem, conditions, gait = best.space.problem, best.conditions, best.gait
     # where the class has another direction to give
     free = (gait.durations <= _IDLE).any(axis=1)
     price = float(prices(best)[0][free].min(initial=0.0))
@@ -229,7 +236,5 @@ def best_relaxed_gait(
         optimality,
         certificate,
         realised_gaits(problem, gait, repeats, certificate.efficiency, report),
-        time.perf_counter() - begin,
-        starts=starts,
-        others=tuple((-other.objective, other.gait.extent) for other in others),
+        best.seconds,
     )

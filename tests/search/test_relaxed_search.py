@@ -9,6 +9,7 @@ from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import relaxed_solution
 from colloc.results.relaxed_solution import Optimality, finite_certificate, realised_gaits, relaxed_certificate
 from colloc.results.relaxed_store import is_relaxed, load_relaxed, save_relaxed
+from colloc.search.few_corners import polygon_near
 from colloc.search.reduced_search import VERY_ROUGH, Found, settled
 from colloc.search.relaxed_search import prices, readied
 
@@ -124,6 +125,17 @@ def test_the_face_of_the_library_keeps_and_reads_relaxed_gaits(solution, tmp_pat
     assert solution.success
     again = colloc.load(colloc.save(solution, tmp_path / "relaxed.h5"))
     assert again.efficiency == solution.efficiency == solution.best.certificate.efficiency
+
+
+def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution):
+    heard = []
+    simple = polygon_near(solution.problem, solution.relaxed, 52, heard.append)
+    assert simple.best.corners <= 52 < 0.5 * solution.realised[0].corners
+    assert simple.success
+    # what is left without loops is far from it: joined to larger ones they were kept
+    mean = finite_certificate(solution.problem, solution.relaxed.mean.realised())
+    assert simple.efficiency > solution.certificate.efficiency - 0.3 * (solution.certificate.efficiency - mean.efficiency)
+    assert len(heard) > 3
 
 
 def test_other_searches_say_that_relaxed_gaits_are_not_for_them():
