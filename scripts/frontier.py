@@ -41,7 +41,7 @@ from scripts.bound_table import COEFFICIENTS
 DELTA, LEAST_EXTENT, FEW = 1e-5, 0.3, 60
 """At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one."""
 PARTS = ("gait", "few", "small", "bound")
-BUDGET = Budget()
+BUDGET = Budget(intervals=16, tolerance=3e-4)
 STORE, GAITS, TABLE = Path("results/curated/frontier.json"), Path("results/frontier"), Path("results/curated/frontier.md")
 HEAD = """# The best gaits from both sides
 

@@ -27,7 +27,7 @@ from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
 
-VERSION = 2
+VERSION = 3
 """Part of the cache key: raise it when the computation changes its result."""
 
 
@@ -38,7 +38,7 @@ class Budget:
     Parameters
     ----------
     intervals : int
-        Knot intervals of the splines in every joint angle.
+        Knot intervals of the splines in every joint angle, at most.
     harmonics : tuple of int, optional
         Harmonics in the heading; by default (1, 3), or (0, 1) where mu_b differs from mu_f.
     shapes, directions : int
@@ -49,22 +49,23 @@ class Budget:
         Climbs a round.
     tolerance : float
         Excess of the summits over the program's value at which a bound counts as converged.
-    graded : tuple of float
-        Inner knots in every joint angle, if they are not to be evenly spaced (`colloc.numerics.spline`).
+    first : int
+        Even intervals to begin with; more knots are inserted where they are worth most (`colloc.bounds.knots`). As many as
+        `intervals` keep the knots even.
     """
 
-    intervals: int = 10
+    intervals: int = 12
     harmonics: tuple[int, ...] | None = None
     shapes: int = 20
     directions: int = 48
-    rounds: int = 24
+    rounds: int = 60
     starts: int = 250
     tolerance: float = 5e-4
-    graded: tuple[float, ...] = ()
+    first: int = 6
 
 
 QUICK = Budget()
-THOROUGH = Budget(intervals=14, harmonics=(1, 3, 5), shapes=28, rounds=30, starts=400)
+THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4)
 
 
 @dataclass(frozen=True)
@@ -139,11 +140,12 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     begin = time.process_time()
     body = domain.body
     harmonics = budget.harmonics or ((1, 3) if domain.friction.reversible else (0, 1))
-    spline = TensorSpline(body.n_joint, domain.joint_limit, budget.intervals, budget.graded)
+    spline = TensorSpline(body.n_joint, domain.joint_limit, min(budget.first, budget.intervals))
     space = PotentialSpace(spline, harmonics, swaps_ends(body))
     found = exchanged_optimum(
         domain,
         space,
+        intervals=budget.intervals,
         shapes=budget.shapes,
         directions=budget.directions,
         rounds=budget.rounds,
@@ -160,12 +162,12 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         angles=tuple(found.summit.angles[:, 0].tolist()),
         rates=tuple(found.summit.rates[:, 0].tolist()),
         joint_limit=domain.joint_limit,
-        intervals=budget.intervals,
+        intervals=found.space.spline.intervals,
         harmonics=harmonics,
         coefficients=tuple(found.free.tolist()),
         samples=found.samples,
         seconds=time.process_time() - begin,
-        graded=budget.graded,
+        graded=found.space.spline.graded,
     )
 
 

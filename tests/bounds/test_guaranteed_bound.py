@@ -1,5 +1,7 @@
 """The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities are what they claim."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,7 @@ BODY = Chain()
 
 @pytest.fixture(scope="module")
 def bound() -> Bound:
-    return efficiency_bound(BODY, Friction(), budget=Budget(4, (1,), 8, 24, 3, 60))
+    return efficiency_bound(BODY, Friction(), budget=Budget(4, (1,), 8, 24, 3, 60, first=4))
 
 
 def test_loaded_balance_without_load_is_the_balance_of_the_body():
@@ -149,6 +151,12 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
 def test_friction_without_a_potential_has_no_proof(bound):
     with pytest.raises(ProblemError, match="isotropic"):
         certify(BODY, Friction(2.0, 1.0, 1.0), bound, 0.5)
+
+
+def test_cells_that_knots_would_cut_are_refused(bound):
+    """Slopes of the reference point are bounded on whole knot intervals, and cells halve even ones."""
+    with pytest.raises(ProblemError, match="even"):
+        certify(BODY, Friction(), dataclasses.replace(bound, graded=(-0.5, 0.0, 0.5)), 0.9)
 
 
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
