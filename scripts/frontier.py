@@ -1,14 +1,15 @@
 """The best gaits from both sides, by law of friction, limit of the joints, number of links and width.
 
-python -m scripts.frontier [--laws 1 6] [--limits 2.5] [--links 3] [--widths 0] [--parts gait few small bound] [--seconds 600]
+python -m scripts.frontier [--laws 1 6] [--limits 2.5] [--links 3] [--widths 0] [--parts gait few] [--seconds 600]
 
-One row for every law of friction, limit of the joint angles, number of links and width of the links; four parts a row. What is
+One row for every law of friction, limit of the joint angles, number of links and width of the links; five parts a row. What is
 done is kept: numbers in `results/curated/frontier.json`, gaits in `results/frontier/`. A run takes up what is missing, and
 writes `results/curated/frontier.md` from all there is. `--seconds` begins no other part after so much processor time.
 
 - gait: the best relaxed gait that travels through shapes, and the best certified finite gait near it;
 - few: the best certified polygon with 60 corners near it;
 - small: the best gait of no size at one shape (three links);
+- loop: the best certified polygon of a short path near that shape;
 - bound: the sampled upper bound (three links; four if asked for).
 """
 
@@ -24,15 +25,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.bounds.infinitesimal import best_small_gait
+from colloc.bounds.infinitesimal import best_small_gait, small_gait
 from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.gaits.guesses import largest_factor
+from colloc.gaits.path_classes import Polygon
+from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.width import gap
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.relaxed_store import load_relaxed, save_relaxed
+from colloc.results.solution import SOLVED
+from colloc.results.store import save
 from colloc.search.few_corners import polygon_near
+from colloc.search.optimise import maximise_efficiency
 from colloc.search.relaxed_search import best_relaxed_gait
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
@@ -40,7 +48,9 @@ from scripts.bound_table import COEFFICIENTS
 
 DELTA, LEAST_EXTENT, FEW = 1e-5, 0.3, 60
 """At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one."""
-PARTS = ("gait", "few", "small", "bound")
+PARTS = ("gait", "few", "small", "loop", "bound")
+SPEED, LOOP_DELTA = 0.02, 2e-5
+"""Of small loops: least path over 2 pi [rad], and delta at unit shape speed."""
 BUDGET = Budget(intervals=16, tolerance=3e-4)
 STORE, GAITS, TABLE = Path("results/curated/frontier.json"), Path("results/frontier"), Path("results/curated/frontier.md")
 HEAD = """# The best gaits from both sides
@@ -49,16 +59,17 @@ HEAD = """# The best gaits from both sides
 links of none do not cross. *Gait*: the best certified finite gait that travels through shapes (its mean angles range
 over at least 0.3 rad), with its corners, its distance a period and the largest joint angle; delta = 1e-5 at unit shape
 speed. *60 corners*: the best certified polygon with 60. *Relaxed*: what finite gaits near it tend to, for delta -> 0.
-*Small gait*: the best gait of no size at one shape, for delta -> 0. *Bound*: a sampled one, with the number of its
-unknowns: it holds but for what lies between the samples; in brackets the program's value, if the climbs still found
-more than 0.0005 above. *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for the
-row, relative. CPU seconds on a loaded machine. A star: the relaxed gait's own certificate fails a check, so its value
-is not sharp. An empty place has not been computed. What was found is a lower end: other starts may find better gaits.
+*Small gait*: the best gait of no size at one shape, for delta -> 0. *Small loop*: the best certified polygon near it,
+of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one, with the number of its unknowns: it holds but for what
+lies between the samples; in brackets the program's value, if the climbs still found more than 0.0005 above. *Gap*: from
+the better of relaxed and small gait to the smallest bound that is valid for the row, relative. CPU seconds on a loaded
+machine. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty place has not
+been computed. What was found is a lower end: other starts may find better gaits.
 
 """
 COLUMNS = (
     "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "60 corners", "relaxed",
-    "small gait", "bound", "unknowns", "gap", "CPU s",
+    "small gait", "small loop", "bound", "unknowns", "gap", "CPU s",
 )  # fmt: skip
 
 
@@ -125,6 +136,26 @@ def small(row: Row, starts: int) -> dict[str, Any]:
     return {"efficiency": best.efficiency, "shape": shape.tolist(), "seconds": time.process_time() - begin}
 
 
+def loop(row: Row, starts: int) -> dict[str, Any]:
+    """The best polygon of a short path, begun about the shape of the best gait of no size, where links keep their width."""
+    begin, friction = time.process_time(), Friction(*row.mu)
+    shape = np.array(read()[f"{row.name} small"]["shape"])
+    path = small_gait(row.body, friction, shape).path(shape, 1.2 * 2 * np.pi * SPEED)
+    inside = min(1.0, largest_factor(row.body, row.limit, Corners(path).angles(np.linspace(0.0, 1.0, 401))))
+    problem = Problem(
+        f"frontier-{row.name}-loop", Corners(inside * path), row.body, friction, Polygon(path.shape[1]), LOOP_DELTA,
+        100 * LOOP_DELTA, row.limit, SPEED, intervals=30,
+    )  # fmt: skip
+    solution = maximise_efficiency(problem)
+    save(solution, row.file("loop"))
+    certificate = solution.certificate
+    return {
+        "efficiency": certificate.efficiency, "passed": solution.status == SOLVED, "distance": certificate.distance,
+        "gap": float(gap(row.body, solution.gait.angles(np.linspace(0.0, 1.0, 20001))).min()),
+        "seconds": time.process_time() - begin,
+    }  # fmt: skip
+
+
 def bound(row: Row, starts: int) -> dict[str, Any]:
     """The sampled bound."""
     found = efficiency_bound(row.body, Friction(*row.mu), row.limit, budget=BUDGET)
@@ -134,7 +165,13 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-COMPUTE: dict[str, Callable[[Row, int], dict[str, Any]]] = {"gait": gait, "few": few, "small": small, "bound": bound}
+COMPUTE: dict[str, Callable[[Row, int], dict[str, Any]]] = {
+    "gait": gait,
+    "few": few,
+    "small": small,
+    "loop": loop,
+    "bound": bound,
+}
 
 
 def read() -> dict[str, dict[str, Any]]:
@@ -157,7 +194,10 @@ def asked(options: argparse.Namespace) -> Iterator[Row]:
 
 def wanted(row: Row, part: str, known: dict) -> bool:
     """Whether a part can be computed and is not known."""
-    possible = {"gait": True, "few": row.file("gait").exists(), "small": row.links == 3, "bound": row.links <= 4}
+    possible = {
+        "gait": True, "few": row.file("gait").exists(), "small": row.links == 3, "loop": f"{row.name} small" in known,
+        "bound": row.links <= 4,
+    }  # fmt: skip
     return f"{row.name} {part}" not in known and possible[part]
 
 
@@ -176,7 +216,7 @@ def smallest_bound(row: Row, known: dict) -> float:
 def line(row: Row, known: dict) -> str:
     """A row of the table."""
     parts = {part: known.get(f"{row.name} {part}", {}) for part in PARTS}
-    travels, simple, still, above = (parts[part] for part in PARTS)
+    travels, simple, still, loops, above = (parts[part] for part in PARTS)
 
     def value(of: dict, key: str, form: str = ".4f", mark: str = "") -> str:
         return f"{of[key]:{form}}{mark}" if key in of else ""
@@ -192,6 +232,7 @@ def line(row: Row, known: dict) -> str:
         value(travels, "distance", ".3f"), value(travels, "angle", ".3f"),
         value(simple, "efficiency", mark="" if simple.get("passed") else refused),
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
+        value(loops, "efficiency", mark="" if loops.get("passed") else refused),
         value(above, "sampled", mark=program), value(above, "unknowns", "d"), gap,
         f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
     ]  # fmt: skip
