@@ -224,7 +224,7 @@ def line(row: Row, known: dict) -> str:
     refused = " (not certified)"
     ends = [travels.get("relaxed", -np.inf), still.get("efficiency", -np.inf)]
     least = smallest_bound(row, known)
-    gap = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) and np.isfinite(least) else ""
+    apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) and np.isfinite(least) else ""
     program = "" if above.get("converged", True) else f" ({above['floor']:.4f})"
     cells = [
         ", ".join(f"{m:g}" for m in row.mu), f"{row.limit:.4g}", str(row.links), f"{row.width:g}",
@@ -233,7 +233,7 @@ def line(row: Row, known: dict) -> str:
         value(simple, "efficiency", mark="" if simple.get("passed") else refused),
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
         value(loops, "efficiency", mark="" if loops.get("passed") else refused),
-        value(above, "sampled", mark=program), value(above, "unknowns", "d"), gap,
+        value(above, "sampled", mark=program), value(above, "unknowns", "d"), apart,
         f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
     ]  # fmt: skip
     return f"| {' | '.join(cells)} |"
