@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from colloc.gaits.guesses import largest_factor
 from colloc.gaits.mixture import Mixture, corners_of
 from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
@@ -230,6 +231,15 @@ def finite_certificate(problem: Problem, gait: Corners, instants: int = 1600, to
     return gait_certificate(problem, path, problem.delta * gait.delta_unit, gait.corner_phases, instants, tolerance)
 
 
+def kept_inside(problem: Problem, gait: Corners) -> Corners:
+    """A polygon about admissible shapes, shrunk towards the straight body by as much as its loops reach beyond them."""
+    body, angles = problem.body, gait.angles(np.union1d(np.linspace(0.0, 1.0, _GRID + 1), gait.corner_phases))
+    beyond = max(float(body.largest_angles(angles).max()) - problem.joint_limit, float(body.crossing_depth(angles).max()))
+    if beyond <= body.usual.excess:
+        return gait
+    return Corners(largest_factor(body, problem.joint_limit, angles) * gait.corners, gait.symmetry)
+
+
 def realised_gaits(
     problem: Problem,
     gait: Mixture,
@@ -254,7 +264,7 @@ def realised_gaits(
         report(f"certifying {m} repeats")
         both = []
         for sense in (1, -1):
-            corners = gait.realised(m, sense)
+            corners = kept_inside(problem, gait.realised(m, sense))
             both.append(Realised(m, sense, corners, finite_certificate(problem, corners)))
         found.append(max(both, key=lambda r: (r.certificate.passed, r.certificate.efficiency)))
         far = max(r.certificate.efficiency for r in found) < (1 - _NEAR) * tends_to

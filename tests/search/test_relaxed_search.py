@@ -7,8 +7,15 @@ import colloc
 from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency, replay
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import relaxed_solution
-from colloc.results.relaxed_solution import Optimality, finite_certificate, realised_gaits, relaxed_certificate
+from colloc.results.relaxed_solution import (
+    Optimality,
+    finite_certificate,
+    kept_inside,
+    realised_gaits,
+    relaxed_certificate,
+)
 from colloc.results.relaxed_store import is_relaxed, load_relaxed, save_relaxed
+from colloc.search import few_corners
 from colloc.search.few_corners import polygon_near
 from colloc.search.reduced_search import VERY_ROUGH, Found, settled
 from colloc.search.relaxed_search import prices, readied
@@ -121,14 +128,26 @@ def test_the_motion_that_is_drawn_goes_as_far_as_the_replay_says(solution):
     assert abs(motion.centre[1, 1]) < 1e-3
 
 
+def test_loops_that_reach_beyond_what_is_admissible_are_drawn_in(solution):
+    """The mean shape of a relaxed gait may lie on a bound; of a finite gait the corners may not lie beyond."""
+    gait = solution.realised[0].gait
+    assert kept_inside(solution.problem, gait) is gait
+    narrow = solution.problem.with_(joint_limit=0.99 * np.abs(gait.corners).max())
+    assert "joint limits" in [c.name for c in finite_certificate(narrow, gait).failures]
+    drawn_in = kept_inside(narrow, gait)
+    assert finite_certificate(narrow, drawn_in).passed
+    assert 0.99 * narrow.joint_limit < np.abs(drawn_in.corners).max() <= narrow.joint_limit
+
+
 def test_the_face_of_the_library_keeps_and_reads_relaxed_gaits(solution, tmp_path):
     assert solution.success
     again = colloc.load(colloc.save(solution, tmp_path / "relaxed.h5"))
     assert again.efficiency == solution.efficiency == solution.best.certificate.efficiency
 
 
-def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution):
-    heard = []
+def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution, monkeypatch):
+    monkeypatch.setattr(few_corners, "_TRIED", 1)
+    heard: list[str] = []
     simple = polygon_near(solution.problem, solution.relaxed, 52, heard.append)
     assert simple.best.corners <= 52 < 0.5 * solution.realised[0].corners
     assert simple.success
