@@ -111,6 +111,7 @@ __all__ = [
 bind(
     {
         "plot": "colloc.pictures.figure:solution_figure",
+        "plot relaxed": "colloc.pictures.relaxed_figure:relaxed_figure",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
     }

@@ -6,9 +6,12 @@ repeat its directions so and so often (`colloc.gaits.mixture.Mixture.realised`),
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +23,7 @@ from colloc.results.certificate import VIOLATION, gait_certificate
 from colloc.results.checks import Certificate, Check
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED, SampledMotion, versions
 from colloc.system.errors import NotConvergedError
+from colloc.system.late_binding import bound
 
 STATIONARY = 1e-3
 """Largest slope of the Lagrangian of the reduced program at a relaxed optimum: the efficiency is off by about its square."""
@@ -192,6 +196,14 @@ class RelaxedSolution:
         tail = place - np.exp(1j * theta_at) * (cx + 1j * cy)
         lab = np.stack([place.real, place.imag])
         return SampledMotion(t, angles, self.gait.rates(phase), z, theta_at, lab, np.stack([tail.real, tail.imag]))
+
+    def plot(self) -> Any:
+        """The figure of `colloc solve`, as a matplotlib Figure."""
+        return bound("plot relaxed")(self)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the motion of the best finite gait as GIF or MP4; options as for `colloc.pictures.movie.write_movie`."""
+        return bound("animate")(self, Path(path), **options)
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""

@@ -15,7 +15,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure
+from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure, strips
 from colloc.pictures.publication import panels
 from colloc.pictures.style import save
 
@@ -54,6 +54,15 @@ def assert_readable(figure):
         across, along = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
         assert min(across, along) < 1.0, f"{one!r} lies on {other!r}"
     return [text for text, _ in found]
+
+
+def test_strips_have_the_width_of_the_links_and_round_ends():
+    ends = np.array([[0.0, 0.4, 0.4], [0.0, 0.0, 0.6]])
+    for strip, length in zip(strips(ends, 0.1), (0.4, 0.6), strict=True):
+        x, y = strip.T
+        area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        assert area == pytest.approx(0.1 * length + np.pi * 0.05**2, rel=0.01)
+    assert np.ptp(strips(ends, 0.1)[0], axis=0) == pytest.approx([0.5, 0.1])
 
 
 @pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (8, 0.3)])

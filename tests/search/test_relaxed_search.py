@@ -141,6 +141,7 @@ def test_loops_that_reach_beyond_what_is_admissible_are_drawn_in(solution):
 
 def test_the_face_of_the_library_keeps_and_reads_relaxed_gaits(solution, tmp_path):
     assert solution.success
+    assert len(solution.plot().axes) == 5
     again = colloc.load(colloc.save(solution, tmp_path / "relaxed.h5"))
     assert again.efficiency == solution.efficiency == solution.best.certificate.efficiency
 
