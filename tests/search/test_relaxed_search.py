@@ -5,6 +5,7 @@ import pytest
 
 import colloc
 from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency, replay
+from colloc.gaits.mixture import Mixture
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import relaxed_solution
 from colloc.results.relaxed_solution import (
@@ -126,6 +127,16 @@ def test_the_motion_that_is_drawn_goes_as_far_as_the_replay_says(solution):
     motion = solution.sample(np.array([0.0, 1.0]))
     assert motion.centre[0, 1] - motion.centre[0, 0] == pytest.approx(solution.measured.distance, rel=2e-3)
     assert abs(motion.centre[1, 1]) < 1e-3
+
+
+def test_sides_of_a_polygon_may_be_long():
+    """A side that is all there is on its piece; of several directions each takes a short time, lest loops go on for ever."""
+    stated = problem(1)
+    square = Mixture([[1.7], [1.7]], [[[1.0, 0.0]], [[0.0, 1.0]]], [-0.85, 0.85], "both")
+    space = MixtureSpace(stated, 2)
+    v = space.parameters(square)
+    assert np.all((space.lower <= v) & (v <= space.upper))
+    assert MixtureSpace(problem(3), 2).upper[2] < 1.7
 
 
 def test_loops_that_reach_beyond_what_is_admissible_are_drawn_in(solution):
