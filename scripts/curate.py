@@ -51,6 +51,7 @@ KEPT = {
     "measure.png": "python -m scripts.measure_to_gait",
     "frontier.md": "python -m scripts.frontier",
     "frontier.json": "python -m scripts.frontier",
+    "potentials.json": "python -m scripts.check_potential",
     "without_contact.md": "python -m scripts.without_contact",
     "several_motions.md": "python -m scripts.several_motions",
     "several_motions.png": "python -m scripts.several_motions",

@@ -15,6 +15,7 @@ from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.bounds.knots import with_more_knots
 from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.recheck import near_the_top
 from colloc.bounds.sampling import Domain
 from colloc.numerics.minimax_program import Minimax, smallest_maximum
 
@@ -32,7 +33,6 @@ _RIPE = 5e-3
 """Surprise at which the multipliers say where knots are wanted."""
 _SIDES = (0.0, 0.08, -0.08)
 """A motion enters with the heading of its largest gain and these [rad] to the sides of it, as the best heading will move."""
-_WINDOW = 0.03
 _HOPELESS = 0.005
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -126,15 +126,6 @@ class _Program:
             self.samples = self.samples.joined(motion)
 
 
-def _starts(motion: CoulombMotion, ratio: np.ndarray, level: float, spacing: float, count: int) -> np.ndarray:
-    """Indices of up to `count` of the largest that come near `level`, one for each cell of shapes and directions."""
-    near = np.flatnonzero(ratio > level - _WINDOW)
-    near = near[np.argsort(-ratio[near])]
-    cell = np.concatenate([np.rint(motion.angles[:, near] / spacing), np.rint(motion.rates[:, near] * 4.0)]).T
-    _, first = np.unique(cell, axis=0, return_index=True)
-    return near[np.sort(first)][:count]
-
-
 def exchanged_optimum(
     domain: Domain,
     space: PotentialSpace,
@@ -183,7 +174,7 @@ def exchanged_optimum(
         fresh = domain.lattice(shapes * (1 + last), directions * (1 + last), max((count * _GOLDEN) % 1.0, 0.01))
         pooled = fresh.joined(program.samples.motion)
         values = np.concatenate([ratio(fresh), program.samples.ratio(free)[0]])
-        chosen = _starts(pooled, values, program.best.value, spacing, starts * (1 + 2 * last))
+        chosen = near_the_top(pooled, values, program.best.value, spacing, starts * (1 + 2 * last))
         summit = domain.summits(ratio, pooled.take(chosen), 0.5 * spacing, 0.5 * turn, 14, rng, program.best.value - _HOPELESS)
         reached = ratio(summit)
         seen += fresh.size + chosen.size

@@ -19,6 +19,7 @@ import numpy as np
 from colloc.bounds.coulomb_motion import swaps_ends
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
+from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampling import Domain
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.body import Chain
@@ -79,7 +80,8 @@ class Bound:
     floor : float
         Value of the last program: no potential of this space does better on the samples held, up to the smoothing (1e-5).
     converged : bool
-        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`.
+        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`, and those of a check that
+        the program knows nothing of (`colloc.bounds.recheck`) within twice of it.
     guaranteed : float or None
         Value certified between samples too (`colloc.bounds.guaranteed`), if asked for and possible.
     missing : str
@@ -152,15 +154,20 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         starts=budget.starts,
         tolerance=budget.tolerance,
     )
+    # by samples that the program did not choose
+    checked, motion = largest_ratio(
+        domain, found.space, found.free, shapes=3 * budget.shapes, directions=2 * budget.directions, starts=2 * budget.starts
+    )
+    top, summit = max((found.top, found.summit), (checked, motion), key=lambda each: each[0])
     missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW
     return Bound(
-        sampled=found.top,
+        sampled=top,
         floor=found.floor,
-        converged=found.converged,
+        converged=found.converged and top <= found.floor + 2 * budget.tolerance,
         guaranteed=None,
         missing=missing.format(samples=found.samples),
-        angles=tuple(found.summit.angles[:, 0].tolist()),
-        rates=tuple(found.summit.rates[:, 0].tolist()),
+        angles=tuple(summit.angles[:, 0].tolist()),
+        rates=tuple(summit.rates[:, 0].tolist()),
         joint_limit=domain.joint_limit,
         intervals=found.space.spline.intervals,
         harmonics=harmonics,

@@ -8,6 +8,7 @@ from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.knots import with_knots, with_more_knots, worth
 from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampling import Domain
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -54,6 +55,17 @@ def test_knots_are_worth_something_only_where_the_measure_does_not_close(found):
     # of the two places it took the better
     values = [worth(with_knots(space, np.array([place])), optimum.measure) for place in (0.625, 1.875)]
     assert np.abs(inner - (0.625, 1.875)[int(np.argmax(values))]).min() < 1e-9
+
+
+def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
+    space, optimum = found
+    domain, settings = Domain(Chain(), Friction(), LIMIT), {"shapes": 20, "directions": 48, "starts": 100}
+    values = [largest_ratio(domain, space, optimum.free, seed=seed, **settings)[0] for seed in (1, 2)]
+    assert values[0] == pytest.approx(values[1], abs=2e-3)
+    # four rounds were too few: what they missed shows
+    assert min(values) > optimum.floor
+    # another potential is worse
+    assert largest_ratio(domain, space, 0.5 * optimum.free, **settings)[0] > max(values) + 0.1
 
 
 @pytest.mark.slow
