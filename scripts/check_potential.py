@@ -11,6 +11,7 @@ import argparse
 import json
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,22 +26,39 @@ from colloc.numerics.spline import TensorSpline
 KEPT = Path("results/curated/potentials.json")
 
 
+class Kept(NamedTuple):
+    """A potential for three equal links, and the value of the program that it was the optimum of."""
+
+    domain: Domain
+    space: PotentialSpace
+    free: np.ndarray
+    program: float
+
+
+def potentials(path: Path = KEPT) -> list[Kept]:
+    """Those in a file."""
+    found = []
+    for kept in json.loads(path.read_text()):
+        domain = Domain(Chain(), Friction(*kept["mu"]), kept["joint_limit"])
+        spline = TensorSpline(2, domain.joint_limit, len(kept["graded"]) + 1, tuple(kept["graded"]))
+        space = PotentialSpace(spline, tuple(kept["harmonics"]), swaps_ends(domain.body))
+        found.append(Kept(domain, space, np.array(kept["coefficients"]), kept["program"]))
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", nargs="?", type=Path, default=KEPT)
     for name, usual in (("seed", 0), ("shapes", 60), ("directions", 120), ("starts", 1000)):
         parser.add_argument(f"--{name}", type=int, default=usual)
     options = parser.parse_args()
-    body = Chain()
-    for kept in json.loads(options.file.read_text()):
-        spline = TensorSpline(2, kept["joint_limit"], len(kept["graded"]) + 1, tuple(kept["graded"]))
-        space = PotentialSpace(spline, tuple(kept["harmonics"]), swaps_ends(body))
-        domain, begin = Domain(body, Friction(*kept["mu"]), kept["joint_limit"]), time.process_time()
-        settings = {name: getattr(options, name) for name in ("seed", "shapes", "directions", "starts")}
-        top, at = largest_ratio(domain, space, np.array(kept["coefficients"]), **settings)
+    settings = {name: getattr(options, name) for name in ("seed", "shapes", "directions", "starts")}
+    for domain, space, free, program in potentials(options.file):
+        begin, mu = time.process_time(), domain.friction
+        top, at = largest_ratio(domain, space, free, **settings)
         print(
-            f"mu {kept['mu']}, limit {kept['joint_limit']:.4f}, {space.size} unknowns, program {kept['program']:.5f}: largest "
-            f"ratio {top:.5f} at angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}; "
+            f"mu {mu.mu_t:g}, {mu.mu_f:g}, {mu.mu_b:g}, limit {domain.joint_limit:.4f}, {space.size} unknowns, program "
+            f"{program:.5f}: largest ratio {top:.5f} at angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}; "
             f"{time.process_time() - begin:.0f} s of processor time"
         )
 
