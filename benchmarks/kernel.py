@@ -138,7 +138,9 @@ def bounds(quick: bool) -> str:
     domain = sampling.Domain(BODY, ISOTROPIC, float(np.pi))
     budget = dataclasses.replace(QUICK, intervals=5, shapes=10, rounds=3) if quick else QUICK
     simple = (
-        Budget(intervals=6, harmonics=(1,), shapes=12, rounds=3) if quick else Budget(intervals=12, harmonics=(1,), shapes=24)
+        Budget(intervals=6, harmonics=(1,), shapes=12, rounds=3)
+        if quick
+        else Budget(intervals=12, first=12, harmonics=(1,), shapes=24)
     )
     target = 0.7 if quick else 0.52
     potential = compute_bound(domain, simple)

@@ -17,14 +17,14 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-import colloc
 from benchmarks.peers import drag
 from benchmarks.tables import markdown_table
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, Solution, Viscous, ellipse, replay
 from colloc.gaits.gait_fields import AnyGait as Gait
 from colloc.mechanics.law import Law
+from colloc.search.optimise import best_gait
 from colloc.smooth.motion import Motion, sine_wave, tanh_wave
-from colloc.smooth.period import period
+from scripts.models.period import period
 
 SWIMMER = Viscous(normal=drag.NORMAL, tangential=drag.TANGENTIAL)
 PAPER = "S. Alben, Efficient sliding locomotion with isotropic friction (2019)"
@@ -61,7 +61,7 @@ def sentence(what: str, source: str, printed: str, ours: str, holds: bool, note:
 
 def solved(law: Law, gait: Harmonic, starts: int = 8, **stated: object) -> Solution:
     """The certified optimum of three equal links."""
-    found = colloc.solve(Problem("published", friction=law, gait=gait, **stated), starts=starts)  # type: ignore[arg-type]
+    found = best_gait(Problem("published", friction=law, gait=gait, **stated), starts)  # type: ignore[arg-type]
     if found.status != "solved":
         raise RuntimeError(f"{found.problem!r}: {found.status}; {found.message}")
     return found

@@ -17,7 +17,7 @@ from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 
-BUDGET = Budget(intervals=12, harmonics=(1,), shapes=24)
+BUDGET = Budget(intervals=12, first=12, harmonics=(1,), shapes=24)
 
 
 def main() -> None:

@@ -58,7 +58,7 @@ def draw_bodies(axes: Any, body: Chain, gait: Gait) -> int:
     apart = float(np.ptp(x, axis=0).max()) + _GAP
     for k, colour in enumerate(snapshot_colours(_SNAPSHOTS)):
         axes.plot(x[:, 0] + apart * k, y[:, 0], color=_PALE, lw=2.0, solid_capstyle="round")
-        draw_body(axes, np.stack([x[:, k] + apart * k, y[:, k]]), colour, body.hinges)
+        draw_body(axes, np.stack([x[:, k] + apart * k, y[:, k]]), colour, body)
     low, left = float(y.min()) - _GAP, float(x[:, 0].min())
     axes.plot([left, left + _BAR], [low, low], color=INK, lw=1.2)
     axes.set(aspect="equal", xlim=(-0.55 * apart, (_SNAPSHOTS - 0.45) * apart), ylim=(low - 0.04, float(y.max()) + 0.06))

@@ -1,4 +1,4 @@
-"""How close links come to each other along a gait, for tables of efficiencies: links have no thickness in the model."""
+"""How close links come to each other along a gait, for tables of efficiencies: links without a width may touch."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from colloc import Chain
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.contact import gap
+from colloc.mechanics.width import gap
 
 LYING = 0.01
 """Body lengths: links with a smaller gap count as lying on each other."""

@@ -1,13 +1,15 @@
 """From the bound to the gait: the multipliers of the bound's program as a measure, drawn, and a start for a relaxed gait.
 
-python -m scripts.measure_to_gait [--out results] [--friction 1 1 1] [--limit 2.5] [--intervals 8]
+python -m scripts.measure_to_gait [--out results] [--friction 1 1 1] [--limit 2.5] [--intervals 8] [--first 8] [--no-gait]
 
-Writes measure.png, and prints what the program says and what the search makes of it, with no other start.
+Writes measure.png, and prints what the program says and what the search makes of it, with no other start. With `--no-gait` it
+prints only what the program says, its unknowns and its knots.
 """
 
 from __future__ import annotations
 
 import argparse
+import time
 from pathlib import Path
 
 from colloc.bounds.cutting_plane import exchanged_optimum
@@ -29,16 +31,27 @@ def main() -> None:
     parser.add_argument("--friction", type=float, nargs=3, default=[1.0, 1.0, 1.0], metavar=("MU_T", "MU_F", "MU_B"))
     parser.add_argument("--limit", type=float, default=2.5)
     parser.add_argument("--intervals", type=int, default=8, help="knot intervals of the potential")
+    parser.add_argument("--first", type=int, default=8, help="even ones to begin with; the rest goes where it is wanted")
+    parser.add_argument("--tolerance", type=float, default=2e-3, help="of the climbs above the program")
+    parser.add_argument("--no-gait", action="store_true", help="the bound only")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     body, friction = Chain(), Friction(*options.friction)
     harmonics = (1, 3) if friction.reversible else (0, 1)
-    space = PotentialSpace(TensorSpline(2, options.limit, options.intervals), harmonics, True)
+    space = PotentialSpace(TensorSpline(2, options.limit, min(options.first, options.intervals)), harmonics, True)
     domain = Domain(body, friction, options.limit)
-    bound = exchanged_optimum(domain, space, shapes=16, directions=36, rounds=30, starts=100, tolerance=2e-3)
-    measure = bound.measure
+    lattice = {"shapes": 20, "directions": 48, "rounds": 60, "starts": 150}
+    begin = time.process_time()
+    bound = exchanged_optimum(domain, space, intervals=options.intervals, tolerance=options.tolerance, **lattice)
+    measure, seconds = bound.measure, time.process_time() - begin
     motions = measure.weight.size
-    print(f"bound {bound.top:.4f}, program {bound.floor:.4f}, {motions} motions travel {measure.efficiency():.4f} per work")
+    print(
+        f"bound {bound.top:.5f}, program {bound.floor:.5f} with {bound.space.size} unknowns, {motions} motions travel "
+        f"{measure.efficiency():.4f} per work; {seconds:.0f} s of processor time"
+    )
+    print("knots", *(f"{knot:.3f}" for knot in bound.space.spline.knots if knot > -1e-9))
+    if options.no_gait:
+        return
     problem = Problem("measure", friction=friction, gait=Relaxed(3, "both"), delta=1e-5, joint_limit=options.limit)
     solution = best_relaxed_gait(problem, 0, (1, 4), first=(measure.path(),))
     relaxed, best = solution.certificate, solution.best

@@ -17,15 +17,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.commands.solve_relaxed import STARTS
-from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.relaxed import Relaxed
 from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
-from colloc.search.relaxed_search import best_relaxed_gait
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = {
@@ -49,14 +45,6 @@ class Crawl:
     efficiency: float
     ends: np.ndarray
     centre: np.ndarray
-
-
-def solved(path: Path) -> Solution | RelaxedSolution:
-    """The best gait of a problem file."""
-    stated = read_problem_file(path)
-    if isinstance(stated.problem.gait, Relaxed):
-        return best_relaxed_gait(stated.problem, stated.starts or STARTS)
-    return colloc.solve(path)
 
 
 def phases(solution: Solution | RelaxedSolution, work: np.ndarray) -> np.ndarray:
@@ -121,7 +109,7 @@ def main() -> None:
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE.py", help="problem files, the best gait last")
     parser.add_argument("--output", type=Path, default=ROOT / "results/curated/side_by_side.gif")
     options = parser.parse_args()
-    solutions = [solved(file) for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]]
+    solutions = [colloc.solve(file) for file in options.files or [ROOT / "problems" / f"{name}.py" for name in FILES]]
     for solution in solutions:
         print(solution)
     write_gif(options.output, pictures([crawl(solution) for solution in solutions]), FPS)

@@ -17,6 +17,7 @@ from colloc.mechanics.contact import crossing_bounds
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.mechanics.width import gap
 
 DELTA = 1e-9
 """Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
@@ -106,11 +107,12 @@ def _motion(
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:
-    """Shapes where links i and i + 2 do not cross (to within an angle `margin`), a mask ``(n,)``."""
+    """Shapes where links i and i + 2 do not cross (to within an angle `margin`), and all keep their width, a mask ``(n,)``."""
     bounds = crossing_bounds(body, angles)
     if bounds is None:
         return np.ones(angles.shape[1], dtype=bool)
-    return (bounds <= np.pi + margin).all(axis=0)
+    uncrossed = (bounds <= np.pi + margin).all(axis=0)
+    return uncrossed & (gap(body, angles) >= body.width - margin) if body.width else uncrossed
 
 
 def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:
@@ -124,6 +126,15 @@ def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:
 def swaps_ends(body: Chain) -> bool:
     """Whether turning the body end for end maps its middle link onto itself."""
     return body.symmetric and body.n_link % 2 == 1
+
+
+def one_joint(n_joint: int, half: bool) -> np.ndarray:
+    """Rates of each joint turning alone, forwards, and unless `half` backwards, ``(n_joint, count)``.
+
+    The other links may stick then, and the ratio of gain to power has a peak with a kink there, which falls so steeply (by 3
+    a radian and more) that no lattice of directions sees it.
+    """
+    return np.eye(n_joint) if half else np.concatenate([np.eye(n_joint), -np.eye(n_joint)], axis=1)
 
 
 def unit_directions(n_joint: int, count: int, half: bool) -> np.ndarray:

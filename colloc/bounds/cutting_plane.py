@@ -12,8 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from colloc.bounds.coulomb_motion import CoulombMotion
+from colloc.bounds.knots import with_more_knots
 from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.recheck import near_the_top
 from colloc.bounds.sampling import Domain
 from colloc.numerics.minimax_program import Minimax, smallest_maximum
 
@@ -25,9 +27,12 @@ _LARGEST_CUT = 1500
 _INNER_ROUNDS = 15
 _HELD = 2e-4
 _WEIGHTY = 1e-5
+_NEAR = 0.005
+"""Inequalities this near to the program's value stay; dropping them sooner saves time in a solve and costs more solves."""
+_RIPE = 5e-3
+"""Surprise at which the multipliers say where knots are wanted."""
 _SIDES = (0.0, 0.08, -0.08)
 """A motion enters with the heading of its largest gain and these [rad] to the sides of it, as the best heading will move."""
-_WINDOW = 0.03
 _HOPELESS = 0.005
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -37,9 +42,11 @@ class Optimum(NamedTuple):
 
     free: its coefficients. floor: value of the program, which no potential of the space undercuts by more than the smoothing
     on the samples held. top, summit: the largest ratio met anywhere, and its motion. samples: motions evaluated. rounds: used.
-    converged: whether the last climbs stayed within the tolerance. measure: the multipliers of the last program.
+    converged: whether the last climbs stayed within the tolerance. measure: the multipliers of the last program. space: the
+    potentials of the last program.
     """
 
+    space: PotentialSpace
     free: np.ndarray
     floor: float
     top: float
@@ -53,15 +60,30 @@ class Optimum(NamedTuple):
 class _Program:
     """The inequalities in use, and their optimum."""
 
-    def __init__(self, space: PotentialSpace, samples: Samples, rng: np.random.Generator) -> None:
-        self.roughness, self.smoothing = space.roughness, _EARLY_SMOOTHING
+    def __init__(self, samples: Samples, held: list[tuple[np.ndarray, np.ndarray]], rng: np.random.Generator) -> None:
+        self.space, self.roughness, self.smoothing = samples.space, samples.space.roughness, _EARLY_SMOOTHING
         self.samples = samples
         self.rng = rng
-        chosen = np.sort(rng.permutation(samples.motion.size)[: 3 * space.size])
-        self.rows, self.constants = sparse.csr_matrix((0, space.size)), np.empty(0)
+        self.rows, self.constants = sparse.csr_matrix((0, self.space.size)), np.empty(0)
         self.index, self.heading = np.empty(0, dtype=int), np.empty(0)
-        self._hold([(chosen, np.full(chosen.size, h)) for h in np.arange(12) * (np.pi / 6)])
+        self._hold(held)
         self.best = self._solved()
+
+    @classmethod
+    def begun(cls, samples: Samples, rng: np.random.Generator) -> _Program:
+        """With some of the samples, chosen at random, at headings all round."""
+        chosen = np.sort(rng.permutation(samples.motion.size)[: 3 * samples.space.size])
+        return cls(samples, [(chosen, np.full(chosen.size, h)) for h in np.arange(12) * (np.pi / 6)], rng)
+
+    def moved_to(self, space: PotentialSpace) -> _Program:
+        """With the same inequalities, as other potentials have them."""
+        kept = self._kept()
+        return _Program(Samples(space, self.samples.motion), [(self.index[kept], self.heading[kept])], self.rng)
+
+    def _kept(self) -> np.ndarray:
+        """Mask of inequalities that matter."""
+        near = self.rows @ self.best.x + self.constants > self.best.value - _NEAR
+        return near | (self.best.weights > 1e-6 * self.best.weights.max())
 
     def _hold(self, added: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray | slice = slice(None)) -> None:
         """The inequalities kept, and those of more samples at given headings."""
@@ -87,9 +109,7 @@ class _Program:
         broken = np.flatnonzero(ratio > level + 0.5 * _HELD)
         broken = broken[np.argsort(-ratio[broken])[: 4 * _LARGEST_CUT]]
         broken = self.rng.permutation(broken)[:_LARGEST_CUT]
-        near = self.rows @ self.best.x + self.constants > level - 0.01
-        kept = near | (self.best.weights > 1e-6 * self.best.weights.max())
-        self._hold([(broken, heading[broken] + side) for side in _SIDES], kept)
+        self._hold([(broken, heading[broken] + side) for side in _SIDES], self._kept())
         self.best = self._solved()
 
     def settle(self, excess: float) -> float:
@@ -106,19 +126,11 @@ class _Program:
             self.samples = self.samples.joined(motion)
 
 
-def _starts(motion: CoulombMotion, ratio: np.ndarray, level: float, spacing: float, count: int) -> np.ndarray:
-    """Indices of up to `count` of the largest that come near `level`, one for each cell of shapes and directions."""
-    near = np.flatnonzero(ratio > level - _WINDOW)
-    near = near[np.argsort(-ratio[near])]
-    cell = np.concatenate([np.rint(motion.angles[:, near] / spacing), np.rint(motion.rates[:, near] * 4.0)]).T
-    _, first = np.unique(cell, axis=0, return_index=True)
-    return near[np.sort(first)][:count]
-
-
 def exchanged_optimum(
     domain: Domain,
     space: PotentialSpace,
     *,
+    intervals: int = 0,
     shapes: int,
     directions: int,
     rounds: int,
@@ -126,12 +138,14 @@ def exchanged_optimum(
     tolerance: float,
     seed: int = 0,
 ) -> Optimum:
-    """The potential of `space` whose largest ratio over `domain` is smallest.
+    """The potential of `space`, or of one with more knots, whose largest ratio over `domain` is smallest.
 
     Parameters
     ----------
     domain : Domain
     space : PotentialSpace
+    intervals : int
+        Knots are inserted, where the multipliers ask for them (`colloc.bounds.knots`), until there are so many intervals.
     shapes, directions : int
         The first lattice.
     rounds : int
@@ -143,7 +157,7 @@ def exchanged_optimum(
     seed : int
     """
     rng = np.random.default_rng(seed)
-    program = _Program(space, Samples(space, domain.lattice(shapes, directions)), rng)
+    program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng)
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
     seen, quiet, surprise = program.samples.motion.size, 0, 0.1
     for count in range(1, rounds + 1):
@@ -153,14 +167,14 @@ def exchanged_optimum(
         held = program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
         free = program.best.x
 
-        def ratio(motion: CoulombMotion, free: np.ndarray = free) -> np.ndarray:
+        def ratio(motion: CoulombMotion, space: PotentialSpace = space, free: np.ndarray = free) -> np.ndarray:
             return Samples(space, motion).ratio(free)[0]
 
         last = quiet > 0 or count == rounds
         fresh = domain.lattice(shapes * (1 + last), directions * (1 + last), max((count * _GOLDEN) % 1.0, 0.01))
         pooled = fresh.joined(program.samples.motion)
         values = np.concatenate([ratio(fresh), program.samples.ratio(free)[0]])
-        chosen = _starts(pooled, values, program.best.value, spacing, starts * (1 + 2 * last))
+        chosen = near_the_top(pooled, values, program.best.value, spacing, starts * (1 + 2 * last))
         summit = domain.summits(ratio, pooled.take(chosen), 0.5 * spacing, 0.5 * turn, 14, rng, program.best.value - _HOPELESS)
         reached = ratio(summit)
         seen += fresh.size + chosen.size
@@ -168,9 +182,13 @@ def exchanged_optimum(
         # two rounds in a row, the second on a finer lattice, must find nothing
         surprise = top - program.best.value
         quiet = quiet + 1 if top <= program.best.value + tolerance else 0
-        if quiet == 2 or count == rounds:
+        coarse = space.spline.intervals < intervals
+        if (quiet == 2 and not coarse) or count == rounds:
             break
         program.add(summit.take(np.flatnonzero(reached > program.best.value + 0.25 * tolerance)))
-    best = int(np.argmax(reached))
+        if coarse and surprise < max(_RIPE, tolerance):
+            space, quiet = with_more_knots(space, program.measure(), intervals), 0
+            program = program.moved_to(space)
+    best = summit.take(np.array([int(np.argmax(reached))]))
     assert held <= top
-    return Optimum(free, program.best.value, top, summit.take(np.array([best])), seen, count, quiet == 2, program.measure())
+    return Optimum(space, free, program.best.value, top, best, seen, count, quiet == 2, program.measure())

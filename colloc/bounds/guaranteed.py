@@ -243,6 +243,8 @@ def certify(
             "a bound is guaranteed only for three equal links, isotropic friction and harmonic 1; "
             "otherwise the sampled value stands."
         )
+    if bound.graded:
+        raise ProblemError("cells have to keep to the knots of the reference point: give a bound whose knots are even.")
     begin = time.process_time()
     reference = _Reference(bound, body)
     goal = target * friction.mu_t

@@ -17,6 +17,10 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError
 
+_EDGE, _BISECTIONS = 1e-9, 30
+_FINE = 1e-3
+"""Steps of the search for the best shape at which it ends [rad]: a width of links or a limit binds somewhere between."""
+
 
 class SmallGait(NamedTuple):
     """The best small gait at a shape.
@@ -133,6 +137,17 @@ def small_gait(
     return SmallGait(float(value), heading, motion.rates[:, used], weights[used])
 
 
+def _drawn_in(body: Chain, shapes: np.ndarray) -> np.ndarray:
+    """Shapes ``(n_joint, n)``, those that are not admissible moved towards the straight body until they are."""
+    inside, beyond = np.zeros(shapes.shape[1]), np.ones(shapes.shape[1])
+    inside[admissible(body, shapes, _EDGE)] = 1.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (inside + beyond)
+        keeps = admissible(body, middle * shapes, _EDGE)
+        inside, beyond = np.where(keeps, middle, inside), np.where(keeps, beyond, middle)
+    return inside * shapes
+
+
 def best_small_gait(
     body: Chain, friction: Friction, joint_limit: float = np.pi, steps: int = 10, refined: int = 3
 ) -> tuple[SmallGait, np.ndarray]:
@@ -142,7 +157,7 @@ def best_small_gait(
     """
     axis = np.linspace(-joint_limit, joint_limit, steps + 1)
     shapes = np.stack([a.ravel() for a in np.meshgrid(*[axis] * body.n_joint, indexing="ij")])
-    shapes = shapes[:, admissible(body, shapes, 1e-9) & fundamental(body, shapes)]
+    shapes = _drawn_in(body, shapes[:, fundamental(body, shapes)])
 
     def rough(shape: np.ndarray) -> float:
         return small_gait(body, friction, shape, 180, 4, 0).efficiency
@@ -152,9 +167,9 @@ def best_small_gait(
     found = []
     for start in np.argsort(-values)[:refined]:
         shape, value, size = shapes[:, start], rough(shapes[:, start]), joint_limit / steps
-        while size > 0.01:
+        while size > _FINE:
             tried = np.clip(shape + size * moves, -joint_limit, joint_limit)
-            tried = tried[admissible(body, tried.T, 1e-9)]
+            tried = tried[admissible(body, tried.T, _EDGE)]
             tried = tried[np.abs(tried - shape).max(axis=1) > 1e-9]
             reached = [rough(s) for s in tried]
             if max(reached, default=-np.inf) > value + 1e-6:

@@ -2,7 +2,7 @@
 
 The program that bounds the efficiency is the dual of a linear one: of all ways to share out work among motions (shape, heading
 of the middle link, direction of the joint rates) so that they close in the mean, find the one that travels farthest. Its
-multipliers are that mixture. They say where a gait should look for its shapes, and where the potential needs its knots.
+multipliers are that mixture. They say where a gait should look for its shapes.
 """
 
 from __future__ import annotations
@@ -16,9 +16,6 @@ from colloc.gaits.paths import Corners
 from colloc.gaits.symmetry import BILATERAL
 from colloc.system.errors import ProblemError
 
-_EVEN = 0.5
-"""Part of the knots that is spread evenly."""
-_FINE = 400
 _SECTORS = 24
 """Of the quarter of the plane of two joint angles, in which a measure is averaged to a path."""
 _LIGHT = 2e-3
@@ -51,21 +48,6 @@ class Measure:
         """Distance over work; up to smoothing and tolerances the value of the program."""
         u, v = self.motion.velocity
         return float(self.time @ (np.cos(self.heading) * u - np.sin(self.heading) * v))
-
-    def graded_knots(self, intervals: int, limit: float) -> tuple[float, ...]:
-        """Inner knots in every joint angle, symmetric about 0, half of them spread evenly and half where the weight is."""
-        edges = np.linspace(0.0, limit, _FINE + 1)
-        joints = np.abs(self.motion.angles)
-        weight = np.histogram(joints.ravel(), edges, weights=np.tile(self.weight, len(joints)))[0]
-        width = max(1, _FINE // intervals)
-        smooth = np.convolve(weight, np.ones(width) / width, mode="same")
-        density = _EVEN / _FINE + (1 - _EVEN) * smooth / max(smooth.sum(), 1e-300)
-        along = np.concatenate([[0.0], np.cumsum(density)])
-        # the half line from 0: a knot at 0 itself where the number of intervals is even
-        places = np.arange(intervals % 2 / 2 or 1.0, intervals / 2, 1.0) * (2 / intervals)
-        positive = np.interp(places * along[-1], along, edges)
-        middle = [0.0] if intervals % 2 == 0 else []
-        return (*(-positive[::-1]).tolist(), *middle, *positive.tolist())
 
     def path(self) -> Corners:
         """A closed path of two joint angles through the mean shapes of the measure, symmetric both ways: a start for a search.

@@ -19,14 +19,16 @@ import numpy as np
 from colloc.bounds.coulomb_motion import swaps_ends
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
+from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampling import Domain
+from colloc.gaits.gait_fields import fields, law_fields
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
 
-VERSION = 2
+VERSION = 3
 """Part of the cache key: raise it when the computation changes its result."""
 
 
@@ -37,7 +39,7 @@ class Budget:
     Parameters
     ----------
     intervals : int
-        Knot intervals of the splines in every joint angle.
+        Knot intervals of the splines in every joint angle, at most.
     harmonics : tuple of int, optional
         Harmonics in the heading; by default (1, 3), or (0, 1) where mu_b differs from mu_f.
     shapes, directions : int
@@ -48,22 +50,23 @@ class Budget:
         Climbs a round.
     tolerance : float
         Excess of the summits over the program's value at which a bound counts as converged.
-    graded : tuple of float
-        Inner knots in every joint angle, if they are not to be evenly spaced (`colloc.numerics.spline`).
+    first : int
+        Even intervals to begin with; more knots are inserted where they are worth most (`colloc.bounds.knots`). As many as
+        `intervals` keep the knots even.
     """
 
-    intervals: int = 10
+    intervals: int = 12
     harmonics: tuple[int, ...] | None = None
     shapes: int = 20
     directions: int = 48
-    rounds: int = 24
+    rounds: int = 60
     starts: int = 250
     tolerance: float = 5e-4
-    graded: tuple[float, ...] = ()
+    first: int = 6
 
 
 QUICK = Budget()
-THOROUGH = Budget(intervals=14, harmonics=(1, 3, 5), shapes=28, rounds=30, starts=400)
+THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4)
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,8 @@ class Bound:
     floor : float
         Value of the last program: no potential of this space does better on the samples held, up to the smoothing (1e-5).
     converged : bool
-        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`.
+        Whether the last climbs between the samples stayed within the budget's tolerance of `floor`, and those of a check that
+        the program knows nothing of (`colloc.bounds.recheck`) within twice of it.
     guaranteed : float or None
         Value certified between samples too (`colloc.bounds.guaranteed`), if asked for and possible.
     missing : str
@@ -138,42 +142,46 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     begin = time.process_time()
     body = domain.body
     harmonics = budget.harmonics or ((1, 3) if domain.friction.reversible else (0, 1))
-    spline = TensorSpline(body.n_joint, domain.joint_limit, budget.intervals, budget.graded)
+    spline = TensorSpline(body.n_joint, domain.joint_limit, min(budget.first, budget.intervals))
     space = PotentialSpace(spline, harmonics, swaps_ends(body))
     found = exchanged_optimum(
         domain,
         space,
+        intervals=budget.intervals,
         shapes=budget.shapes,
         directions=budget.directions,
         rounds=budget.rounds,
         starts=budget.starts,
         tolerance=budget.tolerance,
     )
+    # by samples that the program did not choose
+    checked, motion = largest_ratio(
+        domain, found.space, found.free, shapes=3 * budget.shapes, directions=2 * budget.directions, starts=2 * budget.starts
+    )
+    top, summit = max((found.top, found.summit), (checked, motion), key=lambda each: each[0])
     missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW
     return Bound(
-        sampled=found.top,
+        sampled=top,
         floor=found.floor,
-        converged=found.converged,
+        converged=found.converged and top <= found.floor + 2 * budget.tolerance,
         guaranteed=None,
         missing=missing.format(samples=found.samples),
-        angles=tuple(found.summit.angles[:, 0].tolist()),
-        rates=tuple(found.summit.rates[:, 0].tolist()),
+        angles=tuple(summit.angles[:, 0].tolist()),
+        rates=tuple(summit.rates[:, 0].tolist()),
         joint_limit=domain.joint_limit,
-        intervals=budget.intervals,
+        intervals=found.space.spline.intervals,
         harmonics=harmonics,
         coefficients=tuple(found.free.tolist()),
         samples=found.samples,
         seconds=time.process_time() - begin,
-        graded=budget.graded,
+        graded=found.space.spline.graded,
     )
 
 
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
-    fields = {"version": VERSION, "domain": asdict(domain), "budget": asdict(budget)}
-    if type(domain.friction) is not Friction:  # a law with the same coefficients
-        fields["law"] = type(domain.friction).__name__
-    return hash_of(fields)
+    stated = {"body": fields(domain.body), "friction": law_fields(domain.friction), "joint_limit": domain.joint_limit}
+    return hash_of({"version": VERSION, "domain": stated, "budget": asdict(budget)})
 
 
 def known_bound(
@@ -189,8 +197,8 @@ def known_bound(
     if entry is None:
         return None
     try:
-        fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
-        return Bound(**fields)
+        stored: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
+        return Bound(**stored)
     except (TypeError, AttributeError):
         raise StoreError(f"{cache} holds something else than bounds; move it away.") from None
 

@@ -7,14 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import CoulombMotion, admissible, all_motions, fundamental, unit_directions
+from colloc.bounds.coulomb_motion import (
+    CoulombMotion,
+    admissible,
+    all_motions,
+    fundamental,
+    one_joint,
+    unit_directions,
+)
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 
 _DELTA = 1e-6
 """Regularisation speed, at unit shape speed: solving costs half of what it does at 1e-9, the best small gait loses 1.5e-5."""
 _EDGE = 1e-9
-_FRAMES = 4
+_FRAMES, _STEADY = 4, 2
+"""Directions, and their opposites, that a climb tries at a step; and in how many of them the rates stay as they are."""
+_FINER = 3
+"""Motions of one joint alone are sampled so many times as densely in every angle: their peaks are those hardest to meet."""
 _TRIAL_STEPS = 4
 _GROW, _SHRINK = 1.25, 0.5
 
@@ -45,19 +55,24 @@ class Domain:
         return all_motions(self.body, self.friction, angles, rates, _DELTA)
 
     def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> CoulombMotion:
-        """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions.
+        """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions; and of each
+        joint turning alone, on a finer one.
 
         One of each class of mirror images; with directed friction the end swap reverses time, so both senses of every rate
         are sampled. `shift` in [0, 1) moves the lattice by that part of its spacing (then without its last value).
         """
-        steps = (np.arange(shapes + (shift == 0)) + shift) / shapes
-        axis = self.joint_limit * (2.0 * steps - 1.0)
-        angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.body.n_joint, indexing="ij")])
-        angles = angles[:, self.holds(angles) & fundamental(self.body, angles)]
         rates = unit_directions(self.body.n_joint, directions, self.friction.reversible)
         if shift and self.body.n_joint == 2:
             turn = shift * (np.pi if self.friction.reversible else 2.0 * np.pi) / directions
             rates = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ rates
+        alone = one_joint(self.body.n_joint, self.friction.reversible)
+        return self._at_all(shapes, shift, rates).joined(self._at_all(_FINER * shapes, shift, alone))
+
+    def _at_all(self, shapes: int, shift: float, rates: np.ndarray) -> CoulombMotion:
+        steps = (np.arange(shapes + (shift == 0)) + shift) / shapes
+        axis = self.joint_limit * (2.0 * steps - 1.0)
+        angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.body.n_joint, indexing="ij")])
+        angles = angles[:, self.holds(angles) & fundamental(self.body, angles)]
         return self.solved(np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1]))[0]
 
     def summits(
@@ -87,6 +102,8 @@ class Domain:
                 top, best, size, n = top.take(going), best[going], size[going], going.size
                 angles, rates = top.angles, top.rates
             move = rng.standard_normal((2 * n_joint, n, _FRAMES))
+            # along a crease that holds for the same rates at many shapes, as where one joint turns and the rest sticks
+            move[n_joint:, :, :_STEADY] = 0.0
             # a direction of rates means nothing along the rates themselves
             along = (move[n_joint:] * rates[:, :, None]).sum(axis=0)
             move[n_joint:] -= along * rates[:, :, None]

@@ -12,8 +12,7 @@ from pathlib import Path
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
-from colloc.results.relaxed_store import is_relaxed, load_relaxed
-from colloc.results.store import load
+from colloc.results.solution_file import load
 
 _EPILOG = """\
 Orange arrows are the friction on the links; the large disc is the head; the small plane shows the first two joint angles.
@@ -44,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
-    solution = load_relaxed(source) if is_relaxed(source) else load(source)
+    solution = load(source)
     path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('gif', 'mp4'))}"))
     settings = {"periods": options.periods, "seconds": options.seconds, "fps": options.fps, "width": options.width}
     from colloc.pictures.movie import write_movie  # heavy imports only now: a bad option is refused at once

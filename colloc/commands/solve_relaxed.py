@@ -14,11 +14,9 @@ from colloc.gaits.problem_file import ProblemFile, Reference
 from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.relaxed_store import save_relaxed
 from colloc.results.solution import SOLVED
-from colloc.search.relaxed_search import best_relaxed_gait
+from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.system.errors import CollocError
 from colloc.system.progress import StatusLine
-
-STARTS = 8
 
 
 def summary_lines(solution: RelaxedSolution, reference: Reference | None = None) -> list[str]:
@@ -87,7 +85,7 @@ def solve_relaxed(problem: Problem, stated: ProblemFile, path: Path, options: ar
     quiet = options.quiet or options.json
     with StatusLine(enabled=not quiet) as line:
         solution = best_relaxed_gait(
-            problem, options.starts or stated.starts or STARTS, seconds=options.seconds,
+            problem, options.starts or stated.starts or RELAXED_STARTS, seconds=options.seconds,
             report=lambda what: line.say(f"{problem.name}: {what}"),
         )  # fmt: skip
     solution.source = stated.source

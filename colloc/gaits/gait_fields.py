@@ -29,6 +29,7 @@ from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
+from colloc.system.argument_names import STATED_IF_SET
 
 AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
@@ -44,12 +45,17 @@ LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 
 def fields(value: Any) -> dict[str, Any]:
     """The fields of a gait, a class of gaits or a body as numbers, strings and lists."""
-    found = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+    stated = [f for f in dataclasses.fields(value) if f.metadata != STATED_IF_SET or getattr(value, f.name) != f.default]
+    found = {f.name: getattr(value, f.name) for f in stated}
     return {k: v.tolist() if isinstance(v, (np.ndarray, np.generic)) else v for k, v in found.items()}
 
 
+def _always_stated(kind: type) -> set[str]:
+    return {f.name for f in dataclasses.fields(kind) if f.metadata != STATED_IF_SET}
+
+
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
-    exact = [kind for kind in kinds if {f.name for f in dataclasses.fields(kind)} == set(given)]
+    exact = [kind for kind in kinds if _always_stated(kind) <= set(given) <= {f.name for f in dataclasses.fields(kind)}]
     for kind in (*exact, *kinds):
         # fields that are left out have defaults: the first one tells the kind
         if dataclasses.fields(kind)[0].name in given:

@@ -277,14 +277,13 @@ class Problem:
         if largest > limit + self.body.usual.excess:
             each = np.abs(self.body.limited @ stretched).max(axis=1, initial=0.0)
             which = self.body.limit_names[np.argmax(each)] if each.size else "the tangent"
-            raise ProblemError(
-                f"guess is inadmissible: {which} reaches {largest:.4g} rad, "
-                f"beyond the limit {limit:.4g}; make its amplitude smaller."
-            )
+            beyond = f"{which} reaches {largest:.4g} rad, beyond the limit {limit:.4g}"
+            raise ProblemError(f"guess is inadmissible: {beyond}; make its amplitude smaller.")
         depth = self.body.crossing_depth(angles)
         if depth.max() > _SLACK:
             when = np.argmax(depth) / _CHECKED_PHASES
-            raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
+            what = "overlap" if self.body.drawn_width else "cross each other"
+            raise ProblemError(f"guess is inadmissible: links {what} at phase {when:.3f}.")
 
     def __repr__(self) -> str:
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"

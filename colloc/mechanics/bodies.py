@@ -301,6 +301,10 @@ class Body(Protocol):
         """How far parts pass through each other from instant to instant of a path."""
 
     # form
+    @property
+    def drawn_width(self) -> float:
+        """Of the strip along the outline [body lengths]; 0 for a line."""
+
     def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points along the body in its axes, seen from the tail, x and y, ``(n_point, n_time)`` each, tail first."""
 

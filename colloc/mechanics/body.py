@@ -25,7 +25,6 @@ from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     SMOOTHING,
-    crossing_depth,
     crossing_sums,
     far_pairs,
     intrusions,
@@ -36,6 +35,7 @@ from colloc.mechanics.law import Law
 from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.mechanics.width import excesses, overlap
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.argument_names import named_arguments
 
@@ -48,11 +48,14 @@ class Chain(Links):
     ----------
     lengths : tuple of float
         Link lengths from tail to head; they add up to the body length, 1.
+    width : float
+        Of every link [body lengths]: links do not overlap but neighbours about their joint (`colloc.mechanics.width`). By
+        default links are lines, which must not cross but may lie on each other. Friction is that of the lines either way.
 
     Examples
     --------
     >>> from colloc import Chain
-    >>> Chain((0.25, 0.5, 0.25)).n_joint
+    >>> Chain((0.25, 0.5, 0.25), width=0.02).n_joint
     2
     """
 
@@ -83,7 +86,8 @@ class Chain(Links):
         return self
 
     def describe(self) -> str:
-        return f"links of lengths {', '.join(f'{length:.4g}' for length in self.lengths)} from the tail [body lengths]"
+        wide = f", {self.width:.4g} wide" if self.width else ""
+        return f"links of lengths {', '.join(f'{length:.4g}' for length in self.lengths)} from the tail{wide} [body lengths]"
 
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         now = instant(self, friction, angles, rates, z, delta)
@@ -152,7 +156,7 @@ class Chain(Links):
         return np.abs(angles).max(axis=0)
 
     def contacts(self, angles: Array, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
-        """All links two apart, bending to either side, and the pairs `far` of links farther apart."""
+        """All links two apart, bending to either side, the pairs `far` of links farther apart, and what a width asks of all."""
         found = []
         for i, (first, second) in enumerate(crossing_sums(self, angles)):
             name = f"links {i + 1} and {i + 3}"
@@ -160,6 +164,10 @@ class Chain(Links):
             found.append(Contact(f"{name} (right)", -first - np.pi, -second - np.pi, SMOOTHING))
         for i, j in far:
             found.append(Contact(f"links {i + 1} and {j + 1}", *intrusions(self, angles, i, j), CLEARANCE_SMOOTHING))
+        if self.width:
+            for (end, link), excess in excesses(self, angles):
+                # one condition alone is the smaller of two that are the same
+                found.append(Contact(f"end {end} and link {link + 1}", excess, excess, CLEARANCE_SMOOTHING))
         return found
 
     @property
@@ -167,7 +175,7 @@ class Chain(Links):
         return tuple(far_pairs(self))
 
     def crossing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
-        return crossing_depth(self, angles, pairs)
+        return overlap(self, angles, pairs)
 
     def passing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
         return passing_depth(self, angles, pairs)
@@ -178,6 +186,10 @@ class Chain(Links):
     @property
     def hinges(self) -> slice:
         return slice(1, -1)
+
+    @property
+    def drawn_width(self) -> float:
+        return self.width
 
     def centre(self, angles: np.ndarray) -> np.ndarray:
         return np.concatenate(self.centre_of_mass(self.posture(angles)))

@@ -166,28 +166,6 @@ def passing_depth(body: Links, angles: np.ndarray, pairs: Sequence[tuple[int, in
     return deepest
 
 
-def gap(body: Links, angles: np.ndarray) -> np.ndarray:
-    """The smallest distance between any two links [body lengths], ``(n_time,)``; 0 where links lie on or cross each other.
-
-    Of neighbours, which always meet at their joint, it is the distance from the free end of one to the other. Joint angles
-    ``(n_joint, n_time)``. So neighbours of equal lengths l folded by an angle beyond pi/2 have the gap l sin(pi - |angle|).
-    """
-    ends = np.stack(body.joints(angles))
-    distances = [
-        _from_segment(ends, end, line)
-        for line in range(body.n_link)
-        for end in (*range(line), *range(line + 2, body.n_link + 1))
-    ]
-    return np.where(crossing_depth(body, angles) > 0, 0.0, np.min(distances, axis=0))
-
-
-def _from_segment(ends: np.ndarray, end: int, link: int) -> np.ndarray:
-    """Distance of the chain's joint or tip number `end` from a link, ``(n_time,)``."""
-    along, to = ends[:, link + 1] - ends[:, link], ends[:, end] - ends[:, link]
-    part = np.clip((along * to).sum(axis=0) / (along * along).sum(axis=0), 0.0, 1.0)
-    return np.hypot(*(to - part * along))
-
-
 def _end_distances(ends: np.ndarray, i: int, j: int) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
     """Signed distances of the ends of link j from the line of link i, the other way round, and which ends lie beside."""
     result: list[list[np.ndarray]] = []

@@ -8,12 +8,13 @@ choice keeps the relative precision of a link at rest, which the first loses by 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
+from colloc.system.argument_names import STATED_IF_SET
 from colloc.system.errors import ProblemError
 
 TAIL = None
@@ -45,9 +46,12 @@ class Links:
     ----------
     lengths : tuple of float
         Link lengths from tail to head; they add up to the body length, 1.
+    width : float
+        Of every link [body lengths], see `colloc.mechanics.width`; by default links are lines.
     """
 
     lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)
+    width: float = field(default=0.0, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
         try:
@@ -61,6 +65,10 @@ class Links:
             raise ProblemError(f"body.lengths must be positive and finite, not {lengths}.")
         if abs(sum(lengths) - 1.0) > 1e-12:
             raise ProblemError(f"body.lengths must add up to the body length 1, not {sum(lengths):.12g}.")
+        width = self.width
+        if isinstance(width, bool) or not isinstance(width, (int, float, np.number)) or not 0 <= width < min(lengths):
+            raise ProblemError(f"body.width must be a number from 0 to below the shortest link, not {width!r}.")
+        object.__setattr__(self, "width", float(width))
 
     @property
     def in_series(self) -> bool:

@@ -74,7 +74,9 @@ class _Scene:
         figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
         self.phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
         self.trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in (SKY, ORANGE, VERMILION)]
-        (self.body,) = axes.plot([], [], "-", color=INK, lw=4, solid_capstyle="round", solid_joinstyle="round")
+        # a pixel is `scale` body lengths, and 0.72 points
+        thickness = 0.72 * solution.problem.body.drawn_width / scale or 4
+        (self.body,) = axes.plot([], [], "-", color=INK, lw=thickness, solid_capstyle="round", solid_joinstyle="round")
         (self.joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
         (self.head,) = axes.plot([], [], "o", color=INK, ms=9)
         (self.centre,) = axes.plot([], [], "o", color=VERMILION, ms=5)

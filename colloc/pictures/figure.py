@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
@@ -26,6 +26,8 @@ _FLAT, _SEEN = 0.12, 0.3
 _SMALL = 1.6
 """Extent [rad] below which a path in shape space is shown from closer than the whole plane."""
 _MOST_PERIODS = 3
+_ROUND = 9
+"""Vertices of the round end of a link."""
 _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -43,7 +45,7 @@ def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int 
     shift = middle - 0.5 * (x.min(axis=0) + x.max(axis=0))
     low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
-        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body.hinges)
+        draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body)
         axes.plot(motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
         axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, -3), color=GREY, **below)
@@ -61,10 +63,25 @@ def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int 
         axes.annotate(f"heights drawn {higher} times as large", (0, 1), (4, 4), **above)
 
 
-def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, hinges: slice) -> None:
-    """One body from its outline, ``(2, n_point)``: its joints hollow, its head a disc."""
-    axes.plot(*ends, "-", color=colour, lw=2.4, solid_capstyle="round", solid_joinstyle="round")
-    axes.plot(*ends[:, hinges], "o", color="white", mec=colour, ms=3.5)
+def strips(ends: np.ndarray, width: float) -> np.ndarray:
+    """Round-ended strips of a width about the parts of an outline ``(2, n_point)``: polygons ``(n_part, n_vertex, 2)``."""
+    along = np.arctan2(*np.diff(ends)[::-1])[:, None]
+    half_turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ROUND)
+    rims = [
+        end[:, :, None] + 0.5 * width * np.stack([np.cos(along + turn), np.sin(along + turn)])
+        for end, turn in ((ends[:, 1:], half_turn), (ends[:, :-1], half_turn + np.pi))
+    ]
+    return np.concatenate(rims, axis=2).transpose(1, 2, 0)
+
+
+def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body) -> None:
+    """One body from its outline, ``(2, n_point)``: links of their width, if they have one, joints hollow, the head a disc."""
+    if body.drawn_width:
+        links = list(strips(ends, body.drawn_width))
+        axes.add_collection(PolyCollection(links, facecolors=[colour], edgecolors="white", lw=0.2))
+    else:
+        axes.plot(*ends, "-", color=colour, lw=2.4, solid_capstyle="round", solid_joinstyle="round")
+    axes.plot(*ends[:, body.hinges], "o", color="white", mec=colour, ms=3.5)
     axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
 
 
@@ -85,7 +102,7 @@ def draw_lab(axes: Axes, solution: Solution | RelaxedSolution) -> None:
     for path, colour, name in ((ends[:, 0], BLUE, "tail"), (ends[:, -1], ORANGE, "head"), (fine.centre, VERMILION, "centre")):
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
-        draw_body(axes, ends[:, :, k], shade, solution.problem.body.hinges)
+        draw_body(axes, ends[:, :, k], shade, solution.problem.body)
         axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
     axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]")

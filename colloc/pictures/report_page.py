@@ -15,6 +15,7 @@ from markupsafe import Markup
 from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference, problem_file_text
+from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.style import INK, styled
@@ -95,7 +96,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
             _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
         ]
-        found |= {"motion": motion_data(frames(solution), body.hinges), "errors": float(errors.sum())}
+        found |= {"motion": motion_data(frames(solution), body), "errors": float(errors.sum())}
     return (
         environment()
         .get_template("report.html")
@@ -181,7 +182,7 @@ def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, 
     return Picture(caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase)
 
 
-def motion_data(shown: Frames, hinges: slice) -> dict[str, Any]:
+def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     """What report.js draws: rows over time, the window that holds all of it, the length of the arrows."""
     last = (shown.periods - 1) * shown.step
     reach = np.concatenate([shown.ends.reshape(2, -1), shown.ends.reshape(2, -1) + last[:, None]], axis=1)
@@ -195,7 +196,7 @@ def motion_data(shown: Frames, hinges: slice) -> dict[str, Any]:
     data: dict[str, Any] = {name: np.round(row, 4).tolist() for name, row in rows.items()}
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
-        "hinges": hinges.indices(len(shown.ends[0]))[:2],
+        "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
         "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": 0.12 / strongest,
         "grid": grid,
         "shape": float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 1.2, 4.0)),

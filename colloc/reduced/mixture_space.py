@@ -21,7 +21,7 @@ _NEAR = 0.6
 _CELLS = 3
 """Mesh intervals of a piece: where links begin to stick the velocities have kinks, which are narrow for small delta."""
 _LONGEST = 1.0
-"""Time in a direction on a piece [rad], at most. A gait that loops at one shape could go on for ever."""
+"""Time in one of several directions on a piece [rad], at most. A gait that loops at one shape could go on for ever."""
 _LOOP = 0.05
 """Time that a mixture begun along a path spends in every other direction, as a share of that along the path."""
 _SAMPLES = 2000
@@ -58,7 +58,9 @@ class MixtureSpace:
         self.n = self.time.stop + count * (1 if self.n_joint == 2 else self.n_joint)
         self.own = np.arange(self.n)
         self.lower, self.upper = np.full(self.n, -np.inf), np.full(self.n, np.inf)
-        self.lower[self.time], self.upper[self.time] = 0.0, _LONGEST
+        # a side of a polygon goes across the square of admissible angles at most
+        longest = _LONGEST if self.n_direction > 1 else 2 * problem.joint_limit * np.sqrt(self.n_joint)
+        self.lower[self.time], self.upper[self.time] = 0.0, longest
         # instants of the checks as means of the shapes where pieces meet
         ends = np.eye(pieces + 1)
         self._watch = np.vstack([ends, 0.5 * (ends[:-1] + ends[1:])])

@@ -23,7 +23,7 @@ from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
 
-_OWN_SEARCH = "relaxed gaits have a search of their own: colloc solve FILE, or colloc.search.relaxed_search.best_relaxed_gait."
+_OWN_SEARCH = "relaxed gaits have a search of their own: colloc solve FILE, or colloc.solve."
 
 
 def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:

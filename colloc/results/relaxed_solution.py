@@ -6,12 +6,16 @@ repeat its directions so and so often (`colloc.gaits.mixture.Mixture.realised`),
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from colloc.gaits.guesses import largest_factor, under_one_limit
 from colloc.gaits.mixture import Mixture, corners_of
 from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
@@ -19,6 +23,7 @@ from colloc.results.certificate import VIOLATION, gait_certificate
 from colloc.results.checks import Certificate, Check
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED, SampledMotion, versions
 from colloc.system.errors import NotConvergedError
+from colloc.system.late_binding import bound
 
 STATIONARY = 1e-3
 """Largest slope of the Lagrangian of the reduced program at a relaxed optimum: the efficiency is off by about its square."""
@@ -149,6 +154,16 @@ class RelaxedSolution:
         return SOLVED if self.measured.passed else CERTIFICATE_FAILED
 
     @property
+    def success(self) -> bool:
+        """Whether the best finite gait is certified."""
+        return self.status == SOLVED
+
+    @property
+    def efficiency(self) -> float:
+        """Of the best finite gait; what it tends to is ``certificate.efficiency``."""
+        return self.measured.efficiency
+
+    @property
     def delta_per_period(self) -> float:
         """Regularisation speed of the best finite gait in body lengths per period."""
         return self.problem.delta * self.gait.delta_unit
@@ -181,6 +196,14 @@ class RelaxedSolution:
         tail = place - np.exp(1j * theta_at) * (cx + 1j * cy)
         lab = np.stack([place.real, place.imag])
         return SampledMotion(t, angles, self.gait.rates(phase), z, theta_at, lab, np.stack([tail.real, tail.imag]))
+
+    def plot(self) -> Any:
+        """The figure of `colloc solve`, as a matplotlib Figure."""
+        return bound("plot relaxed")(self)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the motion of the best finite gait as GIF or MP4; options as for `colloc.pictures.movie.write_movie`."""
+        return bound("animate")(self, Path(path), **options)
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
@@ -220,6 +243,16 @@ def finite_certificate(problem: Problem, gait: Corners, instants: int = 1600, to
     return gait_certificate(problem, path, problem.delta * gait.delta_unit, gait.corner_phases, instants, tolerance)
 
 
+def kept_inside(problem: Problem, gait: Corners) -> Corners:
+    """A polygon about admissible shapes, shrunk towards the straight body by as much as its loops reach beyond them."""
+    body, angles = problem.body, gait.angles(np.union1d(np.linspace(0.0, 1.0, _GRID + 1), gait.corner_phases))
+    stretched, limit = under_one_limit(angles, problem.joint_limit)
+    beyond = max(float(body.largest_angles(stretched).max()) - limit, float(body.crossing_depth(angles).max()))
+    if beyond <= body.usual.excess:
+        return gait
+    return Corners(largest_factor(body, problem.joint_limit, angles) * gait.corners, gait.symmetry)
+
+
 def realised_gaits(
     problem: Problem,
     gait: Mixture,
@@ -244,7 +277,7 @@ def realised_gaits(
         report(f"certifying {m} repeats")
         both = []
         for sense in (1, -1):
-            corners = gait.realised(m, sense)
+            corners = kept_inside(problem, gait.realised(m, sense))
             both.append(Realised(m, sense, corners, finite_certificate(problem, corners)))
         found.append(max(both, key=lambda r: (r.certificate.passed, r.certificate.efficiency)))
         far = max(r.certificate.efficiency for r in found) < (1 - _NEAR) * tends_to

@@ -73,17 +73,6 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
     ------
     StoreError
         If the folder cannot be made or written.
-
-    Examples
-    --------
-    >>> import colloc, os, tempfile
-    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    >>> solution = colloc.solve(problem, starts=1)
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = colloc.save(solution, os.path.join(folder, "quick.h5"))
-    ...     again = colloc.load(path)
-    >>> again.certificate == solution.certificate
-    True
     """
     path = Path(path)
     with new_file(path) as file:
@@ -101,13 +90,6 @@ def load(path: str | os.PathLike[str]) -> Solution:
     ------
     StoreError
         If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> colloc.load("nothing.h5")
-    Traceback (most recent call last):
-    colloc.system.errors.StoreError: there is no file nothing.h5.
     """
     changed = was_changed(Path(path), FORMAT)
     try:

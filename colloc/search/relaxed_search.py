@@ -25,6 +25,8 @@ from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 
+RELAXED_STARTS = 8
+"""Starts where none are asked for."""
 _COARSE, _MOST = 0.4, 0.7
 """Pieces on which starts are told apart, and are followed, as shares of those of the answer."""
 _FOLLOWED, _PROMISING, _SAME = 3, 0.8, 4e-3
@@ -216,9 +218,16 @@ def best_relaxed_gait(
         raise ProblemError("relaxed gaits are measured by their efficiency alone; leave objective, rotation and at_least out.")
     begin = time.perf_counter()
     best, *others = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
+    solution = certified(best, repeats, report)
+    solution.seconds, solution.starts = time.perf_counter() - begin, starts
+    solution.others = tuple((-other.objective, other.gait.extent) for other in others)
+    return solution
+
+
+def certified(best: Found, repeats: tuple[int, ...] = (1,), report: Callable[[str], None] = lambda _: None) -> RelaxedSolution:
+    """A relaxed gait, and finite gaits near it, with their certificates."""
     report("certifying the relaxed gait")
-    conditions = best.conditions
-    gait = best.gait
+    problem, conditions, gait = best.space.problem, best.conditions, best.gait
     # where the class has another direction to give
     free = (gait.durations <= _IDLE).any(axis=1)
     price = float(prices(best)[0][free].min(initial=0.0))
@@ -230,7 +239,5 @@ def best_relaxed_gait(
         optimality,
         certificate,
         realised_gaits(problem, gait, repeats, certificate.efficiency, report),
-        time.perf_counter() - begin,
-        starts=starts,
-        others=tuple((-other.objective, other.gait.extent) for other in others),
+        best.seconds,
     )

@@ -31,6 +31,7 @@ class SmoothBody:
     n_force = 0
     looks_for_all_velocities = False
     hinges = slice(0, 0)
+    drawn_width = 0.0
     far_pairs: Pairs = ()
     schedule: tuple[float, ...] = ()
     first_panels = 16

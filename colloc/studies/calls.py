@@ -13,14 +13,17 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
+from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sampling import LATIN_HYPERCUBE
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, Outcome, basins, counts
 from colloc.results.level import Level
+from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.search_step import SearchStep
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait, maximise_efficiency
+from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.studies.campaign import run_starts
 from colloc.studies.run import Progress, StudyRun
 from colloc.studies.study import Study, read_study_file
@@ -38,8 +41,8 @@ def solve(
     *,
     seconds: float = np.inf,
     verbose: bool = False,
-    progress: Callable[[Level | SearchStep], object] | None = None,
-) -> Solution:
+    progress: Callable[[Level | SearchStep | str], object] | None = None,
+) -> Solution | RelaxedSolution:
     """The most efficient gait of a problem, certified: what ``colloc solve`` finds.
 
     Parameters
@@ -47,18 +50,18 @@ def solve(
     problem : Problem or path-like
         A problem, or a problem file.
     starts : int, optional
-        Starts to find the best gait of; 1 is the guess alone. By default what the problem file says, else 16.
+        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 16 (relaxed gaits: 8).
     seconds : float
         Wall time after which no other start is begun.
     verbose : bool
         Print a line for every start and every level of delta as it ends.
     progress : callable, optional
         Called with a `colloc.results.search_step.SearchStep` after every start and every gait that is followed, then with every
-        `colloc.results.level.Level` of the best one.
+        `colloc.results.level.Level` of the best one; of relaxed gaits with what is under way, in words.
 
     Returns
     -------
-    Solution
+    Solution, or of a class of relaxed gaits RelaxedSolution
         Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that does not converge.
 
     Raises
@@ -79,8 +82,12 @@ def solve(
         raise ProblemError(f"starts must be at least 1, not {starts}.")
     if not seconds > 0:
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
-    told = _told(verbose, progress)
-    solution = best_gait(stated.problem, starts or stated.starts or STARTS, told, seconds, watch=told)
+    told, count = _told(verbose, progress), starts or stated.starts
+    solution: Solution | RelaxedSolution
+    if isinstance(stated.problem.gait, Relaxed):
+        solution = best_relaxed_gait(stated.problem, count or RELAXED_STARTS, seconds=seconds, report=told)
+    else:
+        solution = best_gait(stated.problem, count or STARTS, told, seconds, watch=told)
     solution.source = stated.source
     return solution
 

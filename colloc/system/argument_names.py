@@ -1,4 +1,4 @@
-"""Misspelt arguments of the classes that people write by hand: one sentence with the nearest name."""
+"""Arguments of the classes that people write by hand: misspelt ones meet a sentence with the nearest name."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 from colloc.system.errors import ProblemError
 
 T = TypeVar("T")
+STATED_IF_SET = {"stated if set": True}
+"""Metadata of a field that statements name only where it is not its default: what was stated before there was one, stays."""
 
 
 def named_arguments(cls: type[T]) -> type[T]:

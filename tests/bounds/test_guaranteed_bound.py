@@ -22,7 +22,7 @@ BODY = Chain()
 
 @pytest.fixture(scope="module")
 def bound() -> Bound:
-    return efficiency_bound(BODY, Friction(), budget=Budget(4, (1,), 8, 24, 3, 60))
+    return efficiency_bound(BODY, Friction(), budget=Budget(4, (1,), 8, 24, 3, 60, first=4))
 
 
 def test_loaded_balance_without_load_is_the_balance_of_the_body():
@@ -259,6 +259,12 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
 def test_what_the_proof_does_not_cover_is_refused(bound, body, friction, harmonics):
     with pytest.raises(ProblemError, match="isotropic"):
         certify(body, friction, dataclasses.replace(bound, harmonics=harmonics), 0.5, seconds=0.0)
+
+
+def test_cells_that_knots_would_cut_are_refused(bound):
+    """Slopes of the reference point are bounded on whole knot intervals, and cells halve even ones."""
+    with pytest.raises(ProblemError, match="even"):
+        certify(BODY, Friction(), dataclasses.replace(bound, graded=(-0.5, 0.0, 0.5)), 0.9)
 
 
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])

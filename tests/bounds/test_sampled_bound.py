@@ -107,7 +107,8 @@ def test_centre_of_mass_gives_exactly_one_for_isotropic_friction():
 
 def test_two_links_with_reversible_friction_cannot_move():
     """A path in one angle retraces itself, so the true bound is 0; splines approach it as their knots get finer."""
-    values = [efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(n, (1,), 64, 1)).sampled for n in (8, 16, 32)]
+    budgets = [Budget(n, (1,), 64, 1, first=n) for n in (8, 16, 32)]
+    values = [efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=budget).sampled for budget in budgets]
     assert values[0] > 1.5 * values[1] > 2.25 * values[2]
     assert values[2] < 0.01
 
@@ -161,6 +162,22 @@ def test_climbs_find_the_summit_of_a_crease():
     top = domain.summits(crease, start, 0.3, 0.2, 40, np.random.default_rng(17))
     assert np.median(crease(top)) > -0.05
     assert np.all(crease(top) >= crease(start))
+
+
+def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
+    """Seen at (1.82, -1.82) with rates (1, 0): a cone that falls by 3.6 a radian, so that no lattice of directions meets it."""
+    domain = Domain(Chain(), Friction(), 2.5)
+    lattice = domain.lattice(8, 24, 0.37)
+    alone = np.flatnonzero(lattice.rates[1] == 0)
+    assert alone.size > 3 * 8  # on a finer lattice of shapes than other rates
+
+    def cone(motion: CoulombMotion) -> np.ndarray:
+        a, b = motion.angles
+        return -3.6 * np.abs(motion.rates[1]) - (a - 1.82) ** 2 - (b + 1.82) ** 2
+
+    start = lattice.take(alone[np.argsort(-cone(lattice.take(alone)))[-20:]])
+    top = domain.summits(cone, start, 0.3, 0.1, 40, np.random.default_rng(18))
+    assert np.median(cone(top)) > -1e-3
 
 
 def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):

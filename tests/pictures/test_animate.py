@@ -52,6 +52,17 @@ def test_short_and_long_chains_are_drawn(n_link, unsolved):
     assert (first != bare).any()
 
 
+def test_links_are_drawn_of_their_width(unsolved):
+    def dark_pixels(width):
+        problem = crawler(3).with_(body=Chain(width=width))
+        picture = next(pictures(unsolved(problem), 2, 1, width=300, arrows=False))
+        return (picture[40:, : int(0.68 * picture.shape[1])].max(axis=2) < 80).sum()
+
+    thin, thick = dark_pixels(0.08), dark_pixels(0.16)
+    # a strip of length 1 and two round ends; joints, head and centre are drawn over it
+    assert thick / thin == pytest.approx((0.16 + np.pi * 0.08**2) / (0.08 + np.pi * 0.04**2), rel=0.15)
+
+
 def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
     assert main([str(file), "--periods", "1", "--seconds", "1", "--fps", "10", "--width", "300"]) == 0

@@ -14,7 +14,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure
+from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure, strips
 from colloc.pictures.publication import panels
 from colloc.pictures.style import save
 from scripts.gallery import picture
@@ -25,6 +25,15 @@ def crawler(n_link, size=0.6):
     guess = Fourier(np.zeros(n_link - 1), size * np.cos(0.9 * j)[:, None], size * np.sin(0.9 * j)[:, None] + 0.1)
     lengths = (1 / n_link,) * n_link
     return Problem("crawler", guess, Chain(lengths), Friction(1.5, 1.0, 1.2), gait=Harmonic(1), delta=1e-2, intervals=8)
+
+
+def test_strips_have_the_width_of_the_links_and_round_ends():
+    ends = np.array([[0.0, 0.4, 0.4], [0.0, 0.0, 0.6]])
+    for strip, length in zip(strips(ends, 0.1), (0.4, 0.6), strict=True):
+        x, y = strip.T
+        area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        assert area == pytest.approx(0.1 * length + np.pi * 0.05**2, rel=0.01)
+    assert np.ptp(strips(ends, 0.1)[0], axis=0) == pytest.approx([0.5, 0.1])
 
 
 @pytest.mark.parametrize(("n_link", "size"), [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (8, 0.3)])

@@ -3,13 +3,23 @@
 import numpy as np
 import pytest
 
+import colloc
 from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency, replay
+from colloc.gaits.mixture import Mixture
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import relaxed_solution
-from colloc.results.relaxed_solution import Optimality, finite_certificate, realised_gaits, relaxed_certificate
+from colloc.results.relaxed_solution import (
+    Optimality,
+    finite_certificate,
+    kept_inside,
+    realised_gaits,
+    relaxed_certificate,
+)
 from colloc.results.relaxed_store import is_relaxed, load_relaxed, save_relaxed
+from colloc.search import few_corners
+from colloc.search.few_corners import polygon_near
 from colloc.search.reduced_search import VERY_ROUGH, Found, settled
-from colloc.search.relaxed_search import best_relaxed_gait, prices, readied
+from colloc.search.relaxed_search import prices, readied
 
 
 def problem(directions=3, delta=3e-4, pieces=14):
@@ -20,7 +30,7 @@ def problem(directions=3, delta=3e-4, pieces=14):
 
 @pytest.fixture(scope="module")
 def solution():
-    return best_relaxed_gait(problem(), 1, repeats=(1, 2, 4))
+    return colloc.solve(problem(), starts=1)
 
 
 def test_the_isotropic_body_reaches_more_than_any_class_of_smooth_gaits(solution):
@@ -117,6 +127,46 @@ def test_the_motion_that_is_drawn_goes_as_far_as_the_replay_says(solution):
     motion = solution.sample(np.array([0.0, 1.0]))
     assert motion.centre[0, 1] - motion.centre[0, 0] == pytest.approx(solution.measured.distance, rel=2e-3)
     assert abs(motion.centre[1, 1]) < 1e-3
+
+
+def test_sides_of_a_polygon_may_be_long():
+    """A side that is all there is on its piece; of several directions each takes a short time, lest loops go on for ever."""
+    stated = problem(1)
+    square = Mixture([[1.7], [1.7]], [[[1.0, 0.0]], [[0.0, 1.0]]], [-0.85, 0.85], "both")
+    space = MixtureSpace(stated, 2)
+    v = space.parameters(square)
+    assert np.all((space.lower <= v) & (v <= space.upper))
+    assert MixtureSpace(problem(3), 2).upper[2] < 1.7
+
+
+def test_loops_that_reach_beyond_what_is_admissible_are_drawn_in(solution):
+    """The mean shape of a relaxed gait may lie on a bound; of a finite gait the corners may not lie beyond."""
+    gait = solution.realised[0].gait
+    assert kept_inside(solution.problem, gait) is gait
+    narrow = solution.problem.with_(joint_limit=0.99 * np.abs(gait.corners).max())
+    assert "joint limits" in [c.name for c in finite_certificate(narrow, gait).failures]
+    drawn_in = kept_inside(narrow, gait)
+    assert finite_certificate(narrow, drawn_in).passed
+    assert 0.99 * narrow.joint_limit < np.abs(drawn_in.corners).max() <= narrow.joint_limit
+
+
+def test_the_face_of_the_library_keeps_and_reads_relaxed_gaits(solution, tmp_path):
+    assert solution.success
+    assert len(solution.plot().axes) == 5
+    again = colloc.load(colloc.save(solution, tmp_path / "relaxed.h5"))
+    assert again.efficiency == solution.efficiency == solution.best.certificate.efficiency
+
+
+def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution, monkeypatch):
+    monkeypatch.setattr(few_corners, "_TRIED", 1)
+    heard: list[str] = []
+    simple = polygon_near(solution.problem, solution.relaxed, 52, heard.append)
+    assert simple.best.corners <= 52 < 0.5 * solution.realised[0].corners
+    assert simple.success
+    # what is left without loops is far from it: joined to larger ones they were kept
+    mean = finite_certificate(solution.problem, solution.relaxed.mean.realised())
+    assert simple.efficiency > solution.certificate.efficiency - 0.3 * (solution.certificate.efficiency - mean.efficiency)
+    assert len(heard) > 3
 
 
 def test_other_searches_say_that_relaxed_gaits_are_not_for_them():

@@ -114,7 +114,7 @@
       trail([data.x[last], data.y[last]], "#e69f00", 1);
       trail(data.centre, red, 1.5);
     }
-    line(x, y, colours.ink, 5);
+    line(x, y, colours.ink, data.width * unit || 5);
     for (let k = data.hinges[0]; k < data.hinges[1]; k++) disc(x[k], y[k], 3.2, colours.paper, colours.ink);
     disc(x[last], y[last], 6, colours.ink);
     disc(at([data.centre[0]], position, 0)[0], at([data.centre[1]], position, 1)[0], 3.5, red);

@@ -1,0 +1,287 @@
+"""The best gaits from both sides, by law of friction, limit of the joints, number of links and width.
+
+python -m scripts.frontier [--laws 1 6] [--limits 2.5] [--links 3] [--widths 0] [--parts gait few] [--seconds 600]
+
+One row for every law of friction, limit of the joint angles, number of links and width of the links; five parts a row. What is
+done is kept: numbers in `results/curated/frontier.json`, gaits in `results/frontier/`. A run takes up what is missing, and
+writes `results/curated/frontier.md` from all there is. `--seconds` begins no other part after so much processor time.
+
+- gait: the best relaxed gait that travels through shapes, and the best certified finite gait near it;
+- few: the best certified polygon with 60 corners near it;
+- small: the best gait of no size at one shape (three links);
+- loop: the best certified polygon of a short path near that shape;
+- bound: the sampled upper bound (three links; four if asked for); of a kept potential (`scripts.check_potential`) what a check
+  finds, and the seconds are those of the check.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colloc.bounds.infinitesimal import best_small_gait, small_gait
+from colloc.bounds.recheck import largest_ratio
+from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.gaits.guesses import largest_factor
+from colloc.gaits.path_classes import Polygon
+from colloc.gaits.paths import Corners
+from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Relaxed
+from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.width import gap
+from colloc.results.relaxed_solution import RelaxedSolution
+from colloc.results.relaxed_store import load_relaxed, save_relaxed
+from colloc.results.solution import SOLVED
+from colloc.results.store import save
+from colloc.search.few_corners import polygon_near
+from colloc.search.optimise import maximise_efficiency
+from colloc.search.relaxed_search import best_relaxed_gait
+from colloc.system.errors import CollocError
+from colloc.system.replaced_file import replaced_file
+from scripts.bound_table import COEFFICIENTS
+from scripts.check_potential import potentials
+
+DELTA, LEAST_EXTENT, FEW = 1e-5, 0.3, 60
+"""At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one."""
+PARTS = ("gait", "few", "small", "loop", "bound")
+SPEED, LOOP_DELTA = 0.02, 2e-5
+"""Of small loops: least path over 2 pi [rad], and delta at unit shape speed."""
+BUDGET = Budget(intervals=16, tolerance=3e-4)
+STORE, GAITS, TABLE = Path("results/curated/frontier.json"), Path("results/frontier"), Path("results/curated/frontier.md")
+HEAD = """# The best gaits from both sides
+
+`python -m scripts.frontier`, taken up again and again. Joints within the limit; links of the width do not overlap,
+links of none do not cross. *Gait*: the best certified finite gait that travels through shapes (its mean angles range
+over at least 0.3 rad), with its corners, its distance a period and the largest joint angle; delta = 1e-5 at unit shape
+speed. *60 corners*: the best certified polygon with 60. *Relaxed*: what finite gaits near it tend to, for delta -> 0.
+*Small gait*: the best gait of no size at one shape, for delta -> 0. *Small loop*: the best certified polygon near it,
+of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one, with the number of its unknowns: it holds but for what
+lies between the samples; in brackets the program's value, if the climbs still found more than 0.0005 above. *Gap*: from
+the better of relaxed and small gait to the smallest bound that is valid for the row, relative. CPU seconds on a loaded
+machine. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty place has not
+been computed. What was found is a lower end: other starts may find better gaits.
+
+"""
+COLUMNS = (
+    "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "60 corners", "relaxed",
+    "small gait", "small loop", "bound", "unknowns", "gap", "CPU s",
+)  # fmt: skip
+
+
+class Row(NamedTuple):
+    """What is asked of a row."""
+
+    mu: tuple[float, ...]
+    limit: float
+    links: int
+    width: float
+
+    @property
+    def name(self) -> str:
+        return "-".join(f"{x:g}" for x in (*self.mu, round(self.limit, 4), self.links, self.width))
+
+    @property
+    def body(self) -> Chain:
+        return Chain((1 / self.links,) * self.links, width=self.width)
+
+    def file(self, part: str) -> Path:
+        return GAITS / f"{self.name}-{part}.h5"
+
+
+def finite(solution: RelaxedSolution, seconds: float) -> dict[str, Any]:
+    """What the table says of a solution."""
+    best, relaxed = solution.best, solution.certificate
+    return {
+        "efficiency": best.certificate.efficiency,
+        "passed": best.certificate.passed,
+        "corners": best.corners,
+        "distance": best.certificate.distance,
+        "angle": float(np.abs(best.gait.corners).max()),
+        "relaxed": relaxed.efficiency_at_zero_delta,
+        "sharp": relaxed.passed,
+        "seconds": seconds,
+    }
+
+
+def gait(row: Row, starts: int) -> dict[str, Any]:
+    """The best relaxed gait that travels, begun also from that for equal coefficients."""
+    begin, even = time.process_time(), row._replace(mu=(1.0, 1.0, 1.0)).file("gait")
+    first = (load_relaxed(even).relaxed.mean.realised(),) if even.exists() else ()
+    problem = Problem(
+        f"frontier-{row.name}", body=row.body, friction=Friction(*row.mu), gait=Relaxed(row.links, "both"), delta=DELTA,
+        joint_limit=row.limit,
+    )  # fmt: skip
+    solution = best_relaxed_gait(problem, starts, first=first, least_extent=LEAST_EXTENT)
+    save_relaxed(solution, row.file("gait"))
+    return finite(solution, time.process_time() - begin)
+
+
+def few(row: Row, starts: int) -> dict[str, Any]:
+    """The best polygon of a few corners near the relaxed gait of the row."""
+    begin, near = time.process_time(), load_relaxed(row.file("gait"))
+    solution = polygon_near(near.problem, near.relaxed, FEW)
+    save_relaxed(solution, row.file("few"))
+    return finite(solution, time.process_time() - begin)
+
+
+def small(row: Row, starts: int) -> dict[str, Any]:
+    """The best gait of no size."""
+    begin = time.process_time()
+    best, shape = best_small_gait(row.body, Friction(*row.mu), row.limit)
+    return {"efficiency": best.efficiency, "shape": shape.tolist(), "seconds": time.process_time() - begin}
+
+
+def loop(row: Row, starts: int) -> dict[str, Any]:
+    """The best polygon of a short path, begun about the shape of the best gait of no size, where links keep their width."""
+    begin, friction = time.process_time(), Friction(*row.mu)
+    shape = np.array(read()[f"{row.name} small"]["shape"])
+    path = small_gait(row.body, friction, shape).path(shape, 1.2 * 2 * np.pi * SPEED)
+    inside = min(1.0, largest_factor(row.body, row.limit, Corners(path).angles(np.linspace(0.0, 1.0, 401))))
+    problem = Problem(
+        f"frontier-{row.name}-loop", Corners(inside * path), row.body, friction, Polygon(path.shape[1]), LOOP_DELTA,
+        100 * LOOP_DELTA, row.limit, SPEED, intervals=30,
+    )  # fmt: skip
+    solution = maximise_efficiency(problem)
+    save(solution, row.file("loop"))
+    certificate = solution.certificate
+    return {
+        "efficiency": certificate.efficiency, "passed": solution.status == SOLVED, "distance": certificate.distance,
+        "gap": float(gap(row.body, solution.gait.angles(np.linspace(0.0, 1.0, 20001))).min()),
+        "seconds": time.process_time() - begin,
+    }  # fmt: skip
+
+
+def bound(row: Row, starts: int) -> dict[str, Any]:
+    """The sampled bound: that of a kept potential, looked for anew, or a new one."""
+    begin = time.process_time()
+    for domain, space, free, program in potentials():
+        if (domain.body, domain.friction) == (row.body, Friction(*row.mu)) and abs(domain.joint_limit - row.limit) < 1e-9:
+            top = largest_ratio(domain, space, free)[0]
+            seconds = time.process_time() - begin
+            return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
+    found = efficiency_bound(row.body, Friction(*row.mu), row.limit, budget=BUDGET)
+    return {
+        "sampled": found.sampled, "floor": found.floor, "converged": found.converged, "unknowns": len(found.coefficients),
+        "seconds": found.seconds,
+    }  # fmt: skip
+
+
+COMPUTE: dict[str, Callable[[Row, int], dict[str, Any]]] = {
+    "gait": gait,
+    "few": few,
+    "small": small,
+    "loop": loop,
+    "bound": bound,
+}
+
+
+def read() -> dict[str, dict[str, Any]]:
+    """What is known, by row and part."""
+    return json.loads(STORE.read_text()) if STORE.exists() else {}
+
+
+def put(key: str, value: dict[str, Any]) -> None:
+    """Keep a part; what others have kept in the meantime stays."""
+    with replaced_file(STORE) as temporary:
+        Path(temporary).write_text(json.dumps(read() | {key: value}, indent=1, sort_keys=True) + "\n")
+
+
+def asked(options: argparse.Namespace) -> Iterator[Row]:
+    """The rows, those first that are most wanted."""
+    laws = [COEFFICIENTS[k - 1] for k in options.laws]
+    for links, width, limit, mu in product(options.links, options.widths, options.limits, laws):
+        yield Row(tuple(map(float, mu)), limit, links, width)
+
+
+def wanted(row: Row, part: str, known: dict) -> bool:
+    """Whether a part can be computed and is not known."""
+    possible = {
+        "gait": True, "few": row.file("gait").exists(), "small": row.links == 3, "loop": f"{row.name} small" in known,
+        "bound": row.links <= 4,
+    }  # fmt: skip
+    return f"{row.name} {part}" not in known and possible[part]
+
+
+def smallest_bound(row: Row, known: dict) -> float:
+    """Of the bounds that hold for a row: those for its limit or a larger one, its width or a smaller one."""
+    holds = [np.inf]
+    for key, value in known.items():
+        name, part = key.split()
+        numbers = [float(x) for x in name.split("-")]
+        of_row = part == "bound" and tuple(numbers[:3]) == row.mu and numbers[4] == row.links
+        if of_row and numbers[3] >= round(row.limit, 4) and numbers[5] <= row.width:
+            holds.append(value["sampled"])
+    return min(holds)
+
+
+def line(row: Row, known: dict) -> str:
+    """A row of the table."""
+    parts = {part: known.get(f"{row.name} {part}", {}) for part in PARTS}
+    travels, simple, still, loops, above = (parts[part] for part in PARTS)
+
+    def value(of: dict, key: str, form: str = ".4f", mark: str = "") -> str:
+        return f"{of[key]:{form}}{mark}" if key in of else ""
+
+    refused = " (not certified)"
+    ends = [travels.get("relaxed", -np.inf), still.get("efficiency", -np.inf)]
+    least = smallest_bound(row, known)
+    apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) and np.isfinite(least) else ""
+    program = "" if above.get("converged", True) else f" ({above['floor']:.4f})"
+    cells = [
+        ", ".join(f"{m:g}" for m in row.mu), f"{row.limit:.4g}", str(row.links), f"{row.width:g}",
+        value(travels, "efficiency", mark="" if travels.get("passed") else refused), value(travels, "corners", "d"),
+        value(travels, "distance", ".3f"), value(travels, "angle", ".3f"),
+        value(simple, "efficiency", mark="" if simple.get("passed") else refused),
+        value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
+        value(loops, "efficiency", mark="" if loops.get("passed") else refused),
+        value(above, "sampled", mark=program), value(above, "unknowns", "d"), apart,
+        f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
+    ]  # fmt: skip
+    return f"| {' | '.join(cells)} |"
+
+
+def rows_of(known: dict) -> list[Row]:
+    """The rows of which something is known, in the order of the table."""
+    found = set()
+    for key in known:
+        *mu, limit, links, width = (float(x) for x in key.split()[0].split("-"))
+        found.add(Row(tuple(mu), limit, int(links), width))
+    order = {tuple(map(float, mu)): k for k, mu in enumerate(COEFFICIENTS)}
+    return sorted(found, key=lambda r: (r.links, r.width, r.limit, order[r.mu]))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--laws", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6], choices=range(1, 7), metavar="N")
+    parser.add_argument("--limits", type=float, nargs="+", default=[2.5, float(np.pi), 2.0])
+    parser.add_argument("--links", type=int, nargs="+", default=[3, 4, 5])
+    parser.add_argument("--widths", type=float, nargs="+", default=[0.0, 0.01, 0.03])
+    parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)
+    parser.add_argument("--starts", type=int, default=4, help="of relaxed gaits, beside the one found for equal coefficients")
+    parser.add_argument("--seconds", type=float, default=np.inf)
+    options = parser.parse_args()
+    GAITS.mkdir(parents=True, exist_ok=True)
+    for row in asked(options):
+        for part in options.parts:
+            if time.process_time() < options.seconds and wanted(row, part, read()):
+                try:
+                    put(f"{row.name} {part}", COMPUTE[part](row, options.starts))
+                except CollocError as error:
+                    print(f"{row.name}, {part}: {error}")
+                    continue
+                print(part, line(row, read()), flush=True)
+    known = read()
+    lines = [f"| {' | '.join(COLUMNS)} |", "|" + "---|" * len(COLUMNS), *(line(row, known) for row in rows_of(known))]
+    TABLE.write_text(HEAD + "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
