@@ -58,7 +58,7 @@ KEPT = {
     "error_bars.jsonl": "python -m benchmarks.error_bars --gaits 300",
     "published.md": "python -m benchmarks.published --output results/curated",
     "small_polygons.md": "python -m scripts.small_polygons",
-    "three_link_wheels.front.png": "colloc pareto problems/three_link_wheels.py",
+    "three_link_wheels.front.png": "python -m colloc pareto problems/three_link_wheels.py",
     "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
 }
 

@@ -17,6 +17,7 @@ from colloc.commands.options import add_printing, add_problem, changed, new_pars
 from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.solution import Solution
+from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 from colloc.system.replaced_file import replaced_file
 
@@ -38,7 +39,7 @@ def _parser() -> argparse.ArgumentParser:
         help=f"default: {SPEED.name} {EFFICIENCY.name}",
     )  # fmt: skip
     parser.add_argument("--points", type=int, default=_POINTS, metavar="N", help=f"of the front (default: {_POINTS})")
-    parser.add_argument("--starts", type=int, metavar="N", help="starts to find both ends of (default: 16)")
+    parser.add_argument("--starts", type=int, metavar="N", help="starts to find both ends of (default: 32)")
     parser.add_argument("--output", metavar="PATH", help="folder, or .csv file (default: results/NAME.front.csv)")
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.front.png")
     add_printing(parser)
@@ -51,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _pareto(options: argparse.Namespace) -> int:
+    if options.starts is not None and options.starts < 1:
+        raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
     stated = read_problem_file(options.problem)
     problem = changed(stated.problem, options)
     first, second = (objective_from(text) for text in options.objectives)

@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
     parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
     parser.add_argument(
-        "--starts", type=int, metavar="N", help="starts to find the best gait of (default: 16); 1: the guess alone"
+        "--starts", type=int, metavar="N", help="starts to find the best gait of (default: 32); 1: the guess alone"
     )
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="begin no other start after so long")
     parser.add_argument(

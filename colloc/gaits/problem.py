@@ -282,8 +282,9 @@ class Problem:
         depth = self.body.crossing_depth(angles)
         if depth.max() > _SLACK:
             when = np.argmax(depth) / _CHECKED_PHASES
-            what = "overlap" if self.body.drawn_width else "cross each other"
-            raise ProblemError(f"guess is inadmissible: links {what} at phase {when:.3f}.")
+            if self.body.drawn_width:
+                raise ProblemError(f"guess is inadmissible: links overlap at phase {when:.3f}.")
+            raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def __repr__(self) -> str:
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"

@@ -50,6 +50,7 @@ def all_balanced_velocities(body: Links, friction: Law, angles: np.ndarray, rate
     --------
     Three links with friction (1, 0.01, 100), the first joint turning:
 
+    >>> from colloc.mechanics.friction import Friction
     >>> at = np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
     >>> found = all_balanced_velocities(Links(), Friction(1, 0.01, 100), *at, 1e-4)
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]

@@ -20,7 +20,7 @@ from colloc.smooth.motion import sine_wave
 @pytest.mark.parametrize(
     ("links", "formulation", "value", "jacobian", "hessian"),
     [
-        (3, "implicit velocity", 600, 4500, 13500),
+        (3, "implicit velocity", 600, 4500, 13600),
         (3, "full", 700, 4200, 14000),
         (6, "implicit velocity", 1200, 10700, 46500),
         (6, "full", 1400, 13100, 44500),

@@ -53,6 +53,8 @@ REFUSED = {
     + [f"good.h5 --{option}" for option in ("periods 0", "seconds nan", "fps 0", "width 0", "format avi", "output x.avi")],
     "export": ["", "nope.h5", "text.h5", "good.h5"]
     + [f"good.h5 --period 4 --{option}" for option in ("rate nan", "max-speed 0", "max-speed 1 2 3", "periods 0", "format x")],
+    "pareto": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
+    + [f"problem.py --{option}" for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")],
     "completion": ["--no-such", "x"],
 }
 

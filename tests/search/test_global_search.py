@@ -23,7 +23,7 @@ def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside
     again = load(save(solution, tmp_path / "unequal.h5"))
     assert again.message == solution.message
     assert again.standing == solution.standing
-    assert "best of 16 starts" in again.standing[0]
+    assert "best of 32 starts" in again.standing[0]
     # no distinct gait is told twice, and none of finite size is better than the one that is given
     finite = [other.value for other in again.others if not other.on_speed_floor and other.delta == solution.problem.delta]
     assert max(finite) == pytest.approx(solution.finite.efficiency, rel=1e-3)
