@@ -18,7 +18,6 @@ from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.system.errors import CollocError
 from colloc.system.progress import StatusLine
 
-if TYPE_CHECKING:
 
 def summary_lines(solution: RelaxedSolution, reference: Reference | None = None) -> list[str]:
     """What a person wants to know at the end."""
