@@ -54,6 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _pareto(options: argparse.Namespace) -> int:
     if options.starts is not None and options.starts < 1:
         raise ProblemError(f"--starts must be at least 1, not {options.starts}.")
+    if options.points < 2:
+        raise ProblemError(f"a front has at least 2 points, not {options.points}.")
     stated = read_problem_file(options.problem)
     problem = changed(stated.problem, options)
     first, second = (objective_from(text) for text in options.objectives)

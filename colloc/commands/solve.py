@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
+from colloc.commands.ending import FAILED, NONE_FOUND, OK, run
+from colloc.commands.finish import finished
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
@@ -225,10 +226,10 @@ def _solve(options: argparse.Namespace) -> int:
         path = path.with_suffix(".failed.h5")
     save(solution, path)
     _partial(path).unlink(missing_ok=True)
-    bound, saved, complaints = None, str(path), []
+    bound, saved, complaints = None, [str(path)], []
     if solution.finite is not None:
         solution.finite.source = solution.source
-        saved += f", {save(solution.finite, path.with_suffix('.finite.h5'))} (the gait of finite size)"
+        saved.append(f"{save(solution.finite, path.with_suffix('.finite.h5'))} (the gait of finite size)")
     with StatusLine(enabled=not quiet) as line:
         if options.bound:
             line.say("computing an upper bound on every gait")
@@ -241,22 +242,13 @@ def _solve(options: argparse.Namespace) -> int:
     else:
         lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
         print("\n".join(lines), flush=True)
-    if not options.no_figure:
-        from colloc.pictures.figure import solution_figure
-        from colloc.pictures.style import save as save_figure
 
-        with StatusLine(enabled=not quiet) as line:
-            line.say("drawing")
-            try:
-                for drawn in save_figure(solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + options.pdf]):
-                    saved += f", {drawn}"
-            except CollocError as error:
-                complaints.append(f"no figure: {error}")
-    if not options.json:
-        print(f"  saved {saved}")
-    for complaint in complaints:
-        print(f"colloc: {complaint}", file=sys.stderr)
-    return BAD_PROBLEM if complaints else EXIT[solution.status]
+    def figure() -> object:
+        from colloc.pictures.figure import solution_figure
+
+        return solution_figure(solution)
+
+    return finished(options, path, saved, complaints, figure, EXIT[solution.status])
 
 
 def _partial(path: Path) -> Path:

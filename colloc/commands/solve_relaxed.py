@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from colloc.bounds.optimality_gap import gap_line, upper_bound
-from colloc.commands.ending import BAD_PROBLEM, FAILED, OK
+from colloc.commands.ending import FAILED, OK
+from colloc.commands.finish import finished
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, Reference
 from colloc.results.relaxed_solution import RelaxedSolution
@@ -92,7 +92,7 @@ def solve_relaxed(problem: Problem, stated: ProblemFile, path: Path, options: ar
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")
     save_relaxed(solution, path)
-    bound, complaints, saved = None, [], str(path)
+    bound, complaints = None, []
     try:
         bound = upper_bound(problem, path.parent, compute=options.bound)
     except CollocError as error:  # what is solved is not lost for it
@@ -100,21 +100,12 @@ def solve_relaxed(problem: Problem, stated: ProblemFile, path: Path, options: ar
     if options.json:
         print(json.dumps(summary_dict(solution, path, None if bound is None else bound.sampled)), flush=True)
     else:
-        print(
-            "\n".join([*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]),
-            flush=True,
-        )
-    if not options.no_figure:
-        from colloc.pictures.relaxed_figure import relaxed_figure
-        from colloc.pictures.style import save as save_figure
+        lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
+        print("\n".join(lines), flush=True)
 
-        try:
-            for drawn in save_figure(relaxed_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + options.pdf]):
-                saved += f", {drawn}"
-        except CollocError as error:
-            complaints.append(f"no figure: {error}")
-    if not options.json:
-        print(f"  saved {saved}")
-    for complaint in complaints:
-        print(f"colloc: {complaint}", file=sys.stderr)
-    return BAD_PROBLEM if complaints else OK if solution.status == SOLVED else FAILED
+    def figure() -> object:
+        from colloc.pictures.relaxed_figure import relaxed_figure
+
+        return relaxed_figure(solution)
+
+    return finished(options, path, [str(path)], complaints, figure, OK if solution.status == SOLVED else FAILED)

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.laws.link_quadrature import ByQuadrature
-from colloc.mechanics.friction import check_positive, regularised_speed
+from colloc.mechanics.friction import Coefficients, check_positive, regularised_speed
 from colloc.mechanics.law import Matrix
-from colloc.numerics.arrays import Array, namespace
+from colloc.numerics.arrays import Array
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
 
 @named_arguments
 @dataclass(frozen=True)
-class PowerLaw(ByQuadrature):
+class PowerLaw(Coefficients, ByQuadrature):
     """Friction that grows like a power of the speed; a `colloc.mechanics.law.Law`.
 
     Parameters
@@ -52,24 +52,8 @@ class PowerLaw(ByQuadrature):
         return float(self.power)
 
     @property
-    def reversible(self) -> bool:
-        return self.mu_b == self.mu_f
-
-    @property
-    def associated(self) -> bool:
-        return self.mu_t == self.mu_f == self.mu_b
-
-    @property
     def regularised(self) -> bool:
         return self.power != 1
-
-    @property
-    def smallest(self) -> float:
-        return min(self.mu_t, self.mu_f, self.mu_b)
-
-    @property
-    def largest(self) -> float:
-        return max(self.mu_t, self.mu_f, self.mu_b)
 
     @property
     def label(self) -> str:
@@ -85,24 +69,21 @@ class PowerLaw(ByQuadrature):
     def in_speeds_of(self, unit: float) -> PowerLaw:
         return self.in_units_of(unit**-self.power)
 
-    def _tangential(self, vs: Array) -> Array:
-        return self.mu_f if self.reversible else namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
-
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         growth = regularised_speed(vs, vn, delta) ** (self.power - 1.0)
-        return -self._tangential(vs) * vs * growth, -self.mu_t * vn * growth
+        return -self.tangential(vs) * vs * growth, -self.mu_t * vn * growth
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
         growth = regularised_speed(vs, vn, delta) ** (self.power - 1.0)
         # above degree 1 the force outgrows its secant
         growth = growth * max(1.0, self.power)
         zero = 0.0 * growth
-        return (self._tangential(vs) * growth, zero), (zero, self.mu_t * growth)
+        return (self.tangential(vs) * growth, zero), (zero, self.mu_t * growth)
 
     def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
         r = regularised_speed(vs, vn, delta)
         es, en, ed, growth, p = vs / r, vn / r, delta / r, r ** (self.power - 1.0), self.power
-        along, across = self._tangential(vs) * growth, self.mu_t * growth
+        along, across = self.tangential(vs) * growth, self.mu_t * growth
         oblique = (p - 1.0) * es * en
         return (
             (along * (p * es * es + en * en + ed * ed), along * oblique),

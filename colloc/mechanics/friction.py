@@ -27,9 +27,44 @@ def check_positive(law: object, *names: str) -> None:
             raise ProblemError(f"friction.{name} must be a positive finite number, not {value!r}.")
 
 
+class Coefficients:
+    """Of sliding across the body, forwards and backwards, and what follows from them."""
+
+    mu_t: float
+    mu_f: float
+    mu_b: float
+
+    @property
+    def smallest(self) -> float:
+        return min(self.mu_t, self.mu_f, self.mu_b)
+
+    @property
+    def largest(self) -> float:
+        return max(self.mu_t, self.mu_f, self.mu_b)
+
+    @property
+    def isotropic(self) -> bool:
+        return self.mu_t == self.mu_f == self.mu_b
+
+    @property
+    def associated(self) -> bool:
+        """Only equal coefficients make the law the gradient of a convex dissipation potential."""
+        return self.isotropic
+
+    @property
+    def reversible(self) -> bool:
+        return self.mu_b == self.mu_f
+
+    def tangential(self, vs: Array) -> Array:
+        """Coefficient mu_s of a part that slides along itself with velocity `vs`; no switch where mu_b = mu_f."""
+        if self.reversible:
+            return self.mu_f
+        return namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
+
+
 @named_arguments
 @dataclass(frozen=True)
-class Friction:
+class Friction(Coefficients):
     """Coulomb friction coefficients, in units of the weight; a `colloc.mechanics.law.Law`.
 
     Parameters
@@ -55,27 +90,6 @@ class Friction:
         check_positive(self, "mu_t", "mu_f", "mu_b")
 
     @property
-    def smallest(self) -> float:
-        return min(self.mu_t, self.mu_f, self.mu_b)
-
-    @property
-    def largest(self) -> float:
-        return max(self.mu_t, self.mu_f, self.mu_b)
-
-    @property
-    def isotropic(self) -> bool:
-        return self.mu_t == self.mu_f == self.mu_b
-
-    @property
-    def associated(self) -> bool:
-        """Only equal coefficients make the law the gradient of a convex dissipation potential."""
-        return self.isotropic
-
-    @property
-    def reversible(self) -> bool:
-        return self.mu_b == self.mu_f
-
-    @property
     def kernel_numbers(self) -> tuple[float, ...]:
         """Coefficients, stretches of the tangential velocity forwards and backwards, and whether there is a potential."""
         stretches = [float(self.stretch(np.array(side))) for side in (1.0, -1.0)]
@@ -93,12 +107,6 @@ class Friction:
 
     def in_speeds_of(self, unit: float) -> Friction:
         return self
-
-    def tangential(self, vs: Array) -> Array:
-        """Coefficient mu_s of a link that slides along itself with velocity `vs`; no switch where mu_b = mu_f."""
-        if self.reversible:
-            return self.mu_f
-        return namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
 
     def stretch(self, vs: Array) -> Array:
         """How many times its value `vs` counts in the speed r: once."""

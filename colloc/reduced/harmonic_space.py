@@ -104,6 +104,10 @@ class HarmonicSpace:
         self.row_upper = np.concatenate([*high, [np.inf]])
         return excess
 
+    def metric(self, v: np.ndarray) -> np.ndarray | None:
+        """None: parameters are alike."""
+        return None
+
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""
         values = [self._value(v, *placed) for placed in self._placed]

@@ -191,6 +191,10 @@ class MixtureSpace:
         self.row_upper = np.concatenate([closing, *high, [np.inf]])
         return excess
 
+    def metric(self, v: np.ndarray) -> np.ndarray | None:
+        """None: parameters are alike."""
+        return None
+
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""
         shapes = self.member(v).shapes

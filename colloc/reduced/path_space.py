@@ -32,8 +32,8 @@ _EXACT, _NEAR, _FITTED, _SETTLED, _ROUNDS = 1e-7, 1e-6, 3e-8, 1e-5, 12
 as the last violations go; violation of a start, where the worst instant of a cell swings between two; rounds of moving the
 checks to the worst instants: three joints need up to 8."""
 
-_LEAST_CURVATURE = 1e-4
-"""Of the distance to a gait, as a share of the largest."""
+_LEAST_CURVATURE, _SOFT = 1e-4, 0.1
+"""Of the distance to a gait, as a share of the largest; and of the first guess of the objective's."""
 
 
 class PathSpace:
@@ -225,6 +225,18 @@ class PathSpace:
         objective = fit.assembly.objective.parameters
         self._moved = self._oracles.parameter_vector(1.0, [objective, *given.values()])
         return excess
+
+    def metric(self, v: np.ndarray) -> np.ndarray | None:
+        """The mean squared distance that a step of the parameters moves the shapes, and a little for every parameter.
+
+        A tangent early on a path moves all that comes after it, so parameters are far from equal: with it SQP settles free
+        paths of 130 parameters in 50 iterations instead of 250 to 300.
+        """
+        if not self._arcs:
+            return None
+        frame = self.frame(v)[1][self.shapes.ravel()]
+        metric = frame.T @ frame / len(self.shapes.T)
+        return np.asarray(metric + _SOFT * metric.diagonal().max() * np.eye(self.n))
 
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""

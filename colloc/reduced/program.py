@@ -53,6 +53,9 @@ class SearchSpace(Shapes, Protocol):
     def move_checks(self, v: np.ndarray) -> float:
         """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
 
+    def metric(self, v: np.ndarray) -> np.ndarray | None:
+        """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near an optimum; None for 1."""
+
     def rows(self, v: np.ndarray) -> np.ndarray: ...
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray: ...

@@ -52,8 +52,10 @@ _FOLLOWED, _PROMISING, _CLOSE = 3, 0.8, 0.01
 """How many gaits are followed to the final delta, the share of the best value that they need at the coarse one, and how
 far they may be from the best at the final one to be optimised on the whole mesh."""
 _HOPS, _HOP_SIZES, _HOP_SEED = 0.5, (0.2, 0.4, 0.8), 1
-"""The share of the starts that hop from the best gait known, and how far [rad]. Optima lie near each other: of 16 independent
-starts none led to the best gait of the tutorial, of twelve hops one or two."""
+"""The share of the starts that hop from the best gait known, and how far [rad], in turn. At 0.2 a hop mostly falls back, at 0.8
+it lands where any start would; which of them leads on differs from problem to problem."""
+_SPARE = 8
+"""Gaits of finite size that are followed at most, until one has not shrunk."""
 _ROUNDS = 3
 """Of moving the checks at each delta, where a gait is followed: refinement goes on from there."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
@@ -223,7 +225,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     least = -known[0].found.objective - (1 - _PROMISING) * abs(known[0].found.objective)
     # gaits of finite size may shrink on the way, so they are followed until one has not
     queue = [c for c in known if -c.found.objective >= least][:_FOLLOWED]
-    spare = [c for c in known if is_finite(c.found) and c not in queue][:_FOLLOWED]
+    spare = [c for c in known if is_finite(c.found) and c not in queue][:_SPARE]
     for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(levels[-1]) for _, levels in ends)):
             break

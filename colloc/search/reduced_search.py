@@ -113,6 +113,8 @@ def settled(
     for _ in range(rounds or _ROUNDS[accuracy]):
         before = v
         fresh = curvature is None
+        if fresh and accuracy < VERY_ROUGH:
+            curvature = space.metric(v)
         result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = space.move_checks(v) <= _ADMISSIBLE
