@@ -12,7 +12,7 @@ from pathlib import Path
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
-from colloc.results.solution_file import load
+from colloc.results.store import load
 
 _EPILOG = """\
 Orange arrows are the friction on the links; the large disc is the head; the small plane shows the first two joint angles.

@@ -21,9 +21,8 @@ from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
-from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.law import rate_independent
-from colloc.results.level import PRESCRIBED, REDUCED, Level
+from colloc.results.level import PRESCRIBED, REALISED, REDUCED, Level
 from colloc.results.search_step import SearchStep
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, ProblemError, StoreError
@@ -55,7 +54,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
     parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
     parser.add_argument(
-        "--starts", type=int, metavar="N", help="starts to find the best gait of (default: 32); 1: the guess alone"
+        "--starts",
+        type=int,
+        metavar="N",
+        help="starts to find the best gait of (default: 32, of relaxed gaits 8); 1: the guess alone",
     )
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="begin no other start after so long")
     parser.add_argument(
@@ -104,10 +106,11 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
         gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
         lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]
+        if solution.relaxed is not None:
+            lines += [f"  relaxed         {text}" for text in solution.relaxed.lines()]
+            lines += [f"  {check.line()}" for check in solution.relaxed.certificate.checks]
         if reference is not None:
-            difference = certificate.efficiency - reference.efficiency
-            agree = "agrees with" if abs(difference) <= reference.tolerance else "DIFFERS from"
-            lines.append(f"  {agree} {reference.efficiency:g} +- {reference.tolerance:g} ({reference.source})")
+            lines.append(f"  {reference.verdict(solution.tends_to.efficiency)}")
     if solution.message:
         lines.append(f"  {solution.message}")
     return lines
@@ -132,6 +135,9 @@ def _search_lines(solution: Solution) -> list[str]:
     level = solution.last
     if level.program == PRESCRIBED:
         return [f"nothing is free: the motion is prescribed, measured on a mesh of {level.edges.size - 1} intervals"]
+    if level.program == REALISED:
+        intervals = level.edges.size - 1
+        return [f"a polygon that repeats what a relaxed gait mixes, measured on {intervals} intervals", *solution.standing]
     rows = f"{level.x.size} variables, {level.lam_g.size} constraints"
     how = f"{level.iterations} iterations of IPOPT" if level.program != REDUCED else level.status
     lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {level.kkt_error:.0e}"]
@@ -162,6 +168,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "kkt_error": solution.last.kkt_error,
         "starts": solution.starts,
         "finite": None if solution.finite is None else solution.finite.value,
+        "relaxed": _relaxed_dict(solution),
         "others": [
             {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
             for a in solution.others
@@ -195,6 +202,19 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
     return result
 
 
+def _relaxed_dict(solution: Solution) -> dict | None:
+    """The relaxed gait and the finite ones near it."""
+    if solution.relaxed is None:
+        return None
+    found = solution.relaxed.certificate
+    keys = ("efficiency", "efficiency_error", "efficiency_at_zero_delta", "distance", "passed")
+    finite = [
+        {"repeats": r.repeats, "corners": r.corners, **{key: getattr(r.certificate, key) for key in keys}}
+        for r in solution.relaxed.realised
+    ]
+    return {**{key: getattr(found, key) for key in keys}, "realised": finite}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     return run(_parser(), _solve, arguments)
@@ -217,10 +237,6 @@ def _solve(options: argparse.Namespace) -> int:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
-    if isinstance(problem.gait, Relaxed):
-        from colloc.commands.solve_relaxed import solve_relaxed
-
-        return solve_relaxed(problem, stated, path, options)
     solution = _solved(problem, stated, path, options, quiet)
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")
@@ -244,7 +260,7 @@ def _solve(options: argparse.Namespace) -> int:
         print("\n".join(lines), flush=True)
 
     def figure() -> object:
-        from colloc.pictures.figure import solution_figure
+        from colloc.pictures.solution_figure import solution_figure
 
         return solution_figure(solution)
 
@@ -259,11 +275,10 @@ def _partial(path: Path) -> Path:
 def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse.Namespace, quiet: bool) -> Solution:
     """The solution, from the levels that an interrupted run left if there are any; each level is kept as it ends."""
     from colloc.results.store import load, save
-    from colloc.search.global_search import STARTS
     from colloc.search.optimise import best_gait, maximise_efficiency
 
     # a gait that is given on the command line is to be improved, not left for another
-    starts = options.starts or (1 if options.start else stated.starts or STARTS)
+    starts = options.starts or (1 if options.start else stated.starts)
     source = stated.source
     partial = _partial(path)
     levels: list[Level] = []
@@ -283,7 +298,7 @@ def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse
     before_levels = tuple(levels)
     try:
         with StatusLine(enabled=not quiet) as line:
-            line.say(f"{problem.name}: " + ("building" if starts == 1 else f"trying {starts} starts"))
+            line.say(f"{problem.name}: " + ("building" if starts == 1 else "trying starts"))
 
             def ended(level: Level) -> None:
                 levels.append(level)
@@ -295,7 +310,7 @@ def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse
                 what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
                 line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
 
-            def tried(step: SearchStep) -> None:
+            def tried(step: SearchStep | str) -> None:
                 line.say(f"{problem.name}: {step}")
 
             if options.search == SEARCHES[0]:

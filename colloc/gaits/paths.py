@@ -18,6 +18,8 @@ from colloc.system.errors import ProblemError
 
 _BESIDE = 1e-10
 _FINE_PHASES = 20000
+_MOST_TOLD = 64
+"""Vertices of a polygon that are told one by one."""
 
 
 def _finite(name: str, value: object, ndim: int) -> np.ndarray:
@@ -263,6 +265,9 @@ class Corners(GaitFunction):
         return self._both(t)[1]
 
     def lines(self, coordinate: str = "joint") -> list[str]:
-        """Length and corners."""
+        """Length and, if they are few, corners."""
+        n = self.corners.shape[1]
+        if n > _MOST_TOLD:
+            return [f"path of length {self.length:.4f} rad, {n} vertices"]
         corners = [f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T]
         return [f"path of length {self.length:.4f} rad", *corners]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.symmetry import BILATERAL, BOTH, SYMMETRIES, fraction
+from colloc.gaits.paths import Corners
+from colloc.gaits.symmetry import BILATERAL, BOTH, NONE, SYMMETRIES, fraction
 from colloc.system.errors import ProblemError
 
 _PIECES, _PARAMETERS = 240, 400
@@ -70,4 +71,24 @@ class Relaxed:
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for the mean shapes of its gaits."""
-        return Harmonic(harmonics, BILATERAL if self.symmetry == BOTH else self.symmetry)
+        return Harmonic(harmonics, self.finite.symmetry)
+
+    # finite gaits that come near: polygons
+    @property
+    def finite(self) -> Relaxed:
+        """The class in the symmetry of its finite gaits: one that has both is kept as a bilateral half."""
+        return replace(self, symmetry=BILATERAL) if self.symmetry == BOTH else self
+
+    def size(self, n_joint: int, n_interval: int) -> int:
+        """Number of parameters of a polygon of so many straight pieces: its vertices."""
+        return n_joint * (n_interval + 1)
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> Corners:
+        """The polygon of a parameter vector; its phases follow from its sides."""
+        vertices = parameters.reshape(-1, n_joint).T
+        symmetry = self.finite.symmetry
+        return Corners(vertices[:, :-1] if symmetry == NONE else vertices, symmetry)
+
+    def own_checks(self, gait: Corners) -> list[tuple[str, float, float, str]]:
+        """What a certificate checks of a polygon beyond what all gaits have to keep."""
+        return []

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
-from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
 
 _STRAIGHT = 1e-2
@@ -55,7 +54,7 @@ def turned(vectors: np.ndarray, theta: np.ndarray) -> np.ndarray:
     return np.stack([c * x - s * y, s * x + c * y])
 
 
-def frames(solution: Solution | RelaxedSolution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
+def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
     """Sample a solution's motion and the friction that acts on it.
 
     Parameters

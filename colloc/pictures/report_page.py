@@ -92,6 +92,10 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
         captions["power"] = "power against friction; ticks: mesh"
         found["gait_pictures"] = [_plane(drawn[name], body.coordinate, j) for j, name in enumerate(planes)]
         found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
+        if solution.relaxed is not None:
+            mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
+            mixed["realised"] = "what finite gaits lose to it"
+            found["gait_pictures"] += [_picture(drawn[name], text) for name, text in mixed.items()]
         found["convergence_pictures"] = [
             _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
             _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
@@ -108,6 +112,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             headline=_headline(solution),
             gap=gap.strip(),
             reference=_comparison(solution, reference),
+            relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
             plain=PLAIN,
             policy=_POLICY,
             fields={name: json.dumps(value) for name, value in solution.problem.to_dict().items()},
@@ -142,9 +147,7 @@ def _headline(solution: Solution) -> str:
 def _comparison(solution: Solution, reference: Reference | None) -> str:
     if reference is None or not solution.certificate.replayed:
         return ""
-    agrees = abs(solution.certificate.efficiency - reference.efficiency) <= reference.tolerance
-    verb = "agrees with" if agrees else "DIFFERS from"
-    return f"{verb} {reference.efficiency:g} ± {reference.tolerance:g}: {reference.source}"
+    return reference.verdict(solution.tends_to.efficiency)
 
 
 def _commands(solution: Solution) -> str:

@@ -21,8 +21,9 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate
-from colloc.results.level import Level
+from colloc.results.level import REALISED, Level
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
+from colloc.results.relaxation import Relaxation
 from colloc.results.solution_card import solution_card
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -62,6 +63,8 @@ class Solution:
         Distinct gaits they led to, the one of this solution first; empty for a single start.
     finite : Solution, optional
         The best gait of finite size, where this one is as small as the bound on the shape speed allows; saved by itself.
+    relaxed : Relaxation, optional
+        The relaxed gait that the gait of this solution comes near, for a class of relaxed gaits.
 
     Examples
     --------
@@ -86,6 +89,7 @@ class Solution:
     starts: int = 1
     others: tuple[Alternative, ...] = ()
     finite: Solution | None = None
+    relaxed: Relaxation | None = None
 
     def __repr__(self) -> str:
         facts = [self.problem.name, self.status]
@@ -128,6 +132,11 @@ class Solution:
         return self.certificate if self.certificate.replayed else self.last
 
     @property
+    def tends_to(self) -> Certificate:
+        """The certificate, of a relaxed gait that of the limit: what a value from elsewhere is held against."""
+        return self.certificate if self.relaxed is None else self.relaxed.certificate
+
+    @property
     def value(self) -> float:
         """Of the problem's objective, at the last level; the certificate says whether to believe it."""
         return self.last.value
@@ -163,9 +172,11 @@ class Solution:
 
     @property
     def resolved(self) -> Problem:
-        """The problem, its body on the panels of the last level."""
-        panels = self.last.panels
-        return self.problem.with_(body=self.problem.body.on_panels(panels)) if panels else self.problem
+        """The problem of the last level: the body on its panels, and of relaxed gaits the class of finite ones."""
+        panels, problem = self.last.panels, self.problem
+        if self.last.program == REALISED:
+            return problem.with_(gait=problem.gait.finite)
+        return problem.with_(body=problem.body.on_panels(panels)) if panels else problem
 
     @property
     def layout(self) -> Layout:
@@ -210,8 +221,9 @@ class Solution:
         if t.ndim != 1 or not np.isfinite(t).all():
             raise ValueError("t must be finite phases, a number or a one-dimensional array.")
         period, phase = np.divmod(t, 1.0)
-        symmetry, body = self.problem.gait.symmetry, self.problem.body
-        second = phase > self.problem.gait.fraction
+        stated = self.resolved
+        symmetry, body = stated.gait.symmetry, stated.body
+        second = phase > stated.gait.fraction
         reduced = {"none": phase, "bilateral": np.where(second, 1.0 - phase, phase), "antipodal": phase - 0.5 * second}[
             symmetry
         ]

@@ -141,7 +141,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
         found = replay(
             problem.body,
             problem.friction,
-            lambda t: (gait.angles(t), gait.rates(t)),
+            gait,
             problem.delta * gait.delta_unit,
             instants=instants,
             most_instants=most_instants,
