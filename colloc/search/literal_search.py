@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, nearest_parameters, transcribed
@@ -72,7 +71,7 @@ def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None =
     return Solution(stated, levels, seconds=time.perf_counter() - begin, message=message)
 
 
-def _why(solver: Solver[GaitProgram], x: np.ndarray, result: NlpResult, delta: float) -> str:
+def _why(solver: Solver, x: np.ndarray, result: NlpResult, delta: float) -> str:
     """What failed, and whether the equations were to blame from the start."""
     redundant, text = redundant_equations(solver, x, delta), explanation(solver.transcription, result, delta)
     if redundant:

@@ -221,6 +221,8 @@ def _certified(solution: Solution) -> None:
     except NotConvergedError as error:
         solution.message = f"the replay failed: {error}"
         return
+    if solution.message and not solution.last.optimal:
+        return  # why the search ended says more than what does not hold for that
     failed = solution.certificate.failures
     if failed:
         failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
