@@ -19,12 +19,19 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.style import save
 from colloc.studies.store import StudyFile, load_study
-from colloc.studies.table import best_over
 from colloc.system.errors import StoreError
 from scripts.figures_studies import friction_plane_figure
 
 SMALL_BASIS = Budget(intervals=6, shapes=12, directions=24, rounds=12, starts=60, tolerance=5e-3)
 COMMAND = "python -m colloc.commands.sweep studies/friction_plane.py && python -m scripts.friction_plane"
+
+
+def best_over(table_values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """Largest value along an axis, NaN where there is none, and where it is (0 there)."""
+    filled = np.where(np.isnan(table_values), -np.inf, table_values)
+    where = filled.argmax(axis=axis)
+    best = filled.max(axis=axis)
+    return np.where(np.isfinite(best), best, np.nan), where
 
 
 def bounds(mu_t: np.ndarray, mu_b: np.ndarray, count: int, cache: Path) -> np.ndarray:

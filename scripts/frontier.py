@@ -40,13 +40,13 @@ from colloc.mechanics.width import gap
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save
-from colloc.search.few_corners import polygon_near
 from colloc.search.optimise import maximise_efficiency
 from colloc.search.relaxed_search import best_relaxed_gait
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
 from scripts.bound_table import COEFFICIENTS
 from scripts.check_potential import potentials
+from scripts.few_corners import polygon_near
 
 DELTA, LEAST_EXTENT, FEW = 1e-5, 0.3, 60
 """At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one."""

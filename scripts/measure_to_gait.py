@@ -20,9 +20,9 @@ from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
-from colloc.pictures.measure_figure import measure_figure
 from colloc.pictures.style import save
 from colloc.search.relaxed_search import best_relaxed_gait
+from scripts.figures_measure import measure_figure
 
 
 def main() -> None:

@@ -10,10 +10,10 @@ from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import realisation
 from colloc.results.realisation import finite_certificate, kept_inside, realised_gaits, relaxed_certificate
 from colloc.results.relaxation import Optimality
-from colloc.search import few_corners
-from colloc.search.few_corners import polygon_near
 from colloc.search.reduced_search import VERY_ROUGH, Found, settled
 from colloc.search.relaxed_search import prices, readied
+from scripts import few_corners
+from scripts.few_corners import polygon_near
 
 
 def problem(directions=3, delta=3e-4, pieces=14):

@@ -26,9 +26,10 @@ from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
 from colloc.studies.store import load_study, save_study
 from colloc.studies.study import Axis, Study, read_study_file
-from colloc.studies.table import NO_PROBLEM, best_over, study_table
+from colloc.studies.table import NO_PROBLEM, study_table
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
+from scripts.friction_plane import best_over
 
 FILE = """
 from colloc import *
