@@ -2,8 +2,8 @@
 
 python -m scripts.house_lines [--commit HEAD]
 
-A line of code is one that is not blank, a comment, part of a docstring or an import. A module counts as new if what it does could
-not be asked for before; one that replaces another does not.
+A line of code is one that is not blank, a comment, part of a docstring or an import. A module counts as new if what it does
+could not be asked for before; one that replaces another does not.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def code_lines(text: str) -> int:
     for node in ast.walk(tree):
         words = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         if words or isinstance(node, (ast.Import, ast.ImportFrom)):
-            other |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+            other |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))  # type: ignore[attr-defined]
     rest = (line.strip() for number, line in enumerate(text.splitlines(), 1) if number not in other)
     return sum(bool(line) and not line.startswith("#") for line in rest)
 
