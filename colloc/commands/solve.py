@@ -174,28 +174,11 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
             for a in solution.others
         ],
         "gait": fields(solution.gait),
-        "certificate": None,
+        "certificate": certificate.facts() if certificate.replayed else None,
         "reference": None,
         "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
         "versions": solution.versions,
     }
-    if certificate.replayed:
-        result["certificate"] = {
-            "passed": certificate.passed,
-            "value": certificate.value,
-            "value_error": certificate.value_error,
-            "value_at_zero_delta": certificate.value_at_zero_delta,
-            "value_error_at_zero_delta": certificate.value_error_at_zero_delta,
-            "rotation": certificate.rotation,
-            "length": certificate.length,
-            "efficiency": certificate.efficiency,
-            "efficiency_error": certificate.efficiency_error,
-            "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
-            "error_at_zero_delta": certificate.error_at_zero_delta,
-            "distance_error": certificate.distance_error,
-            "work_error": certificate.work_error,
-            "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
-        }
     if reference is not None:
         keys = ("efficiency", "tolerance", "source")
         result["reference"] = {key: getattr(reference, key) for key in keys}

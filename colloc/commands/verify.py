@@ -105,30 +105,11 @@ def _verify(options: argparse.Namespace) -> int:
     complaint = disagreement(solution.certificate, certificate)
     good = certificate.passed and not complaint and solution.success and not any(gait["complaint"] for gait in gaits)
     if options.json:
-        checks = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks}
-        keys = (
-            "value",
-            "value_error",
-            "efficiency",
-            "efficiency_error",
-            "efficiency_at_zero_delta",
-            "error_at_zero_delta",
-            "distance",
-            "distance_error",
-            "work",
-            "work_error",
-            "instants",
-        )
         facts = {
-            "file": options.result,
-            "objective": solution.problem.objective.name,
-            "name": solution.problem.name,
-            "certified": good,
-            "complaint": complaint,
-        }
-        facts["changed"] = solution.changed
-        facts["gaits"] = gaits
-        print(json.dumps({**facts, **{key: getattr(certificate, key) for key in keys}, "checks": checks}))
+            "file": options.result, "objective": solution.problem.objective.name, "name": solution.problem.name,
+            "certified": good, "complaint": complaint, "changed": solution.changed, "gaits": gaits,
+        }  # fmt: skip
+        print(json.dumps({**facts, **certificate.facts()}))
         return OK if good else FAILED
     print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
     print(
