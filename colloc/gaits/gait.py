@@ -60,7 +60,7 @@ class GaitFunction:
         return f"<{type(self).__name__} of {self.n_joint} joint{'s' if self.n_joint > 1 else ''}>"
 
 
-class GaitClass:
+class ClassOfGaits:
     """Base of the classes of gaits; besides what stands here a class has ``symmetry``, and ``series(harmonics)``."""
 
     symmetry: str

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait import GaitClass, GaitFunction
+from colloc.gaits.gait import ClassOfGaits, GaitFunction
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
@@ -148,7 +148,7 @@ def ellipse(A0: float, A1: float, B1: float) -> Fourier:
 
 @named_arguments
 @dataclass(frozen=True)
-class Harmonic(GaitClass):
+class Harmonic(ClassOfGaits):
     """The class of gaits with `harmonics` harmonics and a given symmetry.
 
     A member is a parameter vector p; angles are linear in it. Without a symmetry that fixes it, the start phase is

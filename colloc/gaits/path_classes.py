@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait import GaitClass
+from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
@@ -32,7 +32,7 @@ JOINS, CURVATURE = 1e-8, 1e-6
 
 @named_arguments
 @dataclass(frozen=True)
-class FreePath(GaitClass):
+class FreePath(ClassOfGaits):
     """Closed paths of bounded curvature at unit shape speed: |q''| <= curvature in arc length.
 
     Parameters
@@ -125,7 +125,7 @@ class FreePath(GaitClass):
 
 @named_arguments
 @dataclass(frozen=True)
-class Polygon(GaitClass):
+class Polygon(ClassOfGaits):
     """Closed polygons with a given number of corners, which are free.
 
     Parameters

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait import GaitClass, GaitFunction
+from colloc.gaits.gait import ClassOfGaits, GaitFunction
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves
 from colloc.system.errors import ProblemError
@@ -63,7 +63,7 @@ class Phases(GaitFunction):
 
 
 @dataclass(frozen=True)
-class Prescribed(GaitClass):
+class Prescribed(ClassOfGaits):
     """Nothing is free: a problem of this class asks what a given motion achieves.
 
     Parameters

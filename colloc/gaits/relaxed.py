@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from colloc.gaits.gait import GaitClass
+from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.paths import Corners
 from colloc.gaits.symmetry import BILATERAL, BOTH, NONE, SYMMETRIES
@@ -17,7 +17,7 @@ _PIECES, _PARAMETERS = 240, 400
 
 
 @dataclass(frozen=True)
-class Relaxed(GaitClass):
+class Relaxed(ClassOfGaits):
     """Relaxed gaits: at each instant a mixture of a few directions of joint rates, constant on every piece of the period.
 
     Parameters

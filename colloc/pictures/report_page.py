@@ -48,7 +48,7 @@ PLAIN = {
 """What a check means for a reader who knows nothing of optimisation, by its name."""
 
 
-class Picture(NamedTuple):
+class Drawn(NamedTuple):
     """A panel as SVG, and where its axes lie: left, right, top, bottom as percent, and limits of both axes."""
 
     caption: str
@@ -161,11 +161,11 @@ def _commands(solution: Solution) -> str:
     )
 
 
-def _plane(panel: Panel, coordinate: str, j: int) -> Picture:
+def _plane(panel: Panel, coordinate: str, j: int) -> Drawn:
     return _picture(panel, f"{coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1))
 
 
-def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False) -> Picture:
+def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False) -> Drawn:
     """The panel as SVG that takes its text colour and font from the page; nothing in it comes from a file but numbers."""
     text, figure = StringIO(), panel.figure()
     with styled():
@@ -182,7 +182,7 @@ def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, 
     box = 100 * axes.get_position().get_points()
     (left, low), (right, high) = box.round(2).tolist()
     sides = (left, right, round(100 - high, 2), round(100 - low, 2))
-    return Picture(caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase)
+    return Drawn(caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase)
 
 
 def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
