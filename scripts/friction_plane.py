@@ -1,6 +1,6 @@
 """Figure and table of the friction plane: python -m scripts.friction_plane [--results FOLDER] [--bounds N] [--output FOLDER]
 
-Reads what ``python -m colloc.commands.sweep studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
+Reads what ``colloc sweep studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
 over the classes searched, and writes friction_plane.png, .pdf and .md. With ``--bounds N`` an upper bound for every gait of
 the body is computed first on a subset of N x N points (sampled, with a small spline basis: see docs/bound.md), kept in
 FOLDER/bounds.sqlite; nothing is interpolated between them.
@@ -23,7 +23,7 @@ from colloc.system.errors import StoreError
 from scripts.figures_studies import friction_plane_figure
 
 SMALL_BASIS = Budget(intervals=6, shapes=12, directions=24, rounds=12, starts=60, tolerance=5e-3)
-COMMAND = "python -m colloc.commands.sweep studies/friction_plane.py && python -m scripts.friction_plane"
+COMMAND = "colloc sweep studies/friction_plane.py && python -m scripts.friction_plane"
 
 
 def best_over(table_values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
@@ -96,7 +96,7 @@ def main() -> None:
     try:
         study = load_study(options.results / "friction_plane.nc")
     except StoreError as error:
-        parser.error(f"{error} python -m colloc.commands.sweep studies/friction_plane.py makes it.")
+        parser.error(f"{error} colloc sweep studies/friction_plane.py makes it.")
     mu_t, mu_b = study.coordinates["mu_t"], study.coordinates["mu_b"]
     efficiency, rest = winners(study)
     bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.sqlite")

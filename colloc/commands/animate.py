@@ -6,7 +6,6 @@ Exit codes: 0 written, 2 bad file or option.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -52,7 +51,3 @@ def _animate(options: argparse.Namespace) -> int:
     size = path.stat().st_size
     tell(options, {"status": "written", "file": str(path), "bytes": size}, [f"saved {path} ({size / 1000:.0f} kB)"])
     return OK
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ Exit codes: 0 opened, 2 bad file or option, 3 not converged, 4 certificate faile
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -72,7 +71,3 @@ def _open(options: argparse.Namespace) -> int:
     save(solution, path)
     tell(options, solution_dict(solution, path, None, None), [*solution_lines(solution, None), f"  saved {path}"])
     return EXIT[solution.status]
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -313,7 +313,3 @@ def levels_left(problem: Problem, level: Level) -> int:
     if level.delta <= problem.delta:
         return 1
     return math.ceil(math.log10(level.delta / problem.delta) - 1e-9) + (problem.mesh_tolerance > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -132,7 +131,3 @@ def _verify(options: argparse.Namespace) -> int:
     if solution.status != "solved" and certificate.passed:
         print(f"  the solve itself ended as: {solution.status}. {solution.message}")
     return OK if good else FAILED
-
-
-if __name__ == "__main__":
-    sys.exit(main())

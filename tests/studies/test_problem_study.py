@@ -428,7 +428,7 @@ def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
 def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     path = tmp_path / "many.py"
     path.write_text(FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))"), encoding="utf-8")
-    command = [sys.executable, "-m", "colloc.commands.sweep", str(path), "--output", str(tmp_path)]
+    command = [sys.executable, "-m", "colloc", "sweep", str(path), "--output", str(tmp_path)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     lines = [process.stdout.readline() for _ in range(3)]
     process.send_signal(signal.SIGINT)
