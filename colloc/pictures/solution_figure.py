@@ -58,7 +58,7 @@ def _of_motion(solution: Solution) -> _Panels:
     if len(angles) == 2 and problem.gait.free:
         found["shape space (disc: t = 0)"] = lambda axes: draw_shape_path(axes, problem, angles)
     else:  # no one plane shows them all
-        found[f"{problem.body.quantity}s"] = lambda axes: draw_angles(axes, t, angles, problem.body)
+        found["shape"] = lambda axes: draw_angles(axes, t, angles, problem.body)
     found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(axes, solution, t)
     found[f"W = {solution.measured.work:.4f} a period (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
     return found
