@@ -95,6 +95,16 @@ class ReducedProgram:
         """Upper bounds of the rows."""
         return np.concatenate([self._own_upper, self.space.row_upper])
 
+    @property
+    def row_names(self) -> list[tuple[str, int]]:
+        """What each row is: its kind, and which of the full program's rows of that kind."""
+        own = [("period", k) for k in range(self._own_lower.size)]
+        return own + [(kind, int(cell)) for kind, cells in self.space.watched.items() for cell in cells]
+
+    def move_checks(self, v: np.ndarray) -> float:
+        """As `SearchSpace.move_checks`."""
+        return self.space.move_checks(v)
+
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""
         return -float(self._objective(self.motion.values(v, self.delta)))
