@@ -38,6 +38,9 @@ class SearchSpace(Shapes, Protocol):
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters of the member nearest to a gait."""
 
+    def laid(self, gait: AnyGait) -> np.ndarray:
+        """Parameters near a gait that need not keep every row: where a search may begin that keeps them as it goes."""
+
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters as the full program has them (see `colloc.collocation.layout`)."""
 
