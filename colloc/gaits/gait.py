@@ -94,6 +94,10 @@ class ClassOfGaits:
         """Intervals that a first mesh wants."""
         raise NotImplementedError
 
+    def coarse_intervals(self, n_joint: int) -> int:
+        """Intervals on which starts are told apart."""
+        return self.intervals(n_joint) // 2
+
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         """Intervals that a mesh with so many points on each needs at least, and for what."""
         return 4, "a path"

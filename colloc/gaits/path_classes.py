@@ -173,10 +173,6 @@ class Polygon(ClassOfGaits):
         """Intervals that a first mesh wants: some on every side."""
         return max(24, 4 * self.pieces)
 
-    def coarse_intervals(self, n_joint: int) -> int:
-        """Intervals on which starts are told apart."""
-        return self.intervals(n_joint) // 2
-
     def describe(self) -> str:
         """The class in words, for reports."""
         axis = f" through a {self.axis}" if self.symmetry == BILATERAL and self.corners % 2 == 0 else ""
