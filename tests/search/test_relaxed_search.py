@@ -147,6 +147,7 @@ def test_what_is_collocated_of_the_finite_gait_is_what_its_replay_says(solution)
     """So its figure, its report and its export show the gait that the certificate is about."""
     assert solution.success
     assert len(solution.plot().axes) == 5
+    assert dict(solution.to_xarray().sizes) == {"t": 401, "joint": 2, "velocity": 3, "axis": 2}
     assert solution.gait.corners == pytest.approx(solution.relaxed.best.gait.corners, abs=1e-12)
     assert solution.last.efficiency == pytest.approx(solution.measured.efficiency, rel=1e-3)
     assert solution.last.distance == pytest.approx(solution.measured.distance, rel=1e-3)
