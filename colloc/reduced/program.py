@@ -53,8 +53,9 @@ class SearchSpace(Shapes, Protocol):
     def with_far(self, far: Pairs) -> SearchSpace:
         """The class with other pairs of links kept apart."""
 
-    def move_checks(self, v: np.ndarray) -> float:
-        """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+        """Place every check at the worst instants of the gait v, or later by a share of its mesh cell; how far the gait exceeds
+        any bound there [rad]."""
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near an optimum; None for 1."""
@@ -104,9 +105,9 @@ class ReducedProgram:
         own = [("period", k) for k in range(self._own_lower.size)]
         return own + [(kind, int(cell)) for kind, cells in self.space.watched.items() for cell in cells]
 
-    def move_checks(self, v: np.ndarray) -> float:
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
         """As `SearchSpace.move_checks`."""
-        return self.space.move_checks(v)
+        return self.space.move_checks(v, later)
 
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""
