@@ -42,7 +42,7 @@ _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
 
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
-_BODY = (ctypes.c_int, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
+_BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_loaded": (*_BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
