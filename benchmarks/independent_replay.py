@@ -54,7 +54,7 @@ def _moments(vs: np.ndarray, vn: np.ndarray, w: np.ndarray, length: float, delta
 class Crawler(NamedTuple):
     """A chain of links on a plane with Coulomb friction (mu_t, mu_f, mu_b); or one for each of many instants.
 
-    Lengths and weights are then ``(link, n)`` and coefficients ``(3, n)``. Weights are parts of the whole, by default the lengths.
+    Lengths and weights are then ``(link, n)`` and coefficients ``(3, n)``. Weights are shares, by default the lengths.
     """
 
     lengths: Sequence[float] | np.ndarray
