@@ -59,6 +59,8 @@ class Found:
         Of the reduced program.
     accuracy : float
         Of it that was asked for.
+    program : ReducedProgram, optional
+        Whose conditions these are; by default the program of that space at that delta.
     iterations, evaluations : int
     seconds : float
     curvature : (n, n), optional
@@ -75,13 +77,14 @@ class Found:
     evaluations: int
     seconds: float
     curvature: np.ndarray | None = None
+    program: ReducedProgram | None = None
 
     @classmethod
     def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
         """A gait as it is, to go on from."""
-        space.move_checks(v)
         program = ReducedProgram(space, delta)
-        return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0)
+        program.move_checks(v)
+        return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0, program=program)
 
     @property
     def optimal(self) -> bool:
@@ -109,7 +112,7 @@ def settled(
     """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
-    space.move_checks(v)
+    program.move_checks(v)
     for _ in range(rounds or _ROUNDS[accuracy]):
         before = v
         fresh = curvature is None
@@ -117,15 +120,15 @@ def settled(
             curvature = space.metric(v)
         result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
-        admissible = space.move_checks(v) <= _ADMISSIBLE
+        admissible = program.move_checks(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < STATIONARY[accuracy]
         # what was learned across kinks may end the search too early: then it begins anew
         curvature = result.curvature if stationary else None
         if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < _AT_REST)):
             break
-    seconds = time.perf_counter() - begin
-    return Found(space, v, delta, result.objective, conditions, accuracy, iterations, evaluations, seconds, curvature)
+    counts = iterations, evaluations, time.perf_counter() - begin
+    return Found(space, v, delta, result.objective, conditions, accuracy, *counts, curvature, program)
 
 
 def settled_apart(

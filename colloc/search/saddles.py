@@ -36,6 +36,7 @@ def off_saddles(found: Found, lacks: str, report: Report) -> tuple[Found, str]:
 def _below(found: Found) -> Iterator[np.ndarray]:
     """Gaits beside a saddle that are better."""
     program = ReducedProgram(found.space, found.delta)
+    program.move_checks(found.v)
     here = curvature(program, found.v)
     if here.smallest + here.error < -_FALLS * abs(found.objective):
         for step in STEPS:

@@ -22,7 +22,7 @@ from colloc import (
 from colloc.collocation.warm_start import feasible_point
 from colloc.commands import verify
 from colloc.gaits.objective import EFFICIENCY, SPEED
-from colloc.mechanics.driven_power import actuator_powers, driven_power
+from colloc.mechanics.actuators import actuator_powers, driven_power
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
