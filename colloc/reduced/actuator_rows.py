@@ -21,8 +21,10 @@ _SAMPLES = np.linspace(1e-9, 1 - 1e-9, 17)
 """Of an interval; rates may jump at its ends."""
 _NEAR = 0.3
 """A value that is nearer to its bound than this, over the limit, is among the rows."""
-_EXACT = 1e-6
-"""Excess over a limit that counts as none, relative: far less than a certificate allows."""
+_ZOOMS, _CLOSE = 2, 0.02
+"""Samples are laid again, 8 times as densely, round the highest of an interval that is nearer than this to its limit."""
+_EXACT = 3e-5
+"""Excess over a limit that counts as none, relative: less than a certificate allows."""
 
 
 class ActuatorRows:
@@ -44,14 +46,10 @@ class ActuatorRows:
 
     def place(self, v: np.ndarray, delta: float, gait: AnyGait, phases: Mesh) -> float:
         """Choose the rows near the gait v, whose mesh in its phases is given; by how much it exceeds any limit, relative."""
-        body, friction, mesh = self._motion.body, self._motion.friction, self._motion.mesh
-        t = (phases.edges[:-1, None] + phases.h[:, None] * _SAMPLES).ravel()
-        at = friction, gait.angles(t), gait.rates(t)
-        slow = delta * gait.delta_unit
-        z = body.solve(*at, slow).z
-        largest = self._magnitudes(self._limits.shares_in_balance(body, *at, z, slow)).reshape(-1, mesh.n, _SAMPLES.size)
+        mesh = self._motion.mesh
         here = self._magnitudes(self._all(v, delta))
-        between = np.maximum(largest.max(axis=2) - here[:, mesh.points].max(axis=2), 0.0)
+        largest = self._largest(gait, delta * gait.delta_unit, phases)
+        between = np.maximum(largest - here[:, mesh.points].max(axis=2), 0.0)
         lowered = np.zeros_like(here)
         for points in mesh.points.T:  # neighbours may share a point
             lowered[:, points] = np.maximum(lowered[:, points], between)
@@ -60,6 +58,28 @@ class ActuatorRows:
         self.placed = np.stack(np.nonzero(here > self.upper - _NEAR))
         excess = float(largest.max()) - 1.0
         return excess if excess > _EXACT or np.isnan(excess) else 0.0
+
+    def _largest(self, gait: AnyGait, delta: float, phases: Mesh) -> np.ndarray:
+        """In every interval, ``(n_share, n)``; delta is per period."""
+        left, width = np.tile(phases.edges[:-1], (len(self._limits.names), 1)), np.tile(phases.h, (len(self._limits.names), 1))
+        largest = np.full(left.shape, -np.inf)
+        share, interval = np.indices(left.shape).reshape(2, -1)
+        for _ in range(_ZOOMS + 1):
+            t = left[share, interval, None] + width[share, interval, None] * _SAMPLES
+            found = self._shares_at(gait, delta, t.ravel())[np.repeat(share, _SAMPLES.size), np.arange(t.size)].reshape(t.shape)
+            largest[share, interval] = np.maximum(largest[share, interval], found.max(axis=1))
+            inner = np.clip(found.argmax(axis=1), 1, _SAMPLES.size - 2)
+            left[share, interval] = t[np.arange(share.size), inner - 1]
+            width[share, interval] *= 2 / (_SAMPLES.size - 1)
+            close = largest[share, interval] > 1.0 - _CLOSE
+            share, interval = share[close], interval[close]
+        return largest
+
+    def _shares_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
+        """Magnitudes at phases, ``(n_share, n_time)``."""
+        body, at = self._motion.body, (self._motion.friction, gait.angles(t), gait.rates(t))
+        z = body.solve(*at, delta).z
+        return self._magnitudes(self._limits.shares_in_balance(body, *at, z, delta))
 
     def _magnitudes(self, shares: np.ndarray) -> np.ndarray:
         """What a bound from above is laid on: moments are bounded both ways."""
@@ -81,6 +101,8 @@ class ActuatorRows:
         """Derivatives of the rows, ``(n_row, n)``."""
         s, motion = self._motion.at(v, delta), self._motion
         (share, point), each = self.placed, np.arange(self.placed.shape[1])
+        if not each.size:
+            return np.empty((0, v.size))
         at = s.angles[:, point], s.rates[:, point], s.solved.z[:, point]
         slopes = share_slopes(motion.body, motion.friction, self._limits, *at, delta)
         on_shape = np.zeros((each.size, motion.mesh.n_point, slopes.shape[1]))

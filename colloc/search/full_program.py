@@ -118,6 +118,9 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
     before = solver.measured(x, delta, *_multipliers(found, program))
+    if found.conditions.violation > RADIUS:  # no gait within reach is admissible
+        kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
+        return level_of(program, kept, delta, REDUCED), explanation(program, kept, delta)
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
     for _ in range(_ROUNDS):  # the gait may have moved so far that other instants are the worst
