@@ -6,7 +6,11 @@
 
 #include <stddef.h>
 
+#ifdef OWN_LAW
+#include "link_quadrature.h"
+#else
 #include "link_friction.h"
+#endif
 
 typedef struct {
     double length, pressure, cos, sin; /* pressure: weight per length over the body's; direction in the body frame */
@@ -120,11 +124,9 @@ static inline Total evaluate(
         total.force[1] += fy;
         total.force[2] += link[i].x * fy - link[i].y * fx + k[i].couple;
         if (law->associated)
-            total.merit += link[i].pressure * dissipation(&k[i], link[i].length);
+            total.merit += link[i].pressure * dissipation(&k[i], law, link[i].length);
     }
-    if (law->associated)
-        total.merit *= law->mu_t;
-    else
+    if (!law->associated)
         total.merit = 0.5 * (total.force[0] * total.force[0] + total.force[1] * total.force[1] + total.force[2] * total.force[2]);
     return total;
 }

@@ -9,8 +9,7 @@
 #include "loaded.h"
 #include "motion.h"
 
-/* The largest rate: the law is homogeneous once delta scales along. */
-static inline double speed_of(const int n, const double *rate, ptrdiff_t stride)
+static inline double largest_rate_of(const int n, const double *rate, ptrdiff_t stride)
 {
     double speed = 0.0;
     for (int j = 0; j < n - 1; ++j)
@@ -29,8 +28,9 @@ static inline void balance_instants(
     double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     for (ptrdiff_t t = first; t < last; ++t) {
-        const double speed = speed_of(n, rates + t, n_time);
+        const double largest = largest_rate_of(n, rates + t, n_time), speed = speed_unit_of(largest);
         double tail[3];
+        s->largest_rate = largest;
         find_directions(n, s->link, length, pressure, angles + t, rates + t, speed, n_time);
         s->anchor = n / 2;
         s->iterations = 0;
@@ -86,7 +86,7 @@ int colloc_motion(
     Matrix3 *K = malloc((size_t)n * sizeof *K);
     Change *d = malloc((size_t)n * sizeof *d);
     for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
-        const double speed = speed_of(n, rates + t, n_time), own_delta = scaled_delta_of(delta, speed);
+        const double speed = speed_unit_of(largest_rate_of(n, rates + t, n_time)), own_delta = scaled_delta_of(delta, speed);
         const int a = (int)anchor[t];
         double z[3], value[ROWS], net[3], dz[3], change[DIFFERENTIATED_ROWS];
         for (int i = 0; i < 3; ++i)

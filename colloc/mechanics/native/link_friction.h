@@ -86,10 +86,23 @@ static inline void find_force(Sliding *k, const Law *law, double length, double 
     k->couple = -mu_t * k->w * l3 * per_S * (0.5 * k->Q - k->a2 * k->h * per_S * per_S);
 }
 
-/* Dissipation potential of the link at mu = 1: the integral of r. */
-static inline double dissipation(const Sliding *k, double length)
+/* The speed in whose units balances are solved: the law is homogeneous once delta scales along. */
+static inline double speed_unit_of(double largest_rate)
 {
-    return length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g);
+    return largest_rate;
+}
+
+/* Friction on a body that moves at unit speed, see `force_unit` in colloc/mechanics/damped_newton.py. */
+static inline double unit_of_force(const Law *law, double delta, double largest_rate)
+{
+    (void)largest_rate;
+    return law->largest / hypot(1.0, delta);
+}
+
+/* Dissipation potential of the link: mu times the integral of r. */
+static inline double dissipation(const Sliding *k, const Law *law, double length)
+{
+    return law->mu_t * length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g);
 }
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w). */
