@@ -6,7 +6,7 @@
 Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1 to 4 harmonics, free paths
 and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. With --laws another family: elliptic, viscous, power
 and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power. For each: whether it is
-solved, its value over the best ever found for that problem (kept in benchmarks/zoo_best.json, which a better answer updates), and
+solved, its value over the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates), and
 the processor time. Failures are printed with the reason.
 """
 
