@@ -36,7 +36,7 @@ _DRIER, _LOST = 0.1, 0.5
 _ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
 _ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
 """Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
-_ADMISSIBLE, _SHRINKS = 1e-8, 0.9
+_ADMISSIBLE, _ALIKE = 1e-8, 1e-3
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
 _MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
@@ -129,7 +129,7 @@ def settled(
         if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < _AT_REST)):
             break
         violation = conditions.violation
-        if violation > max(_SHRINKS * worse, STATIONARY[ROUGH]) and not result.on_edge:
+        if violation > STATIONARY[ROUGH] and abs(violation - worse) < _ALIKE * worse and not result.on_edge:
             break  # the rows contradict each other near here
     counts = iterations, evaluations, time.perf_counter() - begin
     return Found(space, v, delta, result.objective, conditions, accuracy, *counts, curvature, program)
