@@ -61,18 +61,20 @@ class ActuatorRows:
 
     def _largest(self, gait: AnyGait, delta: float, phases: Mesh) -> np.ndarray:
         """In every interval, ``(n_share, n)``; delta is per period."""
-        left, width = np.tile(phases.edges[:-1], (len(self._limits.names), 1)), np.tile(phases.h, (len(self._limits.names), 1))
-        largest = np.full(left.shape, -np.inf)
-        share, interval = np.indices(left.shape).reshape(2, -1)
-        for _ in range(_ZOOMS + 1):
-            t = left[share, interval, None] + width[share, interval, None] * _SAMPLES
-            found = self._shares_at(gait, delta, t.ravel())[np.repeat(share, _SAMPLES.size), np.arange(t.size)].reshape(t.shape)
-            largest[share, interval] = np.maximum(largest[share, interval], found.max(axis=1))
-            inner = np.clip(found.argmax(axis=1), 1, _SAMPLES.size - 2)
-            left[share, interval] = t[np.arange(share.size), inner - 1]
-            width[share, interval] *= 2 / (_SAMPLES.size - 1)
-            close = largest[share, interval] > 1.0 - _CLOSE
-            share, interval = share[close], interval[close]
+        t = phases.edges[:-1, None] + phases.h[:, None] * _SAMPLES
+        found = self._shares_at(gait, delta, t.ravel()).reshape(-1, *t.shape)
+        largest, t = found.max(axis=2), np.tile(t, (len(found), 1, 1))
+        for _ in range(_ZOOMS):
+            share, interval = np.nonzero(largest > 1.0 - _CLOSE)
+            if not share.size:
+                break
+            each, near = np.arange(share.size), found[share, interval].argmax(axis=1)
+            near, around = np.clip(near, 1, _SAMPLES.size - 2), t[share, interval]
+            left, right = around[each, near - 1], around[each, near + 1]
+            t[share, interval] = finer = left[:, None] + (right - left)[:, None] * _SAMPLES
+            every = self._shares_at(gait, delta, finer.ravel()).reshape(-1, *finer.shape)
+            found[share, interval] = every[share, each]
+            largest[share, interval] = np.maximum(largest[share, interval], every[share, each].max(axis=1))
         return largest
 
     def _shares_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
