@@ -94,9 +94,9 @@ class ReducedProgram:
         self.lower, self.upper = space.lower, space.upper
         self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
 
-    def move_checks(self, v: np.ndarray) -> float:
-        """Place the rows that depend on where the gait v is, the space's and the actuators'; how far it exceeds any bound."""
-        excess = self.space.move_checks(v)
+    def place_rows(self, v: np.ndarray) -> float:
+        """Place all rows that depend on where the gait v is, the space's and the actuators'; how far it exceeds any bound."""
+        excess = self.move_checks(v)
         if self.actuators is None:
             return excess
         gait = self.space.member(v)
@@ -120,10 +120,12 @@ class ReducedProgram:
     def row_names(self) -> list[tuple[str, int]]:
         """What each row is: its kind, and which of the full program's rows of that kind."""
         own = [("period", k) for k in range(self._own_lower.size)]
+        if self.actuators is not None:
+            own += [(f"actuators, share {share}", int(point)) for share, point in self.actuators.placed.T]
         return own + [(kind, int(cell)) for kind, cells in self.space.watched.items() for cell in cells]
 
     def move_checks(self, v: np.ndarray) -> float:
-        """As `SearchSpace.move_checks`."""
+        """As `SearchSpace.move_checks`; rows of actuators stay where they are."""
         return self.space.move_checks(v)
 
     def objective(self, v: np.ndarray) -> float:

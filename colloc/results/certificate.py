@@ -235,7 +235,7 @@ def _second_order(solution: Solution) -> Check:
     space, v = space_near(problem, solution.gait, level.edges, level.scheme)
     space = space.with_far(problem.body.far_pairs)
     program = ReducedProgram(space, level.delta)
-    program.move_checks(v)
+    program.place_rows(v)
     if v.size > _MOST_PARAMETERS:
         return Check("second order", 0.0, SADDLE, f"not measured, for {v.size} parameters")
     found = curvature(program, v)

@@ -124,7 +124,7 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
     for _ in range(_ROUNDS):  # the gait may have moved so far that other instants are the worst
-        if not result.optimal or reduced.move_checks(result.x[own]) <= _ADMISSIBLE:
+        if not result.optimal or reduced.place_rows(result.x[own]) <= _ADMISSIBLE:
             break
         solver.transcription = program = _limited(reduced, program)
         result = solver.solve_within(result.x, delta, (result.lam_x, result.lam_g), RADIUS).accumulated(result)

@@ -83,7 +83,7 @@ class Found:
     def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
         """A gait as it is, to go on from."""
         program = ReducedProgram(space, delta)
-        program.move_checks(v)
+        program.place_rows(v)
         return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0, program=program)
 
     @property
@@ -112,7 +112,7 @@ def settled(
     """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
-    program.move_checks(v)
+    program.place_rows(v)
     violation = np.inf
     for _ in range(rounds or _ROUNDS[accuracy]):
         before, worse = v, violation
@@ -121,7 +121,7 @@ def settled(
             curvature = space.metric(v)
         result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
-        admissible = program.move_checks(v) <= _ADMISSIBLE
+        admissible = program.place_rows(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < STATIONARY[accuracy]
         # what was learned across kinks may end the search too early: then it begins anew

@@ -59,7 +59,7 @@ def test_gradients_of_the_reduced_program_are_those_of_differences(case):
     space, v = space_near(problem, problem.guess)
     v = v + 1e-2 * np.random.default_rng(0).normal(size=v.size)
     program = ReducedProgram(space, DELTA)
-    program.move_checks(v)
+    program.place_rows(v)
     steps = h * np.eye(space.n)
     slopes = [(program.objective(v + e) - program.objective(v - e)) / (2 * h) for e in steps]
     # balances are solved to 1e-12, so that differences over 2 h know the slope of a value of order 1 to 1e-6
@@ -84,7 +84,7 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
         own = reduced.rows(v)[first : first + len(problem.at_least)]
         np.testing.assert_allclose(g[full.groups["at least"]], own, atol=1e-11)
     if problem.actuator_limits.names:
-        reduced.move_checks(v)
+        reduced.place_rows(v)
         share, point = reduced.actuators.placed
         shares = g[full.groups["actuators"]].reshape(-1, len(problem.actuator_limits.names))
         assert share.size > 10
