@@ -37,6 +37,7 @@ def off_saddles(found: Found, lacks: str, report: Report) -> tuple[Found, str]:
 def _better(found: Found) -> Iterator[Found]:
     """Gaits that the search comes to from beside a saddle, and that are better."""
     program = ReducedProgram(found.space, found.delta)
+    program.place_rows(found.v)
     here = curvature(program, found.v)
     if here.smallest + here.error < -_FALLS * abs(found.objective):
         lagrangian, length = Lagrangian(program, found.v), np.linalg.norm(found.v)
