@@ -19,8 +19,9 @@ FLAT, PACKED = "c613bd0", "a631038"
 """The last commit of the flat folder, and the move into packages, which took out what only scripts use."""
 NEW = {
     "laws of friction other than Coulomb's": "laws/ mechanics/law numerics/expression",
-    "objectives of one's own, fronts of two, actuators that recover nothing": (
-        "gaits/objective mechanics/driven_power reduced/driven_slopes studies/pareto commands/pareto pictures/front_figure"
+    "objectives of one's own, fronts of two, what actuators can do": (
+        "gaits/objective mechanics/driven_power reduced/driven_slopes studies/pareto commands/pareto pictures/front_figure "
+        "mechanics/actuators reduced/actuator_slopes reduced/actuator_rows"
     ),
     "relaxed gaits and the finite ones near them": (
         "gaits/mixture gaits/relaxed reduced/mixture_space search/relaxed_search results/relaxation results/realisation "

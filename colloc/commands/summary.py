@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
-from colloc.mechanics.law import rate_independent
 from colloc.results.level import PRESCRIBED, REALISED, REDUCED
 from colloc.results.solution import Solution
 
@@ -31,8 +30,8 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  search          {text}" for text in _search_lines(solution)]
-        law = solution.problem.friction
-        paced = "" if rate_independent(law) else f"; run in a period of 1, as work depends on the pace under {law.label}"
+        reason = solution.problem.paced_by
+        paced = f"; run in a period of 1, as {reason}" if reason else ""
         gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
         lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]

@@ -38,6 +38,7 @@ class Relaxed(ClassOfGaits):
 
     symmetries = (*SYMMETRIES, BOTH)
     unit_speed = True
+    mixes = True
     delta_start = 0.01
 
     def __post_init__(self) -> None:

@@ -95,8 +95,12 @@ class OwnLaw(ByQuadrature):
                 raise ProblemError(f"friction: the force jumps where {what} changes its sign; let it vanish or agree there.")
 
     @property
-    def _formulas(self) -> tuple[Formula, Formula]:
-        return formula(self.tangential, VARIABLES), formula(self.normal, VARIABLES)
+    def formulas(self) -> tuple[str, ...]:
+        return self.tangential, self.normal
+
+    @property
+    def _read(self) -> tuple[Formula, ...]:
+        return tuple(formula(text, VARIABLES) for text in self.formulas)
 
     @cached_property
     def degree(self) -> float | None:
@@ -114,7 +118,7 @@ class OwnLaw(ByQuadrature):
 
     @cached_property
     def regularised(self) -> bool:
-        return any(name in each.names for each in self._formulas for name in ("speed", "delta"))
+        return any(name in each.names for each in self._read for name in ("speed", "delta"))
 
     @cached_property
     def _at_unit_speed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -147,7 +151,7 @@ class OwnLaw(ByQuadrature):
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta + 0.0 * vs))
         at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta}
-        fs, fn = (each(at) / self.unit for each in self._formulas)
+        fs, fn = (each(at) / self.unit for each in self._read)
         return fs, fn
 
     def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
@@ -160,7 +164,7 @@ class OwnLaw(ByQuadrature):
             "speed": Dual(r, (vs / r, vn / r)),
             "delta": Dual(delta + zero, (zero, zero)),
         }
-        rows = [each.differentiated(at).slopes for each in self._formulas]
+        rows = [each.differentiated(at).slopes for each in self._read]
         return tuple(tuple(zero - self.speed_unit / self.unit * slope for slope in row) for row in rows)
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:

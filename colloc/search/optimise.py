@@ -10,7 +10,6 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sampling import on_speed_floor
 from colloc.gaits.symmetry import NONE
 from colloc.reduced.spaces import space_near
@@ -124,7 +123,7 @@ def maximise_efficiency(
     >>> maximise_efficiency(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral"))).status
     'solved'
     """
-    if isinstance(problem.gait, Relaxed) and not literal:
+    if problem.gait.mixes and not literal:
         return best_gait(problem, 1, on_level)
     begin = time.perf_counter()
     solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
@@ -172,7 +171,7 @@ def best_gait(
         ``solution.finite`` is the best gait that did not, if there is one. A class of relaxed gaits is answered by the best
         finite gait near its optimum, which is ``solution.relaxed``.
     """
-    if isinstance(problem.gait, Relaxed):
+    if problem.gait.mixes:
         solution = best_relaxed_gait(problem, starts or RELAXED_STARTS, seconds=seconds, report=watch)
         if on_level is not None:
             on_level(solution.last)

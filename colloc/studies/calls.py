@@ -13,7 +13,6 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sampling import LATIN_HYPERCUBE
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, Outcome, basins, counts
@@ -152,7 +151,7 @@ class Starts:
 
 def reopened(problem: Problem, outcome: Outcome) -> Solution:
     """The solution that a start led to: solved at the final delta from its gait, or again from its guess if it failed."""
-    if outcome.status != SOLVED or isinstance(problem.gait, Relaxed):  # no finite gait says what it comes near
+    if outcome.status != SOLVED or problem.gait.mixes:  # no finite gait says what it comes near
         return maximise_efficiency(problem.with_(guess=outcome.guess))
     return maximise_efficiency(problem.with_(guess=outcome.gait, delta_start=problem.delta))
 
