@@ -12,7 +12,6 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.reduced.program import ReducedProgram
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
 from colloc.results.level import REALISED
@@ -222,7 +221,8 @@ def _second_order(solution: Solution) -> Check:
     problem, level = solution.resolved, solution.last
     if not problem.gait.free:
         return Check("second order", 0.0, SADDLE, "nothing is free in a prescribed motion")
-    from colloc.reduced.second_order import curvature  # both load CasADi
+    from colloc.reduced.program import ReducedProgram  # these load CasADi
+    from colloc.reduced.second_order import curvature
     from colloc.reduced.spaces import space_near
 
     space, v = space_near(problem, solution.gait, level.edges, level.scheme)
