@@ -1,7 +1,9 @@
 """Panels of a period: Simpson's rule on each and on its halves, and what that says of the error.
 
-Kinks of stick and slip lie anywhere between the instants. So the error of a panel is judged by how much less halving it
-changes than halving the panel twice as wide did, and those of different panels add up as magnitudes.
+Kinks of stick and slip lie anywhere between the instants. At some places within a panel a kink changes nothing when the panel
+is halved, and yet much when that is done again: the change of one panel tells little. So a panel is also judged by what
+halving would change if it lay one or two instants earlier or later. The error follows from how much less that is than the
+change on the panel twice as wide, and those of different panels add up as magnitudes.
 """
 
 from __future__ import annotations
@@ -21,6 +23,11 @@ _SMOOTH = 1 / (2 * 16 * 15)
 """What a rule of fourth order leaves on a panel of the change on the panel twice as wide, where the motion is smooth."""
 _MARGIN = 3.0
 """Factor of safety (Roache, 1994)."""
+_KINK = 0.25
+"""What is left of the change when a panel with a kink is halved: the width, and how far the kink lifts the parabola."""
+_BESIDE = 2
+_CORNER = 1e-6
+"""Values on both sides of an instant that differ by more, relative to the largest, belong to a corner or another branch."""
 
 
 class Panels(NamedTuple):
@@ -51,8 +58,8 @@ class Panels(NamedTuple):
         return both.take(np.argsort(both.left))
 
 
-def halves(panels: Panels, new: tuple[np.ndarray, ...]) -> Panels:
-    """Both halves of panels, from the values at their instants and half way between these ``(n, 4)``."""
+def halves(panels: Panels, new: tuple[np.ndarray, ...], changed: np.ndarray) -> Panels:
+    """Both halves of panels, from the values at their instants and half way between these ``(n, 4)``; and what that changes."""
     fields = []
     for old, between in zip(panels[2:-1], new, strict=True):
         merged = np.empty((old.shape[0], 9, *old.shape[2:]), dtype=old.dtype)
@@ -60,30 +67,79 @@ def halves(panels: Panels, new: tuple[np.ndarray, ...]) -> Panels:
         fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, *old.shape[1:]))
     left, width = np.repeat(panels.left, 2), 0.5 * np.repeat(panels.width, 2)
     left[1::2] += width[1::2]
-    return Panels(left, width, *[*fields, np.repeat(differences(panels), 2, axis=0)])
+    return Panels(left, width, *[*fields, np.repeat(changed, 2, axis=0)])
 
 
 def begun(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, ...]) -> Panels:
-    """The first panels, an even number of equal ones between any two corners, with the differences on their pairs."""
+    """The first panels, an even number of equal ones between any two corners, with the changes of their pairs."""
     paired = [np.concatenate([a[::2, ::2], a[1::2, 2::2]], axis=1) for a in values]
     pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0)])
-    return Panels(left, width, *[*values, np.repeat(differences(pairs), 2, axis=0)])
+    return Panels(left, width, *[*values, np.repeat(changes(pairs)[0], 2, axis=0)])
 
 
-def differences(panels: Panels) -> np.ndarray:
-    """What halving changes in rotation, displacement, work, path length and driven work of panels, magnitudes ``(n, 5)``."""
-    whole, once = increments(WHOLE, panels, 1), increments(HALF, panels, 2)
-    return np.stack([np.abs(a - b) for a, b in zip(whole, once, strict=True)], axis=1)
+def travelled(turn: np.ndarray, move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heading and place (complex) before every panel and after the last ``(n + 1,)``, from rotations and displacements."""
+    heading = np.concatenate([[0.0], np.cumsum(turn)])
+    return heading, np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
 
 
-def left_over(changed: np.ndarray, wider: np.ndarray) -> np.ndarray:
-    """Error of the halves of panels ``(n, 5)``, from the last change and the one before, on the panel twice as wide.
+def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What halving each panel changes in the period's rotation, distance, work, path length and driven work ``(n, 5)``.
 
-    The rest of a geometric series; but no less than smooth motion would leave of the change before, with a margin, since a
-    change that falls faster does so by accident.
+    And the most that it would change if the panel lay up to one, and up to two instants earlier or later. All are magnitudes.
     """
-    falloff = np.minimum(2 * changed / np.maximum(wider, 1e-300), 0.5)
-    return np.maximum(changed * falloff / (1 - falloff), _MARGIN * _SMOOTH * wider)
+    turn, move, *_ = increments(WHOLE, panels, 1)
+    heading, place = travelled(turn, move)
+    axes, to_come = np.exp(1j * heading[:-1]), place[-1] - place[1:]
+    found = []
+    around = _extended(panels)
+    for first in range(2 * _BESIDE + 1):
+        window = panels._replace(**{name: a[:, first : first + 5] for name, a in around.items()})
+        whole, once = increments(WHOLE, window, 1), increments(HALF, window, 2)
+        turned, moved, *others = (a - b for a, b in zip(whole, once, strict=True))
+        # what comes after the panel turns with it
+        end = place[-1] - axes * moved - 1j * turned * to_come
+        found.append(np.abs(np.stack([turned, abs(place[-1]) - np.abs(end), *others], axis=1)))
+    return found[_BESIDE], np.fmax.reduce(found[1:-1]), np.fmax.reduce(found)
+
+
+def _extended(panels: Panels) -> dict[str, np.ndarray]:
+    """What is integrated, at the five instants of panels and at two more on both sides, as far apart ``(n, 9)``.
+
+    NaN where the panels beside have no values there, or where a corner lies between.
+    """
+    n, at = panels.left.size, np.arange(4)
+    instants = (panels.left[:, None] + 0.25 * panels.width[:, None] * at).ravel()
+    z, power = panels.z, panels.power
+    jumps = np.abs(z[:, 4] - np.roll(z[:, 0], -1, axis=0)).max(axis=1) > _CORNER * np.abs(z).max()
+    jumps |= np.abs(power[:, 4] - np.roll(power[:, 0], -1)) > _CORNER * power.max()
+    stretch = np.concatenate([[0], np.cumsum(jumps[:-1])])
+    if not jumps[-1]:
+        stretch[stretch == stretch[-1]] = 0
+    beside = np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
+    wanted = (panels.left[:, None] + 0.25 * panels.width[:, None] * beside) % 1.0
+    slack = 0.05 * panels.width[:, None]
+    index = np.searchsorted(instants, wanted - slack) % instants.size
+    off = np.abs(instants[index] - wanted)
+    missing = (np.minimum(off, 1 - off) > slack) | (stretch[index // 4] != stretch[:, None])
+    extended = {}
+    for name in ("z", "centre", "power", "pace", "driven"):
+        values = getattr(panels, name)
+        more = np.reshape(values[:, :4], (4 * n, *values.shape[2:]))[index]
+        more[missing] = np.nan
+        extended[name] = np.concatenate([more[:, :_BESIDE], values, more[:, _BESIDE:]], axis=1)
+    return extended
+
+
+def left_over(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarray:
+    """Error of the halves of panels ``(n, 5)``, from the changes up to one and two instants beside them, and from those of the
+    panels twice as wide.
+
+    The rest of a geometric series, which falls no faster than at a kink that lies anywhere; but no less than smooth motion
+    would leave of the change before, with a margin.
+    """
+    falloff = np.minimum(2 * far / np.maximum(wider, 1e-300), _KINK)
+    return np.maximum(near * falloff / (1 - falloff), _MARGIN * _SMOOTH * wider)
 
 
 def increments(rule: np.ndarray, panels: Panels, every: int) -> tuple[np.ndarray, ...]:
