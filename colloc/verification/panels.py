@@ -21,11 +21,12 @@ WHOLE[2:, 2:] += 0.5 * HALF
 """The same for five instants, parabola by parabola."""
 _SMOOTH = 1 / (2 * 16 * 15)
 """What a rule of fourth order leaves on a panel of the change on the panel twice as wide, where the motion is smooth."""
-_MARGIN = 3.0
-"""Factor of safety (Roache, 1994)."""
+_MARGIN = 1.25
+"""Factor of safety where three grids tell the falloff (Roache, 1998)."""
 _KINK = 0.25
 """What is left of the change when a panel with a kink is halved: the width, and how far the kink lifts the parabola."""
 _BESIDE = 2
+"""Instants by which panels are moved at most: half of a panel, so that a kink lies in the middle of one of them."""
 _CORNER = 1e-6
 """Values on both sides of an instant that differ by more, relative to the largest, belong to a corner or another branch."""
 
@@ -34,7 +35,7 @@ class Panels(NamedTuple):
     """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
     of the centre of mass in the body frame (complex), power, power of the joints, shape speed, driven power, residual and lever
     ``(n, 5)``; and how far all balanced motions lie apart ``(n, 5, 3)`` (`colloc.verification.followed_motion.FollowedMotion`).
-    At last the differences of both rules on the panel twice as wide that each is half of ``(n, 5)`` (see `differences`)."""
+    At last what halving the panel changed that each is half of ``(n, 5)`` (see `changes`)."""
 
     left: np.ndarray
     width: np.ndarray
@@ -91,8 +92,7 @@ def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     turn, move, *_ = increments(WHOLE, panels, 1)
     heading, place = travelled(turn, move)
     axes, to_come = np.exp(1j * heading[:-1]), place[-1] - place[1:]
-    found = []
-    around = _extended(panels)
+    found, around = [], _extended(panels)
     for first in range(2 * _BESIDE + 1):
         window = panels._replace(**{name: a[:, first : first + 5] for name, a in around.items()})
         whole, once = increments(WHOLE, window, 1), increments(HALF, window, 2)
@@ -110,18 +110,19 @@ def _extended(panels: Panels) -> dict[str, np.ndarray]:
     """
     n, at = panels.left.size, np.arange(4)
     instants = (panels.left[:, None] + 0.25 * panels.width[:, None] * at).ravel()
-    z, power = panels.z, panels.power
-    jumps = np.abs(z[:, 4] - np.roll(z[:, 0], -1, axis=0)).max(axis=1) > _CORNER * np.abs(z).max()
-    jumps |= np.abs(power[:, 4] - np.roll(power[:, 0], -1)) > _CORNER * power.max()
+    state = np.concatenate([panels.z, panels.power[:, :, None]], axis=2)
+    steps = np.abs(state[:, 4] - np.roll(state[:, 0], -1, axis=0)) > _CORNER * np.abs(state).max(axis=(0, 1))
+    jumps = steps.any(axis=1)
     stretch = np.concatenate([[0], np.cumsum(jumps[:-1])])
     if not jumps[-1]:
         stretch[stretch == stretch[-1]] = 0
     beside = np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
-    wanted = (panels.left[:, None] + 0.25 * panels.width[:, None] * beside) % 1.0
+    wanted = panels.left[:, None] + 0.25 * panels.width[:, None] * beside
     slack = 0.05 * panels.width[:, None]
-    index = np.searchsorted(instants, wanted - slack) % instants.size
-    off = np.abs(instants[index] - wanted)
+    index = np.searchsorted(instants, wanted % 1.0 - slack) % instants.size
+    off = np.abs(instants[index] - wanted % 1.0)
     missing = (np.minimum(off, 1 - off) > slack) | (stretch[index // 4] != stretch[:, None])
+    missing |= jumps[-1] & ((wanted < 0) | (wanted > 1))
     extended = {}
     for name in ("z", "centre", "power", "pace", "driven"):
         values = getattr(panels, name)
