@@ -50,6 +50,11 @@ class Panels(NamedTuple):
     apart: np.ndarray
     wider: np.ndarray
 
+    @property
+    def rates(self) -> np.ndarray:
+        """What is integrated, ``(5, n, 5)``: spin, velocity of the centre, power, shape speed, driven power."""
+        return np.stack([self.z[..., 2], self.centre, self.power, self.pace, self.driven])
+
     def take(self, chosen: np.ndarray) -> Panels:
         return Panels(*(a[chosen] for a in self))
 
@@ -91,45 +96,37 @@ def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     turn, move, *_ = increments(WHOLE, panels, 1)
     heading, place = travelled(turn, move)
-    axes, to_come = np.exp(1j * heading[:-1]), place[-1] - place[1:]
-    found, around = [], _extended(panels)
-    for first in range(2 * _BESIDE + 1):
-        window = panels._replace(**{name: a[:, first : first + 5] for name, a in around.items()})
-        whole, once = increments(WHOLE, window, 1), increments(HALF, window, 2)
-        turned, moved, *others = (a - b for a, b in zip(whole, once, strict=True))
-        # what comes after the panel turns with it
-        end = place[-1] - axes * moved - 1j * turned * to_come
-        found.append(np.abs(np.stack([turned, abs(place[-1]) - np.abs(end), *others], axis=1)))
-    return found[_BESIDE], np.fmax.reduce(found[1:-1]), np.fmax.reduce(found)
+    rates, (index, seen) = panels.rates, _beside(panels)
+    more = rates[:, :, :4].reshape(rates.shape[0], -1)[:, index]
+    extended = np.concatenate([more[..., :_BESIDE], rates, more[..., _BESIDE:]], axis=2)
+    known = np.concatenate([seen[:, :_BESIDE], np.ones((panels.left.size, 5), dtype=bool), seen[:, _BESIDE:]], axis=1)
+    moved_by = range(2 * _BESIDE + 1)
+    windows = np.stack([extended[..., k : k + 5] for k in moved_by], axis=1)
+    there = np.stack([known[:, k : k + 5].all(axis=1) for k in moved_by])
+    whole, once = _integrals(WHOLE, panels.width, windows), _integrals(HALF, panels.width, windows[..., ::2])
+    turned, moved, *others = (a - b for a, b in zip(whole, once, strict=True))
+    # what comes after the panel turns with it
+    end = place[-1] - np.exp(1j * heading[:-1]) * moved - 1j * turned * (place[-1] - place[1:])
+    found = np.abs(np.stack([turned, abs(place[-1]) - np.abs(end), *others], axis=2)) * there[..., None]
+    return found[_BESIDE], found[1:-1].max(axis=0), found.max(axis=0)
 
 
-def _extended(panels: Panels) -> dict[str, np.ndarray]:
-    """What is integrated, at the five instants of panels and at two more on both sides, as far apart ``(n, 9)``.
-
-    NaN where the panels beside have no values there, or where a corner lies between.
-    """
-    n, at = panels.left.size, np.arange(4)
-    instants = (panels.left[:, None] + 0.25 * panels.width[:, None] * at).ravel()
+def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
+    """Which of all instants lie two before and two after those of each panel, as far apart ``(n, 4)``; and whether there are
+    such, with no corner between."""
+    instants = (panels.left[:, None] + 0.25 * panels.width[:, None] * np.arange(4)).ravel()
     state = np.concatenate([panels.z, panels.power[:, :, None]], axis=2)
     steps = np.abs(state[:, 4] - np.roll(state[:, 0], -1, axis=0)) > _CORNER * np.abs(state).max(axis=(0, 1))
-    jumps = steps.any(axis=1)
-    stretch = np.concatenate([[0], np.cumsum(jumps[:-1])])
-    if not jumps[-1]:
+    corners = steps.any(axis=1)
+    stretch = np.concatenate([[0], np.cumsum(corners[:-1])])
+    if not corners[-1]:
         stretch[stretch == stretch[-1]] = 0
-    beside = np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
-    wanted = panels.left[:, None] + 0.25 * panels.width[:, None] * beside
+    wanted = panels.left[:, None] + 0.25 * panels.width[:, None] * np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
     slack = 0.05 * panels.width[:, None]
     index = np.searchsorted(instants, wanted % 1.0 - slack) % instants.size
     off = np.abs(instants[index] - wanted % 1.0)
-    missing = (np.minimum(off, 1 - off) > slack) | (stretch[index // 4] != stretch[:, None])
-    missing |= jumps[-1] & ((wanted < 0) | (wanted > 1))
-    extended = {}
-    for name in ("z", "centre", "power", "pace", "driven"):
-        values = getattr(panels, name)
-        more = np.reshape(values[:, :4], (4 * n, *values.shape[2:]))[index]
-        more[missing] = np.nan
-        extended[name] = np.concatenate([more[:, :_BESIDE], values, more[:, _BESIDE:]], axis=1)
-    return extended
+    seen = (np.minimum(off, 1 - off) < slack) & (stretch[index // 4] == stretch[:, None])
+    return index, seen & ~(corners[-1] & ((wanted < 0) | (wanted > 1)))
 
 
 def left_over(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarray:
@@ -146,9 +143,11 @@ def left_over(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarra
 def increments(rule: np.ndarray, panels: Panels, every: int) -> tuple[np.ndarray, ...]:
     """Rotation, displacement in the axes at the panel's begin (complex), work, path length and driven work of panels, ``(n,)``
     each, on every `every`-th instant."""
-    omega, centre, *others = (
-        a[:, ::every] for a in (panels.z[..., 2], panels.centre, panels.power, panels.pace, panels.driven)
-    )
-    h, b = panels.width, rule[-1]
+    return _integrals(rule, panels.width, panels.rates[..., ::every])
+
+
+def _integrals(rule: np.ndarray, h: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The same of rates ``(5, ..., n, k)``."""
+    (omega, *others), centre, b = rates[[0, 2, 3, 4]].real, rates[1], rule[-1]
     turn = np.exp(1j * h[:, None] * (omega @ rule.T))
     return h * (omega @ b), h * ((turn * centre) @ b), *(h * (other @ b) for other in others)
