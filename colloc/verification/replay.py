@@ -2,9 +2,9 @@
 
 It shares nothing with collocation but the friction law: no scheme, no mesh, no symmetry, no interpolant. Velocities are
 solved for at five instants of every panel of the period and integrated by Simpson's rule, once over the panel and once over
-its halves; panels are halved where the two differ. What that leaves of the difference follows from how much smaller it is
-than on the panel twice as wide: little where the motion is smooth, all of it at a kink. These errors add up as magnitudes:
-kinks of stick and slip lie anywhere between the instants, so those of different panels may well cancel by accident.
+its halves; panels are halved where the two differ. `colloc.verification.panels` judges what that leaves of the difference.
+These errors add up as magnitudes: kinks of stick and slip lie anywhere between the instants, so those of different panels may
+well cancel by accident.
 
 With unequal coefficients several velocities may balance an instant. The replay then follows one branch in time, and says how
 far the others would lead (`colloc.verification.followed_motion`).
