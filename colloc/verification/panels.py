@@ -126,7 +126,7 @@ def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
     index = np.searchsorted(instants, wanted % 1.0 - slack) % instants.size
     off = np.abs(instants[index] - wanted % 1.0)
     seen = (np.minimum(off, 1 - off) < slack) & (stretch[index // 4] == stretch[:, None])
-    return index, seen & ~(corners[-1] & ((wanted < 0) | (wanted > 1)))
+    return index, seen & ~(corners[-1] & ((wanted < -slack) | (wanted > 1 - slack)))
 
 
 def left_over(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarray:
