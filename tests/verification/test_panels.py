@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.audit import path_of, random_problem
-from colloc.verification.panels import HALF, WHOLE, Panels, begun, changes, increments, left_over, travelled
+from colloc.verification.panels import HALF, WHOLE, Panels, begun, changes, halves, increments, left_over, travelled
 from colloc.verification.replay import replay
 from tests.conftest import ROOT
 
@@ -62,6 +62,21 @@ def test_corners_are_not_taken_for_kinks():
     assert stated_work(panels_of(lambda t: np.where(t < 0.5, 1 + t, 3 - t), corner=0.5)) < 1e-14
     kept_in_view = panels_of(lambda t: np.where(t < 0.51, 1 + t, 3 - t))
     assert stated_work(kept_in_view) > 1e-3
+
+
+def test_halves_carry_on_and_know_what_halving_their_panel_changed():
+    panels, n = panels_of(np.exp), 16
+    changed = changes(panels)[0]
+    between = panels.left[:, None] + panels.width[:, None] * (np.arange(4) + 0.5) / 4
+    nothing, vectors = np.zeros((n, 4)), np.zeros((n, 4, 3))
+    new = (vectors, nothing.astype(complex), np.exp(between), nothing, nothing, nothing, nothing, nothing, vectors)
+    finer = halves(panels, new, changed)
+    for side in (0, 1):
+        np.testing.assert_array_equal(finer.wider[side::2], changed)
+    np.testing.assert_array_equal(finer.left, np.arange(2 * n) / (2 * n))
+    instants = finer.left[:, None] + finer.width[:, None] * np.linspace(0, 1, 5)
+    np.testing.assert_allclose(finer.power, np.exp(instants), rtol=1e-15)
+    np.testing.assert_allclose(changed[:, WORK].sum(), 15 * abs(increments(WHOLE, panels, 1)[2].sum() - np.e + 1), rtol=0.01)
 
 
 def test_changes_are_those_of_the_distance_when_one_panel_is_halved():
