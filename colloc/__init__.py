@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from colloc.laws.own_law import OwnLaw
     from colloc.laws.power_law import PowerLaw
     from colloc.laws.viscous import Viscous
+    from colloc.mechanics.actuators import ActuatorLimits
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
@@ -59,6 +60,7 @@ _HOME = {
     "gaits.problem_file": ("Reference", "load_problem"),
     "gaits.objective": ("Objective",),
     "mechanics.body": ("Chain",),
+    "mechanics.actuators": ("ActuatorLimits",),
     "smooth.modal_body": ("ModalBody",),
     "smooth.concertina": ("Concertina",),
     "smooth.crawler_body": ("CrawlerBody",),
@@ -86,6 +88,7 @@ _HOME = {
 """Where the public names live, in the order of use; each is imported when it is first used."""
 
 __all__ = [
+    "ActuatorLimits",
     "ArcPath",
     "Axis",
     "Chain",

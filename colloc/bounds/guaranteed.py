@@ -238,9 +238,10 @@ def certify(
     ProblemError
         For a body or friction without a proof.
     """
-    if not friction.isotropic or body.n_link != 3 or len(set(body.lengths)) != 1 or bound.harmonics != (1,):
+    equal = body.n_link == 3 and len(set(body.lengths)) == 1 and not body.weights
+    if not friction.isotropic or not equal or bound.harmonics != (1,):
         raise ProblemError(
-            "a bound is guaranteed only for three equal links, isotropic friction and harmonic 1; "
+            "a bound is guaranteed only for three links of equal lengths and weights, isotropic friction and harmonic 1; "
             "otherwise the sampled value stands."
         )
     if bound.graded:

@@ -29,7 +29,7 @@ from colloc.collocation.path_equations import (
     squared_distance,
 )
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
-from colloc.collocation.point_equations import BlockParts, driven_point, objective_block, period_rows
+from colloc.collocation.point_equations import BlockParts, actuator_rows, driven_point, objective_block, period_rows
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.path_classes import FreePath
@@ -229,7 +229,8 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         return driven_point(problem.body, problem.friction, piece.shape, piece.given, piece.speed), gather, given
 
     densities = {"length": lambda: (piece_pace(geometry.piece), here, given), "driven_work": driven}
-    for name, (parts, group) in period_rows(problem, layout, mesh, densities, 1.0).items():
+    besides = period_rows(problem, layout, mesh, densities, 1.0) | actuator_rows(problem, layout, problem.friction, 1.0)
+    for name, (parts, group) in besides.items():
         geometry.blocks[name] = parts
         groups.append(group)
     implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]] = {} if full else {"point": balanced}

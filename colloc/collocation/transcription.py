@@ -25,6 +25,7 @@ from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_m
 from colloc.collocation.point_equations import (
     N_RATE,
     BlockParts,
+    actuator_rows,
     driven_point,
     gait_check,
     mean_square,
@@ -175,8 +176,8 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         "length": lambda: (path_pace(n_joint), layout.rates, none),
         "driven_work": lambda: (driven_point(problem.body, friction), own, none),
     }
-    of_period = period_rows(problem, layout, mesh, densities, RADIANS)
-    blocks |= {name: parts for name, (parts, _) in of_period.items()}
+    besides = period_rows(problem, layout, mesh, densities, RADIANS) | actuator_rows(problem, layout, friction, RADIANS)
+    blocks |= {name: parts for name, (parts, _) in besides.items()}
 
     rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
     groups = [
@@ -194,7 +195,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
             sparse.csr_matrix((1, layout.n)),
             {"shape speed": sparse.eye(1, format="csr")},
         ),
-        *(group for _, group in of_period.values()),
+        *(group for _, group in besides.values()),
     ]
     velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)
 

@@ -22,7 +22,6 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
 from colloc.gaits.relaxed import Relaxed
-from colloc.mechanics.law import rate_independent
 from colloc.results.level import PRESCRIBED, REDUCED, Level
 from colloc.results.search_step import SearchStep
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
@@ -99,8 +98,8 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
         lines += [f"  search          {text}" for text in _search_lines(solution)]
-        law = solution.problem.friction
-        paced = "" if rate_independent(law) else f"; run in a period of 1, as work depends on the pace under {law.label}"
+        reason = solution.problem.paced_by
+        paced = f"; run in a period of 1, as {reason}" if reason else ""
         gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
         lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]

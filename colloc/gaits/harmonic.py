@@ -172,6 +172,7 @@ class Harmonic:
 
     free = True
     unit_speed = False
+    mixes = False
     delta_start = None
     moves_knots = True
 

@@ -258,7 +258,7 @@ NAMED = {
 }
 """Objectives that a problem may name: distance per work; per path in shape space, which is the speed of a body whose shape
 changes at unit rate; rotation per work; distance per work where no actuator recovers energy from being driven backwards
-(`colloc.mechanics.driven_power`); and for viscous drag, whose work grows with the pace, Lighthill's efficiency: the work of
+(`colloc.mechanics.actuators`); and for viscous drag, whose work grows with the pace, Lighthill's efficiency: the work of
 towing the straight body as far in the same time, at unit drag along it, per work."""
 _SHORT = {"efficiency": "d/W", "speed": "d/L", "turning": "θ/W", "driven efficiency": "d/W+", "towing": "d²/W"}
 EFFICIENCY, SPEED, TURNING, DRIVEN, TOWING = (Objective(name) for name in NAMED)

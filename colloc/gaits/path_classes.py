@@ -61,6 +61,7 @@ class FreePath:
 
     free = True
     unit_speed = True
+    mixes = False
     delta_start = _DELTA_START
     moves_knots = False
     of_arcs = True
@@ -176,6 +177,7 @@ class Polygon:
 
     free = True
     unit_speed = True
+    mixes = False
     delta_start = _DELTA_START
     moves_knots = False
     of_arcs = False

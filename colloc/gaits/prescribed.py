@@ -79,6 +79,7 @@ class Prescribed:
 
     free = False
     unit_speed = False
+    mixes = False
     delta_start = None
     moves_knots = False
 

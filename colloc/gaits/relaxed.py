@@ -36,6 +36,7 @@ class Relaxed:
 
     free = True
     unit_speed = True
+    mixes = True
     delta_start = 0.01
     moves_knots = False
     of_arcs = False

@@ -94,6 +94,10 @@ class OwnLaw(ByQuadrature):
             if jump.max() > _JUMP:
                 raise ProblemError(f"friction: the force jumps where {what} changes its sign; let it vanish or agree there.")
 
+    @property
+    def formulas(self) -> tuple[str, ...]:
+        return self.tangential, self.normal
+
     @cached_property
     def _codes(self):
         return tuple(parsed(text, VARIABLES) for text in (self.tangential, self.normal))

@@ -9,6 +9,7 @@ import numpy as np
 from colloc.gaits.guesses import under_one_limit
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.problem import Problem
+from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.reduced.program import ReducedProgram
@@ -118,13 +119,14 @@ def gait_certificate(
     """
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
-    settings["driven"] = problem.uses("driven_work")
+    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits}
     known = measured(problem.body, problem.friction, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
         *before,
         *_motion(problem, path, fine, breaks, tolerance, claimed),
         *_reached(problem, fine),
+        *_actuators(problem, fine),
         _one_motion(problem, fine),
         *after,
         *_delta(problem, fine, known.limit.value),
@@ -174,6 +176,7 @@ def measured(
     objective: Objective = EFFICIENCY,
     rotation: float | None = 0.0,
     driven: bool = False,
+    limits: ActuatorLimits = UNLIMITED,
 ) -> Measured:
     """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
 
@@ -185,9 +188,8 @@ def measured(
     for part in (1.0, 0.1, 0.01) if smoothed else (1.0,):
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
-        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "near": near, "objective": objective}
-        settings["driven"] = driven
-        replays.append(replay(*at, **settings))  # type: ignore[arg-type]
+        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}
+        replays.append(replay(*at, **settings, near=near, objective=objective))  # type: ignore[arg-type]
     known = []
     for aim in (objective, EFFICIENCY):
         values = [aim(each.period) for each in replays]
@@ -232,10 +234,11 @@ def _second_order(solution: Solution) -> Check:
 
     space, v = space_near(problem, solution.gait, level.edges, level.scheme)
     space = space.with_far(problem.body.far_pairs)
-    space.move_checks(v)
+    program = ReducedProgram(space, level.delta)
+    program.place_rows(v)
     if v.size > _MOST_PARAMETERS:
         return Check("second order", 0.0, SADDLE, f"not measured, for {v.size} parameters")
-    found = curvature(ReducedProgram(space, level.delta), v)
+    found = curvature(program, v)
     size = abs(level.value)
     least, error = found.smallest / size, found.error / size
     value = max(-least - error, 0.0)
@@ -293,6 +296,15 @@ def _reached(problem: Problem, fine: Replay) -> list[Check]:
         lacks = max(least - aim(fine.period), 0.0) / max(abs(least), 1e-300)
         checks.append(Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay"))
     return checks
+
+
+def _actuators(problem: Problem, fine: Replay) -> list[Check]:
+    """What the joints have to do, against what they can."""
+    names = problem.actuator_limits.names
+    if not names:
+        return []
+    most, excess = names[np.argmax(fine.shares)], max(float(fine.shares.max()) - 1.0, 0.0)
+    return [Check("actuators", excess, GAP, f"excess over a limit, relative, in replay; nearest to its own: {most}")]
 
 
 def _beyond(value: float, unknown: float) -> float:

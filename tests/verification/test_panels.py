@@ -20,8 +20,8 @@ def panels_of(power, n=16, corner=None):
     if corner is not None:
         t[np.isclose(left, corner), 0] += 1e-12
         t[np.isclose(left + width, corner), 4] -= 1e-12
-    nothing, vectors = np.zeros((n, 5)), np.zeros((n, 5, 3))
-    values = (vectors, nothing.astype(complex), power(t), nothing, nothing, nothing, nothing, nothing, vectors)
+    nothing, vectors, shares = np.zeros((n, 5)), np.zeros((n, 5, 3)), np.zeros((n, 5, 0))
+    values = (vectors, nothing.astype(complex), power(t), nothing, nothing, nothing, nothing, nothing, shares, vectors)
     return begun(left, width, values)
 
 
@@ -68,8 +68,8 @@ def test_halves_carry_on_and_know_what_halving_their_panel_changed():
     panels, n = panels_of(np.exp), 16
     changed = changes(panels)[0]
     between = panels.left[:, None] + panels.width[:, None] * (np.arange(4) + 0.5) / 4
-    nothing, vectors = np.zeros((n, 4)), np.zeros((n, 4, 3))
-    new = (vectors, nothing.astype(complex), np.exp(between), nothing, nothing, nothing, nothing, nothing, vectors)
+    nothing, vectors, shares = np.zeros((n, 4)), np.zeros((n, 4, 3)), np.zeros((n, 4, 0))
+    new = (vectors, nothing.astype(complex), np.exp(between), nothing, nothing, nothing, nothing, nothing, shares, vectors)
     finer = halves(panels, new, changed)
     for side in (0, 1):
         np.testing.assert_array_equal(finer.wider[side::2], changed)
@@ -85,7 +85,9 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved():
     z, centre = rng.normal(size=(n, 5, 3)), rng.normal(size=(n, 5)) + 1j * rng.normal(size=(n, 5))
     z[..., 2] *= 1e-3  # to first order in the turn
     values = [rng.uniform(1, 2, (n, 5)) for _ in range(6)]
-    panels = Panels(np.arange(n) / n, np.full(n, 1 / n), z, centre, *values, np.zeros((n, 5, 3)), np.zeros((n, 5)))
+    panels = Panels(
+        np.arange(n) / n, np.full(n, 1 / n), z, centre, *values, np.zeros((n, 5, 0)), np.zeros((n, 5, 3)), np.zeros((n, 5))
+    )
     once, twice = increments(HALF, panels, 2), increments(WHOLE, panels, 1)
 
     def distance(turn, move):
