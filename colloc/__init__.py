@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from colloc.mechanics.friction import Friction
     from colloc.results.certificate import certify
     from colloc.results.solution import Solution
-    from colloc.results.solution_file import load, save
+    from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.crawler_body import CrawlerBody
@@ -79,7 +79,7 @@ _HOME = {
     "studies.study": ("Study", "Axis"),
     "studies.pareto": ("pareto_front",),
     "results.solution": ("Solution",),
-    "results.solution_file": ("load", "save"),
+    "results.store": ("load", "save"),
     "results.certificate": ("certify",),
     "verification.replay": ("replay",),
     "mechanics.fixed_point": ("solve_balance",),
@@ -134,8 +134,7 @@ __all__ = [
 # what a solution offers and packages above it do
 bind(
     {
-        "plot": "colloc.pictures.figure:solution_figure",
-        "plot relaxed": "colloc.pictures.relaxed_figure:relaxed_figure",
+        "plot": "colloc.pictures.solution_figure:solution_figure",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
         "plot_front": "colloc.pictures.front_figure:front_figure",

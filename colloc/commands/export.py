@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import io
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -133,7 +132,3 @@ def _export(options: argparse.Namespace) -> int:
         lines.append(f"  note: the result is not certified ({solution.status})")
     tell(options, {**facts, "file": str(path), "samples": samples}, lines)
     return OK
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,4 +1,4 @@
-"""Formulas of `colloc.laws.expression` as C, for a compiled kernel of a law's own (folder `colloc/mechanics/native`)."""
+"""Formulas of `colloc.numerics.expression` as C, for a compiled kernel of a law's own (folder `colloc/mechanics/native`)."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ class ReducedProgram:
         return -self._slope(self._objective, v)
 
     def _slope(self, aim: Objective, v: np.ndarray) -> np.ndarray:
-        return aim.with_slopes(self.motion.values(v, self.delta), self._slopes(v)).slope + np.zeros_like(v)
+        return aim.gradient(self.motion.values(v, self.delta), self._slopes(v)) + np.zeros_like(v)
 
     def _slopes(self, v: np.ndarray) -> dict[str, np.ndarray]:
         key = v.tobytes()

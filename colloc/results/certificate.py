@@ -12,9 +12,9 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.reduced.program import ReducedProgram
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
+from colloc.results.level import REALISED
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import MixedPath, Path, Replay, replay
@@ -32,12 +32,6 @@ SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
 _MOST_PARAMETERS = 150
 
 _FINE_PHASES = 20000
-
-
-def gait_path(solution: Solution) -> Path:
-    """Joint angles and rates of the solution's gait as a function of phase."""
-    gait = solution.gait
-    return lambda t: (gait.angles(t), gait.rates(t))
 
 
 def certify(
@@ -68,18 +62,16 @@ def certify(
     True
     """
     problem = solution.resolved
-    path = gait_path(solution)
     if instants is None:
         usual = problem.body.usual
         each = 0.5 * usual.instants_a_point / problem.gait.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * solution.mesh.n_point)))
+    gait = solution.gait
+    at = problem, gait, solution.delta_per_period, gait.corner_phases, instants, tolerance
+    if solution.last.program == REALISED:  # it need not be an optimum, nor is it collocated to be measured by that
+        return gait_certificate(*at)
     return gait_certificate(
-        problem,
-        path,
-        solution.delta_per_period,
-        solution.gait.corner_phases,
-        instants,
-        tolerance,
+        *at,
         claimed=solution.value,
         before=(*_optimality(solution), second_order or _second_order(solution)),
         after=(*_class(solution), *_mesh(solution)),
@@ -229,7 +221,8 @@ def _second_order(solution: Solution) -> Check:
     problem, level = solution.resolved, solution.last
     if not problem.gait.free:
         return Check("second order", 0.0, SADDLE, "nothing is free in a prescribed motion")
-    from colloc.reduced.second_order import curvature  # both load CasADi
+    from colloc.reduced.program import ReducedProgram  # these load CasADi
+    from colloc.reduced.second_order import curvature
     from colloc.reduced.spaces import space_near
 
     space, v = space_near(problem, solution.gait, level.edges, level.scheme)

@@ -127,7 +127,7 @@ def _advice(group: str) -> str:
     return "use more intervals or another guess"
 
 
-def redundant_equations(solver: Solver[GaitProgram], x: np.ndarray, delta: float) -> list[str]:
+def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
     """Kinds of equations that are (nearly) linear combinations of others at x; an optimiser fails on those.
 
     Parameters

@@ -1,5 +1,6 @@
 """A law stated as formulas: read, differentiated, checked for what the solvers rely on, and refused where that fails."""
 
+import pickle
 import re
 from pathlib import Path
 
@@ -91,6 +92,14 @@ def test_a_stated_law_has_the_optimum_of_the_built_in_one():
         assert solution.status == "solved"
         values.append(solution.efficiency)
     assert values[0] == pytest.approx(values[1], rel=1e-6)
+
+
+def test_a_law_of_ones_own_goes_to_other_processes():
+    """As many starts on several processes need it, also once it has been used."""
+    law = OwnLaw("-vs/speed * (1 + exp(-speed))", "-2*vn/speed")
+    one, delta = np.array([[0.3]]), np.array([[1e-3]])
+    again = pickle.loads(pickle.dumps(law))
+    assert again.density(one, one, delta) == law.density(one, one, delta)
 
 
 COMPILED = {

@@ -113,10 +113,10 @@ def test_weak_motors_cost_efficiency_and_keep_their_limit_between_the_nodes(free
 
 
 def test_a_certificate_fails_a_gait_whose_joints_do_more_than_they_can(weak):
-    from colloc.results.certificate import gait_certificate, gait_path
+    from colloc.results.certificate import gait_certificate
 
     weaker = weak.problem.with_(power_limit=0.55)
-    checks = gait_certificate(weaker, gait_path(weak), 1e-4, np.empty(0)).failures
+    checks = gait_certificate(weaker, weak.gait, 1e-4, np.empty(0)).failures
     assert [c.name for c in checks] == ["actuators"]
     assert checks[0].value == pytest.approx(0.6 / 0.55 - 1, rel=1e-3)
 

@@ -1,4 +1,4 @@
-/* Numbers that carry their derivatives with respect to vs and vn: colloc/laws/expression.py, for one number. */
+/* Numbers that carry their derivatives with respect to vs and vn: colloc/numerics/expression.py, for one number. */
 
 #pragma once
 
