@@ -22,7 +22,7 @@ from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
 from colloc.search.prescribed import measured
-from colloc.search.reduced_search import Found, descended, refined, searched
+from colloc.search.reduced_search import FACTOR, Found, descended, refined, searched
 from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.search.saddles import off_saddles
 from colloc.system.errors import NotConvergedError
@@ -31,6 +31,8 @@ TRIVIAL_EFFICIENCY = 1e-4
 """Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
 TRIVIAL_ROTATION = 1e-3
 """Rotation a period [rad] from which a gait that goes nowhere turns."""
+_DRIER = 2
+"""Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous."""
 FINER = "a smaller mesh_tolerance"
 ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
@@ -134,8 +136,28 @@ def maximise_efficiency(
         )
     else:
         _certified(solution)
+        for _ in range(_DRIER if problem.gait.free and not literal else 0):
+            if not _is_small_and_viscous(solution):
+                break
+            solution = _at_smaller_delta(solution, on_level)
     solution.seconds = time.perf_counter() - begin
     return solution
+
+
+def _is_small_and_viscous(solution: Solution) -> bool:
+    """Whether nothing fails but the influence of delta, at a gait that shrank to the bound on the shape speed."""
+    certificate = solution.certificate
+    failed = [] if certificate is None else [check.name for check in certificate.failures]
+    return failed == ["delta influence"] and on_speed_floor(solution.problem, solution.gait)
+
+
+def _at_smaller_delta(solution: Solution, on_level: Report | None) -> Solution:
+    """The solution gone on with at a smaller delta, certified: what is slow enough for a large gait is not for a small one."""
+    asked, delta = solution.problem.delta, FACTOR * solution.problem.delta
+    drier = optimum(solution.problem.with_(delta=delta), on_level, solution.levels[:-1])
+    _certified(drier)
+    drier.message = f"{drier.message} The gait is so small that delta had to be lowered from {asked:.1g} to {delta:.1g}."
+    return drier
 
 
 def best_gait(
