@@ -51,7 +51,7 @@ class Cells(NamedTuple):
 
 
 class Allowance(NamedTuple):
-    """How much more the gain of the balanced motion may be than the trial motion's, and how much less its power, ``(n,)`` each."""
+    """How much more the balanced motion's gain may be than the trial motion's, and how much less its power, ``(n,)`` each."""
 
     gain: np.ndarray
     power: np.ndarray

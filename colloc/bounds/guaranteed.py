@@ -27,8 +27,8 @@ _CHUNK = 8000
 _FIRST = 0.07
 """Largest side of the first cells: larger ones are never closed."""
 _LAYERS = (1e-9, 1e-6, 1e-4, 1e-3, 4e-3, 8.75e-3, 0.0175, 0.035)
-"""Rates of angle 2 between 0 and the first cells' size. Where one joint turns alone two links rest, and slide with the other joint
-however slowly it turns. The motion there is homogeneous, and what a cell may not know of it is in proportion to its speed."""
+"""Rates of angle 2 between 0 and the first cells' size. Where one joint turns alone two links rest, and slide with the other
+joint however slowly it turns. The motion there is homogeneous: what a cell may not know of it is in proportion to its speed."""
 _LOAD = 4.0
 """Times the root of the cell's size: 1/multiplier of the loads. It balances what they move with what interpolation loses."""
 
@@ -130,7 +130,14 @@ def _first_edges(knots: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def certify(
-    domain: Domain, space: PotentialSpace, free: np.ndarray, target: float, *, seconds: float = 1200.0, deepest: int = 12
+    domain: Domain,
+    space: PotentialSpace,
+    free: np.ndarray,
+    target: float,
+    *,
+    seconds: float = 1200.0,
+    deepest: int = 12,
+    part: tuple[int, int] = (1, 1),
 ) -> Guarantee:
     """Prove that no gait of a three-link body exceeds `target`, or as low a value as the time allows.
 
@@ -145,6 +152,9 @@ def certify(
         No new batch of cells is begun after this processor time.
     deepest : int
         Number of times a cell may be halved.
+    part : (int, int)
+        (k, n): the k-th of n parts of the first cells, so that several processes, or several runs, may share them. What is
+        guaranteed is the largest value of all parts.
 
     Raises
     ------
@@ -162,6 +172,7 @@ def certify(
     potential = PotentialRange(space, free)
     edges = _first_edges(space.spline.knots)
     index = np.stack([a.ravel() for a in np.meshgrid(*(np.arange(e.size - 1) for e in edges), indexing="ij")])
+    index = np.array_split(index, part[1], axis=1)[part[0] - 1]
     parents, examined, level = np.full(index.shape[1], np.inf), 0, 0
     with ThreadPoolExecutor(available_threads()) as pool:
         while True:
