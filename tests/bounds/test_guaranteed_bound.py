@@ -5,7 +5,7 @@ import pytest
 
 from colloc.bounds import enclosure, guaranteed
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion
-from colloc.bounds.enclosure import _KAPPA, CORNERS, Cells, by_convexity, by_loads, corner_motions
+from colloc.bounds.enclosure import _KAPPA, CORNERS, DELTA, Cells, by_convexity, by_loads, corner_motions
 from colloc.bounds.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from colloc.bounds.loaded_balance import loaded_balance
 from colloc.bounds.potential import PotentialSpace, Samples
@@ -17,6 +17,7 @@ from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.numerics.spline import DEGREE, TensorSpline
 from colloc.system.errors import ProblemError
+from tests.bounds.interval_enclosure import allowance
 
 BODY = Chain()
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
@@ -135,6 +136,32 @@ def test_balanced_motions_stay_within_what_is_allowed(potential, size, thin):
     if size < 0.01:
         assert np.isfinite(known).mean() > 0.7
         assert np.median(known[np.isfinite(known)]) < 1e-3
+
+
+@needs_kernel
+@pytest.mark.parametrize("size", [0.02, 0.004])
+def test_allowances_are_those_of_interval_arithmetic_on_random_cells(potential, size):
+    """Motions do not come near the margins: what is allowed is held against the inequalities of docs/bound.md, written out
+    again in interval arithmetic; with what is added for rounding it is never less."""
+    cells = boxes(potential, size, 60, 44)
+    corners, reference = corner_motions(BODY, cells), potential.reference(cells)
+    found, compared = by_convexity(BODY, cells, corners, reference), 0
+    for n in np.flatnonzero(np.isfinite(found.gain)):
+        at = cells.at[n]
+        point = (reference.centre[n].real, reference.centre[n].imag, reference.beside[n])
+        forces, left = corners.forces[::2, :2][:, :, at].transpose(2, 0, 1), corners.residual[:, at].max(axis=1)
+        try:
+            exact = allowance(
+                BODY.lengths, cells.low[:, n], cells.size[:, n], corners.velocity[:, at].T, forces, left, point, DELTA
+            )
+        except AssertionError:
+            continue
+        for value, interval in zip((found.gain[n], found.power[n]), exact, strict=True):
+            assert float(interval.b) <= value <= (1 + 1e-5) * float(interval.b) + 2e-9
+        compared += 1
+        if compared == 3:
+            break
+    assert compared == 3
 
 
 @needs_kernel

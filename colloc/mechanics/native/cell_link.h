@@ -196,9 +196,9 @@ static inline void find_errors(CellLink *k, double delta)
             k->gap = gap, k->power_error = power;
         }
         k->kind[j] = SLIDING;
-        const double m = least - spread, sine = spread / least, from = atan2(ya, vs), to = atan2(yb, vs);
+        const double m = least - spread, sine = spread / least, from = atan2(ya, fabs(vs)), to = atan2(yb, fabs(vs));
         const double lean = sin(fmin(0.5 * fabs(to - from) + asin(sine), HALF_PI));
-        const double u0 = cos(0.5 * (from + to)), u1 = sin(0.5 * (from + to));
+        const double u0 = vs < 0 ? -cos(0.5 * (from + to)) : cos(0.5 * (from + to)), u1 = sin(0.5 * (from + to));
         double error = k->off / m + delta * delta / (2.0 * m * m), power = k->off;
         for (int axis = 0; axis < 3; ++axis) {
             double along = 0.0, side = 0.0, square = 0.0;
