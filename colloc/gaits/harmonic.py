@@ -190,6 +190,10 @@ class Harmonic:
         """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
         return round(self.fraction * (30 + 10 * self.harmonics))
 
+    def coarse_intervals(self, n_joint: int) -> int:
+        """Intervals on which starts are told apart."""
+        return self.intervals(n_joint) // 2
+
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         """Intervals that a mesh with so many points on each needs at least, and for what."""
         return max(2, -(-4 * self.harmonics // per_interval)), f"{self.harmonics} harmonics"

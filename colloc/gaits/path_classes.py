@@ -20,7 +20,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, SYMMETRIES, fracti
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
-_ARCS, _PARAMETERS = 120, 250
+_ARCS, _COARSE_ARCS, _PARAMETERS = 120, 24, 250
 """Arcs of a free path over a period, and at most so many parameters in them all."""
 
 _DELTA_START = 0.01
@@ -84,6 +84,10 @@ class FreePath:
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants, each of which is an arc."""
         return round(self.fraction * min(_ARCS, self.most_arcs(n_joint)))
+
+    def coarse_intervals(self, n_joint: int) -> int:
+        """Intervals on which starts are told apart: arcs are parameters, and these show which way a path goes round."""
+        return round(self.fraction * _COARSE_ARCS)
 
     def most_arcs(self, n_joint: int) -> int:
         """Arcs of the solved part that a dense search can take: finer meshes have several intervals an arc."""
@@ -195,6 +199,10 @@ class Polygon:
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: some on every side."""
         return max(24, 4 * self.pieces)
+
+    def coarse_intervals(self, n_joint: int) -> int:
+        """Intervals on which starts are told apart."""
+        return self.intervals(n_joint) // 2
 
     def describe(self) -> str:
         """The class in words, for reports."""

@@ -58,6 +58,8 @@ class HarmonicSpace:
         """Parameters ``(n,)`` of the member nearest to a gait."""
         return self.problem.gait.parameters(fourier_through(gait, self.problem.gait))
 
+    laid = parameters
+
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters as the full program has them."""
         return v

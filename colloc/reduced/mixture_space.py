@@ -90,6 +90,8 @@ class MixtureSpace:
             raw = np.arctan2(raw[..., 1], raw[..., 0])
         return np.concatenate([mixture.start, mixture.durations.ravel(), raw.ravel()])
 
+    laid = parameters
+
     def _along(self, gait: Gait) -> Mixture:
         """A mixture that follows a path: the first direction along it, the others spread, for a small part of the time."""
         points = symmetric_samples(gait, self.problem.gait.symmetry, _SAMPLES)

@@ -81,7 +81,7 @@ class PathSpace:
         self._kept = np.empty(0, dtype=int)
         self._place()
         self._followed, self._framed = remembered(self._follow), remembered(self._frame)
-        self.move_checks(self._laid(near)[self.own])
+        self.move_checks(self.laid(near))
 
     def _place(self) -> None:
         """Where the collocation points lie, as functions of the parameters."""
@@ -156,7 +156,7 @@ class PathSpace:
         NotConvergedError
             If no path of the class is found near the gait.
         """
-        laid = self._laid(gait)
+        laid = self._through(gait)
         v, target, accuracy = laid[self.own], laid, _NEAR
         for _ in range(_ROUNDS):
             excess = self.move_checks(v)
@@ -173,7 +173,11 @@ class PathSpace:
         bound = f"; allow more curvature than {self.problem.gait.curvature:g}" if self._arcs else ""
         raise NotConvergedError(f"found no {self.problem.gait.describe()} near the guess; try another guess{bound}.")
 
-    def _laid(self, gait: AnyGait) -> np.ndarray:
+    def laid(self, gait: AnyGait) -> np.ndarray:
+        """Parameters of a path through a gait, which need not be a member: it may bend more than it should."""
+        return self._through(gait)[self.own]
+
+    def _through(self, gait: AnyGait) -> np.ndarray:
         """Full parameters of a path through a gait; it need not keep every constraint."""
         if self.knots is not None:
             return self.problem.gait.parameters(arcs_through(gait, self.problem.gait, self.knots))

@@ -38,6 +38,9 @@ class SearchSpace(Shapes, Protocol):
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters of the member nearest to a gait."""
 
+    def laid(self, gait: AnyGait) -> np.ndarray:
+        """Parameters near a gait that need not keep every row: where a search may begin that keeps them as it goes."""
+
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """The parameters as the full program has them (see `colloc.collocation.layout`)."""
 
@@ -94,6 +97,16 @@ class ReducedProgram:
     def row_upper(self) -> np.ndarray:
         """Upper bounds of the rows."""
         return np.concatenate([self._own_upper, self.space.row_upper])
+
+    @property
+    def row_names(self) -> list[tuple[str, int]]:
+        """What each row is: its kind, and which of the full program's rows of that kind."""
+        own = [("period", k) for k in range(self._own_lower.size)]
+        return own + [(kind, int(cell)) for kind, cells in self.space.watched.items() for cell in cells]
+
+    def move_checks(self, v: np.ndarray) -> float:
+        """As `SearchSpace.move_checks`."""
+        return self.space.move_checks(v)
 
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""

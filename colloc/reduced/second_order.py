@@ -4,21 +4,28 @@ On the free directions Z, along which no equation and no bound that carries a mu
 
     Z' (grad L(v + h Z) - grad L(v - h Z)) / 2h,      L = -d/W + multipliers . rows,
 
-has to be positive. It is formed from exact gradients by differences. Stick and slip make second derivatives jump as they
-move over a mesh point; that shows in the part that is not symmetric, and in a change with the step h.
+has to be positive. A row is a shape check at the worst instant of a stretch of the gait, and that instant moves with the gait:
+rows held at their instants would lack the curvature that this adds (Hettich and Kortanek, SIAM Review 35, 1993, section 3), so
+every check is moved with v.
+
+The Hessian is formed from exact gradients by differences. Stick and slip make second derivatives jump as they move over a mesh
+point; that shows in the part that is not symmetric, and in a change with the step h. Beside such a jump a direction may look
+like a way down that ends after 1e-8 rad. So a negative curvature counts where it is still there at a step a thousand times as
+long.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import null_space
 
 from colloc.numerics.sqp import NonlinearProgram, stationarity
 
-_STEP = 1e-6
-"""Of the differences, over the length of the parameters' vector."""
+_STEP, _LONG_STEP = 1e-6, 1e-3
+"""Of the differences, over the length of the parameters' vector; and of those that confirm a negative curvature."""
 _HELD = 1e-7
 """Multiplier from which a bound counts as held."""
 _ONE_ROW = 1e-2
@@ -32,7 +39,8 @@ class Curvature:
     Attributes
     ----------
     smallest : float
-        Smallest eigenvalue of the Hessian of the Lagrangian on the free directions; infinite if there are none.
+        Smallest eigenvalue of the Hessian of the Lagrangian on the free directions, a negative one as far as it is confirmed;
+        infinite if there are none.
     error : float
         Of it: what half the step changes along its direction, and the part of the Hessian that is not symmetric.
     n_free : int
@@ -49,7 +57,47 @@ class Curvature:
     kkt_error: float
 
 
-def curvature(program: NonlinearProgram, v: np.ndarray) -> Curvature:
+class CheckedProgram(NonlinearProgram, Protocol):
+    """A program whose rows are checks at instants that may be moved."""
+
+    @property
+    def row_names(self) -> list[tuple[str, int]]:
+        """What each row is: of which kind, and of which stretch of the gait."""
+
+    def move_checks(self, v: np.ndarray) -> object:
+        """Place every check at the worst instants of v; rows may appear and go."""
+
+
+class Lagrangian:
+    """Objective plus multipliers times rows near a point v, every check at the worst instant that it has where it is evaluated.
+
+    Attributes
+    ----------
+    conditions : colloc.numerics.sqp.Stationarity
+        At v, where the checks have to be placed.
+    """
+
+    def __init__(self, program: CheckedProgram, v: np.ndarray) -> None:
+        self._program, self._v, self.conditions = program, v, stationarity(program, v)
+        rows, slopes, on_rows = program.rows(v), program.row_slopes(v), self.conditions.on_rows
+        self._held = [(name, on_rows[k], rows[k], slopes[k]) for k, name in enumerate(program.row_names) if on_rows[k]]
+
+    def __call__(self, at: np.ndarray) -> tuple[float, np.ndarray]:
+        """Its value and gradient ``(n,)``."""
+        program = self._program
+        program.move_checks(at)
+        value, slope = program.objective(at), program.gradient(at).copy()
+        place = {name: k for k, name in enumerate(program.row_names)}
+        rows, slopes = program.rows(at), program.row_slopes(at)
+        for name, multiplier, row, row_slope in self._held:
+            k = place.get(name)
+            value += multiplier * (rows[k] if k is not None else row + row_slope @ (at - self._v))
+            slope += multiplier * (slopes[k] if k is not None else row_slope)
+        program.move_checks(self._v)
+        return float(value), slope
+
+
+def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     """Smallest curvature of the Lagrangian at v, a point that satisfies the first-order conditions; ``2 n_free + 2`` gradients.
 
     Examples
@@ -63,7 +111,8 @@ def curvature(program: NonlinearProgram, v: np.ndarray) -> Curvature:
     >>> round(curvature(ReducedProgram(space, 1e-4), v).smallest, 1)
     -0.8
     """
-    conditions = stationarity(program, v)
+    lagrangian = Lagrangian(program, v)
+    conditions = lagrangian.conditions
     equations = program.row_lower == program.row_upper
     held = equations | (np.abs(conditions.on_rows) > _HELD)
     fixed = np.eye(v.size)[np.abs(conditions.on_bounds) > _HELD]
@@ -73,18 +122,21 @@ def curvature(program: NonlinearProgram, v: np.ndarray) -> Curvature:
     if free.shape[1] == 0:
         return Curvature(np.inf, 0.0, 0, np.zeros(v.size), conditions.kkt_error)
 
-    def slope(at: np.ndarray) -> np.ndarray:
-        return program.gradient(at) + conditions.on_rows @ program.row_slopes(at)
-
     def product(z: np.ndarray, step: float) -> np.ndarray:
-        return (slope(v + step * z) - slope(v - step * z)) / (2 * step)
+        return (lagrangian(v + step * z)[1] - lagrangian(v - step * z)[1]) / (2 * step)
 
-    step = _STEP * max(float(np.linalg.norm(v)), 1e-300)
+    step = _STEP * (float(np.linalg.norm(v)) or 1.0)
     hessian = free.T @ np.stack([product(z, step) for z in free.T], axis=1)
     values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
-    least = free @ vectors[:, 0]
+    confirmed, far, here = values.copy(), step * _LONG_STEP / _STEP, lagrangian(v)[0]
+    for k in np.flatnonzero(values < 0):
+        along = far * free @ vectors[:, k]
+        confirmed[k] = max(values[k], (lagrangian(v + along)[0] - 2 * here + lagrangian(v - along)[0]) / far**2)
+    first = int(np.argmin(confirmed))
+    least = free @ vectors[:, first]
     # what a wrong coupling of two directions does to the smaller eigenvalue
-    coupling = vectors.T @ (0.5 * (hessian - hessian.T)) @ vectors[:, 0]
-    mixed = np.minimum(np.abs(coupling), coupling**2 / np.maximum(values - values[0], 1e-300))
-    error = abs(float(least @ product(least, 0.5 * step)) - values[0]) + mixed.sum()
-    return Curvature(float(values[0]), float(error), values.size, least, conditions.kkt_error)
+    coupling = vectors.T @ (0.5 * (hessian - hessian.T)) @ vectors[:, first]
+    apart = np.maximum(np.abs(values - values[first]), 1e-300)
+    mixed = np.minimum(np.abs(coupling), coupling**2 / apart)
+    error = abs(float(least @ product(least, 0.5 * step)) - values[first]) + mixed.sum()
+    return Curvature(float(confirmed[first]), float(error), values.size, least, conditions.kkt_error)

@@ -77,6 +77,13 @@ def space_near(
     return space, space.parameters(gait)
 
 
+def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
+    """The class of a problem on its first mesh, and parameters about a gait that need not keep every row: ten times as fast for
+    free paths."""
+    space = _space(problem.gait, problem, gait, None, "")
+    return space, space.laid(gait)
+
+
 @singledispatch
 def _space(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, scheme: str) -> SearchSpace:
     return HarmonicSpace(problem, edges, scheme)

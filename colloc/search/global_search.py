@@ -27,7 +27,7 @@ from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor, seed_cla
 from colloc.mechanics.body import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import SearchSpace
-from colloc.reduced.spaces import space_near
+from colloc.reduced.spaces import space_about, space_near
 from colloc.results.alternative import Alternative
 from colloc.results.search_step import SearchStep
 from colloc.search.reduced_search import (
@@ -44,7 +44,7 @@ from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS = 32
 _FEWEST = 12
-"""Intervals of a coarse mesh, at least; else half of what the class asks for."""
+"""Intervals of a coarse mesh, at least."""
 _LEVELS = (1.0, 0.2)
 """Deltas at which starts are compared, in units of the problem's first one."""
 _SAME_EFFICIENCY, _SAME_GAIT = 1e-3, 0.05
@@ -105,8 +105,7 @@ def same_gait(problem: Problem, a: Found, b: Found) -> bool:
 
 def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch: Watch) -> tuple[list[Candidate], int]:
     """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
-    intervals = min(problem.intervals, max(problem.gait.intervals(problem.body.n_joint) // 2, _FEWEST))
-    coarse = problem.with_(intervals=intervals)
+    coarse = problem.with_(intervals=min(problem.intervals, max(problem.gait.coarse_intervals(problem.body.n_joint), _FEWEST)))
     deltas = [max(factor * problem.delta_start, problem.delta) for factor in _LEVELS]
     known: list[list[Candidate]] = [[] for _ in deltas]
     tried, hops = 0, int(_HOPS * count)
@@ -119,10 +118,10 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
         with suppress(CollocError):
             gait = next(starts, None)
             if gait is not None:
-                _follow(*space_near(coarse, closed_gait(coarse, gait, deltas[0])), start, deltas, known)
+                _follow(*space_about(coarse, closed_gait(coarse, gait, deltas[0])), start, deltas, known)
             elif known[-1]:
                 shaken = _shaken(problem, min((c.found for c in known[-1]), key=lambda f: f.objective).gait, start)
-                _follow(*space_near(coarse, shaken), start, deltas[-1:], known[-1:])
+                _follow(*space_about(coarse, shaken), start, deltas[-1:], known[-1:])
         watch(_step("starts", tried, count, [c.found for c in known[-1]]))
     return sorted(known[-1], key=lambda c: c.found.objective), tried
 

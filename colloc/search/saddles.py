@@ -1,7 +1,8 @@
 """Off a saddle: a gait that satisfies the first-order conditions only because its symmetry keeps the search from falling.
 
 A start with more symmetry than its class never leaves it: the gradient has it too. Such a gait may be the best of the symmetric
-ones and still no optimum. The curvature (`colloc.reduced.second_order`) shows the way down.
+ones and still no optimum. The curvature (`colloc.reduced.second_order`) shows the way down. Where rows bind they bend away from
+that straight line, so it is the Lagrangian that has to fall along it; what counts is where the search then ends.
 """
 
 from __future__ import annotations
@@ -11,35 +12,37 @@ from collections.abc import Iterator
 import numpy as np
 
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.second_order import curvature
-from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, Found, Report, refined, settled_apart
+from colloc.reduced.second_order import Lagrangian, curvature
+from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, STATIONARY, Found, Report, refined, settled_apart
 
 STEPS = (0.1, 0.03, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
 _FALLS = 1e-3
 """A curvature below minus this part of the objective [1/rad^2] is one to follow."""
-_TRIES = 3
+_TRIES, _GAIN = 3, 1e-7
+"""Saddles left one after another; the part of the objective that leaving one has to gain."""
 
 
 def off_saddles(found: Found, lacks: str, report: Report) -> tuple[Found, str]:
     """The gait itself if its curvature is not negative, else the optimum below; and what is missing there, or ""."""
     for _ in range(_TRIES):
-        below = next(_below(found), None)
-        if not found.optimal or below is None:
+        better = next(_better(found), None) if found.conditions.kkt_error < STATIONARY[ROUGH] else None
+        if better is None:
             break
-        found = settled_apart(found.space, below, found.delta, NEXT_RADIUS, ROUGH)
-        report(found)
-        found, lacks = refined(found, report)
+        report(better)
+        found, lacks = refined(better, report)
     return found, lacks
 
 
-def _below(found: Found) -> Iterator[np.ndarray]:
-    """Gaits beside a saddle that are better."""
+def _better(found: Found) -> Iterator[Found]:
+    """Gaits that the search comes to from beside a saddle, and that are better."""
     program = ReducedProgram(found.space, found.delta)
     here = curvature(program, found.v)
     if here.smallest + here.error < -_FALLS * abs(found.objective):
-        for step in STEPS:
-            for side in (1.0, -1.0):
-                beside = found.v + side * step * np.linalg.norm(found.v) * here.direction
-                if program.objective(beside) < found.objective:
-                    yield beside
+        lagrangian, length = Lagrangian(program, found.v), np.linalg.norm(found.v)
+        value = lagrangian(found.v)[0]
+        ways = [side * step * length * here.direction for step in STEPS for side in (1.0, -1.0)]
+        for beside in [found.v + way for way in ways if lagrangian(found.v + way)[0] < value]:
+            other = settled_apart(found.space, beside, found.delta, NEXT_RADIUS, ROUGH)
+            if other.objective < found.objective - _GAIN * abs(found.objective):
+                yield other

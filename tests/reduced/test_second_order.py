@@ -41,6 +41,34 @@ class Quadratic:
     def row_slopes(self, v):
         return self.normal
 
+    @property
+    def row_names(self):
+        return [("plane", k) for k in range(len(self.normal))]
+
+    def move_checks(self, v):
+        pass
+
+
+class Touching(Quadratic):
+    """Minimise x^2 + b y^2 - p x with x cos t + y sin t <= 1 at all t: rows at the worst t, which turns with y.
+
+    On the circle x = 1 - y^2/2, so the objective has the curvature 2 b + p - 2 along it; the row held at its instant, x <= 1,
+    gives 2 b.
+    """
+
+    def __init__(self, b, p):
+        super().__init__(np.diag([2.0, 2.0 * b]), [1.0, 0.0])
+        self.pull, self.row_lower, self.row_upper = p, np.array([-np.inf]), np.ones(1)
+
+    def objective(self, v):
+        return super().objective(v) - self.pull * v[0]
+
+    def gradient(self, v):
+        return super().gradient(v) - np.array([self.pull, 0.0])
+
+    def move_checks(self, v):
+        self.normal = v[None] / np.linalg.norm(v)
+
 
 def test_curvature_is_that_on_the_free_directions_alone():
     hessian = np.diag([3.0, -2.0, 0.5])
@@ -49,6 +77,30 @@ def test_curvature_is_that_on_the_free_directions_alone():
     assert np.abs(free.direction) == pytest.approx([0, 1, 0])
     assert fixed.smallest == pytest.approx(0.5)
     assert (free.n_free, fixed.n_free) == (3, 2)
+
+
+@pytest.mark.parametrize("b", [-0.5, 0.25])
+def test_the_worst_instant_moves_with_the_gait(b):
+    found = curvature(Touching(b, 3.0), np.array([1.0, 0.0]))
+    assert found.n_free == 1
+    assert found.smallest == pytest.approx(2 * b + 1, abs=1e-4)
+
+
+class Kinked(Quadratic):
+    """x^2 with a gradient that falls by 1e-3 beside x = 0, as where a link begins to stick at a mesh point."""
+
+    def __init__(self):
+        super().__init__(np.diag([2.0]))
+
+    def objective(self, v):
+        return super().objective(v) - 1e-3 * max(v[0] - 5e-8, 0.0)
+
+    def gradient(self, v):
+        return super().gradient(v) - 1e-3 * (v > 5e-8)
+
+
+def test_a_way_down_that_ends_at_once_is_none():
+    assert curvature(Kinked(), np.array([1e-9])).smallest > 0
 
 
 def test_rows_on_both_sides_of_one_instant_hold_one_direction():
