@@ -109,11 +109,11 @@ def cell_bounds(body: Chain, potential: PotentialRange, cells: Cells, goal: floa
     return value
 
 
-def _touches(body: Chain, cells: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Mask of cells from `cells` to `high` that may hold a shape where links 1 and 3 do not cross."""
+def _touches(body: Chain, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Mask of cells from `low` to `high` that may hold a shape where links 1 and 3 do not cross."""
     if len(set(body.lengths)) > 1:
-        return np.ones(cells.shape[1], dtype=bool)
-    crossed = np.minimum(2 * cells[0] + cells[1], cells[0] + 2 * cells[1]) > 2 * np.pi + 1e-9
+        return np.ones(low.shape[1], dtype=bool)
+    crossed = np.minimum(2 * low[0] + low[1], low[0] + 2 * low[1]) > 2 * np.pi + 1e-9
     mirrored = np.maximum(2 * high[0] + high[1], high[0] + 2 * high[1]) < -2 * np.pi - 1e-9
     return ~(crossed | mirrored)
 
