@@ -1,6 +1,7 @@
 """From the bound to the gait: the multipliers of the bound's program as a measure, drawn, and a start for a relaxed gait.
 
-python -m scripts.measure_to_gait [--out results] [--friction 1 1 1] [--limit 2.5] [--intervals 8] [--first 8] [--no-gait] [--keep]
+python -m scripts.measure_to_gait [--out results] [--friction 1 1 1] [--limit 2.5] [--intervals 8] [--first 8] [--no-gait]
+    [--keep]
 
 Writes measure.png, and prints what the program says and what the search makes of it, with no other start. With `--no-gait` it
 prints only what the program says, its unknowns and its knots; with `--keep` the potential joins those kept.
