@@ -41,7 +41,7 @@ def anatomy(name: str) -> dict[str, float]:
         seconds[part] = seconds.get(part, 0.0) + now - mark
         mark = now
 
-    from colloc.pictures.figure import solution_figure
+    from colloc.pictures.solution_figure import solution_figure
     from colloc.pictures.style import save as save_figure
     from colloc.results.certificate import certify
     from colloc.results.solution import Solution

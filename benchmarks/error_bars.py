@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.independent_replay import Crawler, played
 from benchmarks.zoo import zoo_problem
 from colloc import Chain, Friction, Harmonic
-from colloc.results.certificate import gait_path, measured
+from colloc.results.certificate import measured
 from colloc.search.optimise import optimum
 from colloc.system.errors import NotConvergedError
 from colloc.verification.replay import Path as GaitPath
@@ -51,7 +51,7 @@ def random_gait(number: int) -> tuple[Chain, Friction, GaitPath]:
     kind = Harmonic(int(rng.integers(1, 5)), symmetry)
     size = kind.size(body.n_joint)
     gait = kind.fourier(rng.normal(0, rng.uniform(0.2, 1.0), size) / np.sqrt(size / 3), body.n_joint)
-    return body, Friction(mu_t, 1.0, mu_b), lambda t: (gait.angles(t), gait.rates(t))
+    return body, Friction(mu_t, 1.0, mu_b), gait
 
 
 def compared(
@@ -91,7 +91,7 @@ def solved_gait(number: int, own: bool) -> dict[str, list[float]] | None:
     friction = problem.friction
     assert isinstance(body, Chain)  # the zoo has no others
     assert isinstance(friction, Friction)
-    return compared(body, friction, gait_path(solution), solution.delta_per_period, breaks, own)
+    return compared(body, friction, solution.gait, solution.delta_per_period, breaks, own)
 
 
 def summary(rows: list[dict[str, list[float]]]) -> str:

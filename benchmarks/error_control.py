@@ -102,9 +102,7 @@ def outcome(problem: Problem) -> dict:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
     error = mesh_error(problem, solution.mesh, gait, delta, max(problem.mesh_tolerance, 1e-6))
-    fine = replay(
-        problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, tolerance=1e-9, most_instants=51200
-    )
+    fine = replay(problem.body, problem.friction, gait, delta, tolerance=1e-9, most_instants=51200)
     seconds = time.process_time() - begin
     finer = problem.with_(
         guess=gait, delta_start=delta, scheme="gauss-5", intervals=max(problem.intervals, 24), mesh_tolerance=1e-7

@@ -54,27 +54,33 @@ def _moments(vs: np.ndarray, vn: np.ndarray, w: np.ndarray, length: float, delta
 class Crawler(NamedTuple):
     """A chain of links on a plane with Coulomb friction (mu_t, mu_f, mu_b); or one for each of many instants.
 
-    Lengths are then ``(link, n)`` and coefficients ``(3, n)``.
+    Lengths and weights are then ``(link, n)`` and coefficients ``(3, n)``. Weights are shares, by default the lengths.
     """
 
     lengths: Sequence[float] | np.ndarray
     coefficients: Sequence[float] | np.ndarray
+    weights: Sequence[float] | np.ndarray = ()
+
+    @property
+    def heavy(self) -> np.ndarray:
+        """Weights of the links, stated or not."""
+        return np.asarray(self.weights if len(self.weights) else self.lengths)
 
     def of(self, chosen: np.ndarray) -> Crawler:
         """Those of some instants."""
         if np.ndim(self.lengths) == 1:
             return self
-        return Crawler(np.asarray(self.lengths)[:, chosen], np.asarray(self.coefficients)[:, chosen])
+        return Crawler(np.asarray(self.lengths)[:, chosen], np.asarray(self.coefficients)[:, chosen], self.heavy[:, chosen])
 
     def forces(
         self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Force and torque about the tail ``(3, n)``, power ``(n,)`` and velocity of the centre of mass ``(2, n)``."""
-        mu_t, mu_f, mu_b = self.coefficients
         x = y = phi = np.zeros(angles.shape[1])
         ux, uy, w = z
         total, power, centre = np.zeros_like(z), np.zeros_like(x), np.zeros((2, x.size))
-        for k, length in enumerate(self.lengths):
+        for k, (length, weight) in enumerate(zip(self.lengths, self.heavy, strict=True)):
+            mu_t, mu_f, mu_b = (weight / length * mu for mu in self.coefficients)
             if k:
                 phi, w = phi + angles[k - 1], w + rates[k - 1]
             c, s, half = np.cos(phi), np.sin(phi), 0.5 * length
@@ -85,7 +91,7 @@ class Crawler(NamedTuple):
             fx, fy = along * c - across * s, along * s + across * c
             total += np.stack([fx, fy, x * fy - y * fx + couple])
             power -= along * vs + across * vn + couple * w
-            centre += length * np.stack([ux, uy])
+            centre += weight * np.stack([ux, uy])
             x, y, ux, uy = x + half * c, y + half * s, ux - w * half * s, uy + w * half * c
         return total, power, centre
 
@@ -199,7 +205,8 @@ def _panels(gaits: Sequence[Gait], owner: np.ndarray, left: np.ndarray, width: n
         angles[..., own], rates[..., own] = (each.reshape(angles.shape[0], _TIME.size, -1) for each in there)
     angles, rates = angles.reshape(angles.shape[0], -1), rates.reshape(angles.shape[0], -1)
     whose = np.tile(owner, _TIME.size)
-    body = Crawler(*(np.array([gait.body[k] for gait in gaits])[whose].T for k in (0, 1)))
+    parts = zip(*((gait.body.lengths, gait.body.coefficients, gait.body.heavy) for gait in gaits), strict=True)
+    body = Crawler(*(np.array(part)[whose].T for part in parts))
     delta = np.array([gait.delta for gait in gaits])[whose]
     z, bad = body.velocity(angles, rates, delta, None if near is None else near.reshape(3, -1))
     _, power, centre = body.forces(angles, rates, z, delta)

@@ -80,7 +80,7 @@ def judged(run: dict) -> tuple[bool, float, float]:
     if "gait" not in run or not admissible(Chain(), np.array(run["gait"])[:, None], slack=2e-3)[0]:
         return False, np.nan, np.nan
     gait = ellipse(*run["gait"])
-    replayed = replay(Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 1e-4).efficiency
+    replayed = replay(Chain(), Friction(), gait, 1e-4).efficiency
     short = min((replayed / optimum - 1 for optimum in OPTIMA), key=abs)
     return abs(short) < 1e-3, run["efficiency"] / replayed - 1, short
 

@@ -94,7 +94,7 @@ def contradiction(problem: Problem, outcome: Outcome) -> float:
     """Relative difference of a certified efficiency from a replay on another grid, begun at another phase."""
     gait = shifted(outcome.gait, PHASE)
     again = replay(
-        problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta,
+        problem.body, problem.friction, gait, problem.delta,
         instants=REPLAY_INSTANTS, most_instants=REPLAY_INSTANTS,
     )  # fmt: skip
     return float(outcome.efficiency / again.efficiency - 1)

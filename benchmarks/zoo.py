@@ -1,11 +1,13 @@
 """A zoo of random problems of the kind that people have, solved with default settings and no guess.
 
     python -m benchmarks.zoo --problems 100
+    python -m benchmarks.zoo --laws --problems 20
 
 Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1 to 4 harmonics, free paths
-and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. For each: whether it is solved, its efficiency over
-the best ever found for that problem (kept in benchmarks/zoo_best.json, which a better answer updates), and the processor time.
-Failures are printed with the reason.
+and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. With --laws another family: elliptic, viscous, power
+and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power. For each: whether it is
+solved, its value over the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates), and
+the processor time. Failures are printed with the reason.
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc import Chain, FreePath, Friction, Harmonic, Polygon, Problem
+from colloc import Chain, Elliptic, FreePath, Friction, Harmonic, OwnLaw, Polygon, PowerLaw, Problem, Viscous
+from colloc.gaits.objective import EFFICIENCY
+from colloc.mechanics.law import Law, rate_independent
 from colloc.results.solution import SOLVED
 from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait
@@ -30,13 +34,7 @@ SEED = 21
 def zoo_problem(number: int) -> Problem:
     """Problem `number` of the zoo; it depends on that number alone."""
     rng = np.random.default_rng([SEED, number])
-    links = int(rng.integers(3, 7))
-    symmetric = rng.random() < 0.6
-    lengths = np.full(links, 1.0) if rng.random() < 0.4 else rng.uniform(0.5, 1.5, links)
-    if symmetric:
-        lengths = lengths + lengths[::-1]
-    lengths = lengths / lengths.sum()
-    body = Chain((*lengths[:-1], 1.0 - lengths[:-1].sum()))
+    body = _drawn_body(rng)
     mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))), float(rng.choice([1.0, rng.uniform(1.0, 5.0)]))
     symmetry = str(rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"]))
     kind, limit = rng.random(), float(rng.choice([np.pi, 2.5, 2.0]))
@@ -50,10 +48,51 @@ def zoo_problem(number: int) -> Problem:
     return Problem(f"zoo-{number}", body=body, friction=Friction(mu_t, 1.0, mu_b), gait=gait, joint_limit=limit)
 
 
+def _drawn_body(rng: np.random.Generator, most: int = 6) -> Chain:
+    links = int(rng.integers(3, most + 1))
+    symmetric = rng.random() < 0.6
+    lengths = np.full(links, 1.0) if rng.random() < 0.4 else rng.uniform(0.5, 1.5, links)
+    return Chain(_parts(lengths + lengths[::-1] if symmetric else lengths))
+
+
+def _parts(sizes: np.ndarray) -> tuple[float, ...]:
+    """Of 1, in the proportion of the sizes."""
+    parts = sizes / sizes.sum()
+    return (*parts[:-1], 1.0 - parts[:-1].sum())
+
+
+def law_problem(number: int) -> Problem:
+    """Problem `number` of the family of other laws, objectives and limits; it depends on that number alone."""
+    rng = np.random.default_rng([SEED + 1, number])
+    body = _drawn_body(rng, 4)
+    if rng.random() < 0.4:
+        weights = rng.uniform(0.5, 1.5, body.n_link)
+        body = Chain(body.lengths, weights=_parts(weights + weights[::-1] if body.symmetric else weights))
+    mu_t, mu_b, power = np.exp(rng.uniform(np.log(0.5), np.log(5.0))), rng.choice([1.0, 1.5, 3.0]), rng.uniform(0.2, 1.6)
+    mu = {"mu_t": round(float(mu_t), 3), "mu_f": 1.0, "mu_b": float(mu_b)}
+    along, across = f"where(vs > 0, 1, {mu['mu_b']}) * vs/speed", f"{mu['mu_t']} * vn/speed"
+    weakening = "(1 + 0.5*exp(-speed))"
+    laws: list[tuple[Law, str]] = [
+        (Elliptic(**mu), str(rng.choice(["efficiency", "speed", "driven efficiency"]))),
+        (Viscous(normal=1.0 + mu["mu_t"], tangential=1.0), "towing"),
+        (PowerLaw(round(float(power), 2), **mu), f"distance ** {round(1 + power, 2)} / work"),
+        (OwnLaw(f"-{along} * {weakening}", f"-{across} * {weakening}"), "efficiency"),
+        (Friction(**mu), str(rng.choice(["speed", "driven efficiency", "distance / (work + 0.1 * length)"]))),
+    ]
+    law, objective = laws[number % len(laws)]
+    if number % len(laws) == 1:
+        body = Chain(body.lengths)  # drag does not ask for the weight
+    symmetry = str(rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"]))
+    limited = {"power_limit": round(float(rng.uniform(0.3, 0.8)), 2)} if rng.random() < 0.3 and rate_independent(law) else {}
+    gait = Harmonic(int(rng.integers(1, 4)), symmetry)
+    return Problem(f"zoo-laws-{number}", body=body, friction=law, gait=gait, objective=objective, **limited)  # type: ignore[arg-type]
+
+
 def described(problem: Problem) -> str:
     """In one line."""
-    law = problem.friction.label
-    return f"{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}"
+    law, best = problem.friction.label, "" if problem.objective == EFFICIENCY else f"best {problem.objective.name}, "
+    limit = f", power within {problem.power_limit:g}" if problem.power_limit else ""
+    return f"{best}{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}{limit}"
 
 
 def main() -> None:
@@ -62,24 +101,25 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=100, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
     parser.add_argument("--starts", type=int, default=STARTS, metavar="N", help="more look for better answers")
+    parser.add_argument("--laws", action="store_true", help="the family of other laws, objectives and limits")
     options = parser.parse_args()
     best = json.loads(BEST.read_text(encoding="utf-8")) if BEST.exists() else {}
     solved, quality, seconds = [], [], []
     for number in range(options.first, options.first + options.problems):
-        problem = zoo_problem(number)
+        problem = law_problem(number) if options.laws else zoo_problem(number)
         begin = time.process_time()
         try:
             solution = best_gait(problem, options.starts)
-            status, efficiency, message = solution.status, solution.efficiency, solution.message
+            status, value, message = solution.status, solution.value, solution.message
         except Exception as error:  # whatever goes wrong is what this is looking for
-            status, efficiency, message = "error", np.nan, f"{type(error).__name__}: {error}"
+            status, value, message = "error", np.nan, f"{type(error).__name__}: {error}"
         seconds.append(time.process_time() - begin)
         solved.append(status == SOLVED)
-        if status == SOLVED and efficiency > best.get(problem.name, 0.0):
-            best[problem.name] = efficiency
+        if status == SOLVED and value > best.get(problem.name, 0.0):
+            best[problem.name] = value
             BEST.write_text(json.dumps(best, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-        quality.append(efficiency / best[problem.name] if solved[-1] else 0.0)
-        line = f"{number:4d} {status:18s} {efficiency:9.6f} {quality[-1]:7.4f} {seconds[-1]:7.2f} s  {described(problem)}"
+        quality.append(value / best[problem.name] if solved[-1] else 0.0)
+        line = f"{number:4d} {status:18s} {value:9.6f} {quality[-1]:7.4f} {seconds[-1]:7.2f} s  {described(problem)}"
         print(line + (f"\n     {message}" if message else ""), flush=True)
     n = len(solved)
     print(f"{sum(solved)} of {n} solved; {sum(q > GOOD for q in quality)} within 1 % of the best known")

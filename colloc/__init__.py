@@ -37,12 +37,13 @@ if TYPE_CHECKING:
     from colloc.laws.own_law import OwnLaw
     from colloc.laws.power_law import PowerLaw
     from colloc.laws.viscous import Viscous
+    from colloc.mechanics.actuators import ActuatorLimits
     from colloc.mechanics.body import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
     from colloc.results.certificate import certify
     from colloc.results.solution import Solution
-    from colloc.results.solution_file import load, save
+    from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.crawler_body import CrawlerBody
@@ -59,6 +60,7 @@ _HOME = {
     "gaits.problem_file": ("Reference", "load_problem"),
     "gaits.objective": ("Objective",),
     "mechanics.body": ("Chain",),
+    "mechanics.actuators": ("ActuatorLimits",),
     "smooth.modal_body": ("ModalBody",),
     "smooth.concertina": ("Concertina",),
     "smooth.crawler_body": ("CrawlerBody",),
@@ -77,7 +79,7 @@ _HOME = {
     "studies.study": ("Study", "Axis"),
     "studies.pareto": ("pareto_front",),
     "results.solution": ("Solution",),
-    "results.solution_file": ("load", "save"),
+    "results.store": ("load", "save"),
     "results.certificate": ("certify",),
     "verification.replay": ("replay",),
     "mechanics.fixed_point": ("solve_balance",),
@@ -86,6 +88,7 @@ _HOME = {
 """Where the public names live, in the order of use; each is imported when it is first used."""
 
 __all__ = [
+    "ActuatorLimits",
     "ArcPath",
     "Axis",
     "Chain",
@@ -131,8 +134,7 @@ __all__ = [
 # what a solution offers and packages above it do
 bind(
     {
-        "plot": "colloc.pictures.figure:solution_figure",
-        "plot relaxed": "colloc.pictures.relaxed_figure:relaxed_figure",
+        "plot": "colloc.pictures.solution_figure:solution_figure",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
         "plot_front": "colloc.pictures.front_figure:front_figure",

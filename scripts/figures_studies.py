@@ -9,8 +9,9 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from colloc.pictures.style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, letter, styled, subplots
+from colloc.pictures.style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, styled, subplots
 from colloc.studies.gait_class import DIRECT, RETROGRADE, STANDING
+from scripts.panel_marks import letter
 
 KINDS = (RETROGRADE, STANDING, DIRECT)
 _COLOURS = {RETROGRADE: SKY, STANDING: ORANGE, DIRECT: GREEN}

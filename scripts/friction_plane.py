@@ -1,6 +1,6 @@
 """Figure and table of the friction plane: python -m scripts.friction_plane [--results FOLDER] [--bounds N] [--output FOLDER]
 
-Reads what ``python -m colloc.commands.sweep studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
+Reads what ``colloc sweep studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
 over the classes searched, and writes friction_plane.png, .pdf and .md. With ``--bounds N`` an upper bound for every gait of
 the body is computed first on a subset of N x N points (sampled, with a small spline basis: see docs/bound.md), kept in
 FOLDER/bounds.sqlite; nothing is interpolated between them.
@@ -19,12 +19,19 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.style import save
 from colloc.studies.store import StudyFile, load_study
-from colloc.studies.table import best_over
 from colloc.system.errors import StoreError
 from scripts.figures_studies import friction_plane_figure
 
 SMALL_BASIS = Budget(intervals=6, shapes=12, directions=24, rounds=12, starts=60, tolerance=5e-3)
-COMMAND = "python -m colloc.commands.sweep studies/friction_plane.py && python -m scripts.friction_plane"
+COMMAND = "colloc sweep studies/friction_plane.py && python -m scripts.friction_plane"
+
+
+def best_over(table_values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """Largest value along an axis, NaN where there is none, and where it is (0 there)."""
+    filled = np.where(np.isnan(table_values), -np.inf, table_values)
+    where = filled.argmax(axis=axis)
+    best = filled.max(axis=axis)
+    return np.where(np.isfinite(best), best, np.nan), where
 
 
 def bounds(mu_t: np.ndarray, mu_b: np.ndarray, count: int, cache: Path) -> np.ndarray:
@@ -89,7 +96,7 @@ def main() -> None:
     try:
         study = load_study(options.results / "friction_plane.nc")
     except StoreError as error:
-        parser.error(f"{error} python -m colloc.commands.sweep studies/friction_plane.py makes it.")
+        parser.error(f"{error} colloc sweep studies/friction_plane.py makes it.")
     mu_t, mu_b = study.coordinates["mu_t"], study.coordinates["mu_b"]
     efficiency, rest = winners(study)
     bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.sqlite")

@@ -37,17 +37,16 @@ from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.width import gap
-from colloc.results.relaxed_solution import RelaxedSolution
-from colloc.results.relaxed_store import load_relaxed, save_relaxed
-from colloc.results.solution import SOLVED
-from colloc.results.store import save
-from colloc.search.few_corners import polygon_near
+from colloc.results.relaxation import Relaxation
+from colloc.results.solution import SOLVED, Solution
+from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
 from colloc.search.relaxed_search import best_relaxed_gait
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
 from scripts.bound_table import COEFFICIENTS
 from scripts.check_potential import potentials
+from scripts.few_corners import polygon_near
 
 DELTA, LEAST_EXTENT, FEW = 1e-5, 0.3, 60
 """At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one."""
@@ -96,9 +95,17 @@ class Row(NamedTuple):
         return GAITS / f"{self.name}-{part}.h5"
 
 
-def finite(solution: RelaxedSolution, seconds: float) -> dict[str, Any]:
+def relaxation(path: Path) -> Relaxation:
+    """The relaxed gait of a kept solution, and the finite ones near it."""
+    found = load(path).relaxed
+    assert found is not None
+    return found
+
+
+def finite(solution: Solution, seconds: float) -> dict[str, Any]:
     """What the table says of a solution."""
-    best, relaxed = solution.best, solution.certificate
+    assert solution.relaxed is not None
+    best, relaxed = solution.relaxed.best, solution.relaxed.certificate
     return {
         "efficiency": best.certificate.efficiency,
         "passed": best.certificate.passed,
@@ -114,21 +121,21 @@ def finite(solution: RelaxedSolution, seconds: float) -> dict[str, Any]:
 def gait(row: Row, starts: int) -> dict[str, Any]:
     """The best relaxed gait that travels, begun also from that for equal coefficients."""
     begin, even = time.process_time(), row._replace(mu=(1.0, 1.0, 1.0)).file("gait")
-    first = (load_relaxed(even).relaxed.mean.realised(),) if even.exists() else ()
+    first = (relaxation(even).gait.mean.realised(),) if even.exists() else ()
     problem = Problem(
         f"frontier-{row.name}", body=row.body, friction=Friction(*row.mu), gait=Relaxed(row.links, "both"), delta=DELTA,
         joint_limit=row.limit,
     )  # fmt: skip
     solution = best_relaxed_gait(problem, starts, first=first, least_extent=LEAST_EXTENT)
-    save_relaxed(solution, row.file("gait"))
+    save(solution, row.file("gait"))
     return finite(solution, time.process_time() - begin)
 
 
 def few(row: Row, starts: int) -> dict[str, Any]:
     """The best polygon of a few corners near the relaxed gait of the row."""
-    begin, near = time.process_time(), load_relaxed(row.file("gait"))
-    solution = polygon_near(near.problem, near.relaxed, FEW)
-    save_relaxed(solution, row.file("few"))
+    begin, near = time.process_time(), row.file("gait")
+    solution = polygon_near(load(near).problem, relaxation(near).gait, FEW)
+    save(solution, row.file("few"))
     return finite(solution, time.process_time() - begin)
 
 

@@ -21,10 +21,10 @@ from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
-from colloc.pictures.measure_figure import measure_figure
 from colloc.pictures.style import save
 from colloc.search.relaxed_search import best_relaxed_gait
 from scripts.check_potential import Kept, keep
+from scripts.figures_measure import measure_figure
 
 
 def main() -> None:
@@ -59,7 +59,8 @@ def main() -> None:
         return
     problem = Problem("measure", friction=friction, gait=Relaxed(3, "both"), delta=1e-5, joint_limit=options.limit)
     solution = best_relaxed_gait(problem, 0, (1, 4), first=(measure.path(),))
-    relaxed, best = solution.certificate, solution.best
+    assert solution.relaxed is not None
+    relaxed, best = solution.relaxed.certificate, solution.relaxed.best
     print(f"relaxed {relaxed.efficiency:.4f}, {relaxed.efficiency_at_zero_delta:.4f} for delta -> 0")
     print(f"finite {best.certificate.efficiency:.4f} with {best.corners} corners, {solution.status}")
     print(*save(measure_figure(problem, measure, solution.gait), options.out / "measure", ("png",)))

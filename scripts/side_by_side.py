@@ -20,7 +20,6 @@ import colloc
 from colloc.pictures.motion_frames import lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
-from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -47,7 +46,7 @@ class Crawl:
     centre: np.ndarray
 
 
-def phases(solution: Solution | RelaxedSolution, work: np.ndarray) -> np.ndarray:
+def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
     """The phase at which a gait has spent so much work: the inverse of the integral of its power."""
     t = np.linspace(0.0, 1.0, _GRAIN)
     power = solution.power(solution.sample(t))
@@ -56,7 +55,7 @@ def phases(solution: Solution | RelaxedSolution, work: np.ndarray) -> np.ndarray
     return periods + np.interp(rest, spent, t)
 
 
-def crawl(solution: Solution | RelaxedSolution) -> Crawl:
+def crawl(solution: Solution) -> Crawl:
     """What a gait does with the work."""
     problem = solution.problem
     motion = solution.sample(phases(solution, np.linspace(0.0, WORK, PICTURES)))

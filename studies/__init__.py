@@ -1,1 +1,1 @@
-"""Study files: plain Python that states STUDY, run by ``python -m colloc.commands.sweep``."""
+"""Study files: plain Python that states STUDY, run by ``colloc sweep``."""

@@ -16,6 +16,7 @@ from benchmarks.scaling import problem_of
 from benchmarks.smooth_panels import MOTION, loads
 from benchmarks.tables import interleaved_seconds, markdown_table
 from benchmarks.time_schemes import GAIT, adaptive_efficiency
+from benchmarks.zoo import described, law_problem, zoo_problem
 from colloc import Chain, Friction, ellipse, replay, solve_balance
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.smooth.balance import solve_smooth
@@ -127,3 +128,13 @@ def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():
     # the connection does not depend on the heading, nor on the unit of drag
     R, turned = drag.resistance(0.0, np.array([0.4, -0.9])), drag.resistance(1.1, np.array([0.4, -0.9]))
     np.testing.assert_allclose(np.linalg.eigvalsh(R), np.linalg.eigvalsh(turned), atol=1e-15)
+
+
+def test_the_numbers_of_the_zoo_keep_their_problems_and_both_families_are_stated():
+    lengths = "0.1712, 0.1186, 0.2235, 0.1596, 0.3273"
+    paths = "paths of curvature <= 2 per rad, symmetry none, within 3.14"
+    known = f"links of lengths {lengths} from the tail [body lengths], friction (5.95461, 1, 1) {paths}"
+    assert described(zoo_problem(99)) == known
+    kinds = {type(law_problem(k).friction).__name__ for k in range(10)}
+    assert kinds == {"Elliptic", "Viscous", "PowerLaw", "OwnLaw", "Friction"}
+    assert law_problem(7).hash == law_problem(7).hash != law_problem(2).hash

@@ -86,7 +86,7 @@ def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys)
 
 def test_the_summary_quoted_in_the_tutorial_is_what_a_solve_says(three_link):
     """Words to the letter and numbers to three digits, but for times, roundings and counts of the search."""
-    from colloc.commands.solve import summary_lines
+    from colloc.commands.summary import summary_lines
 
     quoted = next(block for block in blocks(ROOT / "docs/tutorial.md", "text") if "by independent replay" in block)
     said = summary_lines(three_link, None)

@@ -163,9 +163,10 @@ def certify(
     """
     body, friction = domain.body, domain.friction
     odd = 1 in space.harmonics and all(k % 2 for k in space.harmonics)
-    if not friction.isotropic or body.n_link != 3 or not space.end_swap or not odd:
+    if not friction.isotropic or body.n_link != 3 or body.weights or not space.end_swap or not odd:
         raise ProblemError(
-            "a bound is guaranteed only for three links, the outer ones alike, isotropic friction and odd harmonics from 1 on; "
+            "a bound is guaranteed only for three links, the outer ones alike, without weights of their own; isotropic "
+            "friction and odd harmonics from 1 on; "
             "otherwise the sampled value stands."
         )
     begin, goal = time.process_time(), target * friction.mu_t

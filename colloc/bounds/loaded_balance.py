@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import balance_jacobian, instant, net_force, total_power
+from colloc.mechanics.balance import balance_jacobian, dissipation_potential, instant, net_force, total_power
 from colloc.mechanics.body import Chain
 from colloc.mechanics.compiled_balance import loaded
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.link_friction import link_dissipation
 from colloc.mechanics.native_kernel import native_kernel
 
 _UNIT = Friction()
@@ -76,14 +75,14 @@ def _newton(
 ) -> Loaded:
     middle = body.n_link // 2
     lean = angles[:middle].sum(axis=0)
-    length, n = body.length_column(), angles.shape[1]
+    n = angles.shape[1]
     z, load = _turn(start, lean), _turn(load, lean)
     deltas = np.full((1, n), delta)
 
     def evaluate(chosen: np.ndarray, z: np.ndarray):
         now = instant(body, _UNIT, angles[:, chosen], rates[:, chosen], z, deltas[:, chosen], middle)
         force = net_force(now.posture, now.force) + load[:, chosen]
-        potential = link_dissipation(*now.velocity, length, deltas[:, chosen]).sum(axis=0)
+        potential = dissipation_potential(body, _UNIT, now.velocity, deltas[:, chosen])
         return now, force, potential - (load[:, chosen] * z).sum(axis=0)
 
     active = np.arange(n)

@@ -14,8 +14,8 @@ from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
 from colloc.mechanics.bodies import Pairs
-from colloc.numerics.blocks import Block, LocalFunction
-from colloc.numerics.constraint_rows import Group, equalities, selector, stacked
+from colloc.numerics.blocks import LocalFunction
+from colloc.numerics.constraint_rows import Group, equalities, selector
 from colloc.numerics.mesh import Mesh
 
 _FASTEST = 30.0
@@ -62,13 +62,6 @@ class PathGeometry:
         repeat = tau.size // self.start.size
         start, width, second = (np.repeat(a, repeat) for a in (self.start, self.width, self.second))
         return np.stack([start + width * tau, second])
-
-    def assembled_blocks(self, groups: list[Group], implicit: dict) -> tuple[Block, ...]:
-        """The blocks with their scatter matrices into all `groups`."""
-        return tuple(
-            Block(function, gather, stacked(groups, name, function.n_out * gather.shape[1]), given, implicit.get(name))
-            for name, (function, gather, given) in self.blocks.items()
-        )
 
 
 def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndarray, n: int) -> Group:

@@ -8,8 +8,7 @@ the centre of mass along a fixed direction and the first orientation is free.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -29,15 +28,14 @@ from colloc.collocation.path_equations import (
     squared_distance,
 )
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
-from colloc.collocation.point_equations import BlockParts, driven_point, objective_block, period_rows
-from colloc.collocation.shape_checks import ShapeCheck
-from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.collocation.point_equations import BlockParts, actuator_rows, driven_point, objective_block, period_rows
+from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
-from colloc.numerics.blocks import Assembly, Block
+from colloc.numerics.blocks import Block
 from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
 from colloc.numerics.mesh import Mesh
 
@@ -45,45 +43,10 @@ _BESIDE = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
-class PathTranscription:
-    """The nonlinear program of a path; attributes as `collocation.transcription.Transcription`, and the path's geometry."""
+class PathProgram(GaitProgram):
+    """The nonlinear program of a path, with the path's geometry."""
 
-    problem: Problem
-    mesh: Mesh
-    knots: np.ndarray | None
-    layout: Layout
     geometry: PathGeometry
-    assembly: Assembly
-    lower: np.ndarray
-    upper: np.ndarray
-    constraint_lower: np.ndarray
-    constraint_upper: np.ndarray
-    groups: dict[str, slice]
-    velocity: ImplicitVelocity | None
-
-    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> PathTranscription:
-        """The program with other bounds of its rows."""
-        return replace(self, constraint_lower=lower, constraint_upper=upper)
-
-    @property
-    def lifted(self) -> bool:
-        return self.layout.forces.size > 0
-
-    @property
-    def speed_unit(self) -> float:
-        return 1.0
-
-    @property
-    def checks(self) -> list[ShapeCheck]:
-        return self.geometry.checks
-
-    def member(self, parameters: np.ndarray) -> ArcPath | Corners:
-        """The gait of a parameter vector."""
-        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.knots)
-
-    def gait(self, x: np.ndarray) -> ArcPath | Corners:
-        """The gait of a vector of variables."""
-        return self.member(x[self.layout.parameters[:, 0]])
 
     def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
         """The mesh in phases of a member: sides that grew take more of the period than the program's mesh gives them."""
@@ -93,25 +56,9 @@ class PathTranscription:
         edges = np.append(gait.phases[on] + self.geometry.start * np.diff(gait.phases)[on], gait.phases[-1])
         return Mesh(self.mesh.scheme, edges)
 
-    def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant."""
-        gait = self.member(parameters)
-        mesh, given = self.phase_mesh(gait), {}
-        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks), strict=True):
-            tau = np.clip((times - mesh.edges[:-1]) / mesh.h, 0.0, 1.0)
-            given[check.name] = np.vstack([self.geometry.given(tau), held_shares(check, gait, times)])
-        blocks = zip(self.geometry.blocks, self.assembly.blocks, strict=True)
-        return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
-
-    def check_excess(self, x: np.ndarray) -> float:
-        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
-        gait = self.gait(x)
-        excess = 0.0
-        for check, times in zip(self.checks, worst_instants(gait, self.phase_mesh(gait), self.checks), strict=True):
-            rows, values = self.groups[check.name], check_values(check, gait, times)
-            excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
-            excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
-        return excess
+    def placed(self, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """Where the instants lie on their pieces of the path."""
+        return self.geometry.given(np.clip((times - mesh.edges[:-1]) / mesh.h, 0.0, 1.0))
 
 
 def _geometry(
@@ -171,7 +118,7 @@ def _with_vertices(edges: np.ndarray, phases: np.ndarray) -> np.ndarray:
     return np.concatenate([*parts, phases[-1:]])
 
 
-def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathTranscription:
+def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathProgram:
     """The nonlinear program of a problem whose class bounds the path.
 
     Parameters
@@ -229,12 +176,13 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         return driven_point(problem.body, problem.friction, piece.shape, piece.given, piece.speed), gather, given
 
     densities = {"length": lambda: (piece_pace(geometry.piece), here, given), "driven_work": driven}
-    for name, (parts, group) in period_rows(problem, layout, mesh, densities, 1.0).items():
+    besides = period_rows(problem, layout, mesh, densities, 1.0) | actuator_rows(problem, layout, problem.friction, 1.0)
+    for name, (parts, group) in besides.items():
         geometry.blocks[name] = parts
         groups.append(group)
-    implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]] = {} if full else {"point": balanced}
+    implicit: Implicit = {} if full else {"point": balanced}
     objective = objective_block(problem, layout)
-    return _assembled(problem, mesh, _knots(near), layout, geometry, groups, objective, implicit, velocity)
+    return _program(problem, mesh, _knots(near), layout, geometry, groups, objective, implicit, velocity)
 
 
 def _full_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
@@ -245,7 +193,7 @@ def _full_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Gro
     return [output_group(name, range(a, b), n_out, n_point, n) for name, a, b in zip(names, ends, ends[1:], strict=False)]
 
 
-def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathTranscription:
+def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathProgram:
     """The nonlinear program of the member of a path class nearest to a gait, without friction, x or W.
 
     Nearest means in the sum of the squared distances of edges, or corners, to those of a path laid through the gait.
@@ -259,10 +207,10 @@ def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None
     shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")
     target = problem.gait.parameters(near)[shapes]
     objective = Block(squared_distance(shapes.size), shapes[:, None], sparse.eye(1, format="csr"), target[:, None])
-    return _assembled(problem, mesh, _knots(near), layout, geometry, geometry.groups, objective, {}, None)
+    return _program(problem, mesh, _knots(near), layout, geometry, geometry.groups, objective, {}, None)
 
 
-def _assembled(
+def _program(
     problem: Problem,
     mesh: Mesh,
     knots: np.ndarray | None,
@@ -270,22 +218,11 @@ def _assembled(
     geometry: PathGeometry,
     groups: list[Group],
     objective: Block,
-    implicit: dict[str, Callable[[ca.MX, ca.MX], ca.MX]],
+    implicit: Implicit,
     velocity: ImplicitVelocity | None,
-) -> PathTranscription:
-    rows = np.cumsum([0] + [g.m for g in groups])
-    linear = sparse.vstack([g.linear for g in groups]).tocsr()
-    return PathTranscription(
-        problem,
-        mesh,
-        knots,
-        layout,
-        geometry,
-        Assembly(layout.n, objective, geometry.assembled_blocks(groups, implicit), linear),
-        geometry.lower,
-        geometry.upper,
-        np.concatenate([g.lower for g in groups]),
-        np.concatenate([g.upper for g in groups]),
-        {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, rows, rows[1:], strict=False)},
-        velocity,
+) -> PathProgram:
+    assembly, names, row_lower, row_upper, rows = assembled(layout, objective, geometry.blocks, groups, implicit)
+    lower, upper, checks = geometry.lower, geometry.upper, geometry.checks
+    return PathProgram(
+        problem, mesh, knots, layout, assembly, names, lower, upper, row_lower, row_upper, rows, checks, 1.0, velocity, geometry
     )

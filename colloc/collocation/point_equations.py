@@ -25,13 +25,15 @@ from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.objective import QUANTITIES, Objective
 from colloc.gaits.problem import Problem
+from colloc.mechanics.actuators import driven_power
 from colloc.mechanics.bodies import FULL, Body
-from colloc.mechanics.driven_power import driven_power
 from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, local_function, total_function
 from colloc.numerics.constraint_rows import Group, least_group, total_group
 from colloc.numerics.mesh import Mesh
 
+ACTUATORS = "actuators"
+"""The rows of the limits on torques and powers, point by point."""
 N_RATE = 2
 """The last outputs of a point: velocity of the centre of mass along the lab's x, and power."""
 _AT_REST = 1e-12
@@ -132,6 +134,25 @@ def driven_point(
     out = gain * driven_power(body, friction, angles, rates, forces, delta)
     local = ca.vertcat(angles, rates, forces, *([] if shape is None else [shape]))
     return local_function("driven", local, ca.SX(0, 1) if given is None else given, delta, out)
+
+
+def actuator_rows(problem: Problem, layout: Layout, friction: Law, unit: float) -> dict[str, tuple[BlockParts, Group]]:
+    """Block and rows, by name, that keep the actuators within their limits at the points of a full program, if there are any.
+
+    Rates of the variables are those per period divided by `unit`; `friction` takes them.
+    """
+    limits = problem.actuator_limits
+    if not limits.names:
+        return {}
+    _, angles, rates, _, delta = _symbols(problem.body)
+    forces = ca.SX.sym("forces", problem.body.n_force)
+    shares = limits.shares(problem.body, friction, angles, unit * rates, forces, delta)
+    function = local_function(ACTUATORS, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, shares)
+    gather, n_point = np.concatenate([layout.angles, layout.rates, layout.forces]), layout.angles.shape[1]
+    rows = n_point * len(limits.names)
+    own = {ACTUATORS: sparse.eye(rows, format="csr")}
+    group = Group(ACTUATORS, np.tile(limits.least, n_point), np.ones(rows), sparse.csr_matrix((rows, layout.n)), own)
+    return {ACTUATORS: ((function, gather, np.empty((0, n_point))), group)}
 
 
 BlockParts = tuple[LocalFunction, np.ndarray, np.ndarray]

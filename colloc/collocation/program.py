@@ -1,89 +1,119 @@
-"""What a solver asks of a nonlinear program, whatever was transcribed into it."""
+"""A collocated problem, whatever its class of gaits: objective and constraints in blocks, bounds, and names of the rows."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
+from scipy import sparse
 
+from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import Layout
+from colloc.collocation.point_equations import BlockParts
+from colloc.collocation.shape_checks import ShapeCheck
+from colloc.collocation.worst_instants import held_shares, worst_instants
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.numerics.blocks import Assembly
+from colloc.numerics.blocks import Assembly, Block
+from colloc.numerics.constraint_rows import Group, stacked
 from colloc.numerics.mesh import Mesh
 
-
-class ProgramLayout(Protocol):
-    """Where variables sit; a solver needs to know only which ones describe the gait."""
-
-    @property
-    def parameters(self) -> np.ndarray:
-        """``(n_parameter, 1)`` indices of the variables that describe the gait: those that a trust region bounds."""
+Implicit = dict[str, Callable[[ca.MX, ca.MX], ca.MX]]
+"""By name of a block, the velocities that are tied to those of the balance solver, from its locals and delta."""
 
 
-class Program(Protocol):
-    """A transcription: objective and constraints in blocks, bounds, and the unit that delta is handed on in."""
+@dataclass(frozen=True, eq=False)
+class GaitProgram:
+    """A problem on a mesh, ready for a solver of nonlinear programs.
 
-    @property
-    def assembly(self) -> Assembly: ...
+    Attributes
+    ----------
+    problem : Problem
+    mesh : Mesh
+    knots : (n,) or None
+        Phases where the arcs of a free path meet; None for other gaits.
+    layout : Layout
+    assembly : Assembly
+    names : tuple of str
+        Of the assembly's blocks, in order.
+    lower, upper : (n,)
+        Bounds of the variables.
+    constraint_lower, constraint_upper : (m,)
+    groups : dict of str to slice
+        Names of the constraint rows, in order.
+    checks : list of ShapeCheck
+        Shape functions whose largest value in each mesh cell is constrained.
+    speed_unit : float
+        The program's unit of speed: delta is divided by it before the blocks see it.
+    velocity : ImplicitVelocity or None
+        Kept alive here for the functions that call it.
+    """
 
-    @property
-    def layout(self) -> ProgramLayout: ...
+    problem: Problem
+    mesh: Mesh
+    knots: np.ndarray | None
+    layout: Layout
+    assembly: Assembly
+    names: tuple[str, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+    constraint_lower: np.ndarray
+    constraint_upper: np.ndarray
+    groups: dict[str, slice]
+    checks: list[ShapeCheck]
+    speed_unit: float
+    velocity: ImplicitVelocity | None
 
-    @property
-    def lower(self) -> np.ndarray:
-        """``(n,)``, with `upper`: bounds of the variables."""
-
-    @property
-    def upper(self) -> np.ndarray: ...
-
-    @property
-    def constraint_lower(self) -> np.ndarray:
-        """``(m,)``, with `constraint_upper`: bounds of the constraints."""
-
-    @property
-    def constraint_upper(self) -> np.ndarray: ...
-
-    @property
-    def groups(self) -> dict[str, slice]:
-        """Names of the constraint rows, in order."""
+    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> GaitProgram:
+        """The program with other bounds of its rows."""
+        return replace(self, constraint_lower=lower, constraint_upper=upper)
 
     @property
     def lifted(self) -> bool:
         """Whether link forces are variables, which the optimiser has to be leashed for."""
-
-    @property
-    def speed_unit(self) -> float:
-        """The program's unit of speed: delta is divided by it before the blocks see it."""
-
-    def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """Instance parameters of all blocks, objective first, for a gait's parameters ``(n_parameter,)``."""
-
-
-class GaitProgram(Program, Protocol):
-    """The program of a problem: what continuation, refinement and explanation ask of it."""
-
-    @property
-    def problem(self) -> Problem: ...
-
-    @property
-    def mesh(self) -> Mesh: ...
-
-    @property
-    def layout(self) -> Layout: ...
-
-    @property
-    def knots(self) -> np.ndarray | None:
-        """Phases where the arcs of a free path meet; None for other gaits."""
+        return self.layout.forces.size > 0
 
     def member(self, parameters: np.ndarray) -> AnyGait:
         """The gait of a parameter vector ``(n_parameter,)``."""
-
-    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> GaitProgram:
-        """The program with other bounds of its rows."""
+        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.knots)
 
     def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member."""
+        return self.mesh
 
-    def check_excess(self, x: np.ndarray) -> float:
-        """How far shapes between nodes exceed what is admissible, for variables x [rad]."""
+    def placed(self, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """What the checks' blocks are given at an instant of every cell of a mesh in phases, ``(n_given, n_cell)``."""
+        raise NotImplementedError
+
+    def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
+        """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
+
+        An inequality between nodes is kept by constraining it where the gait `parameters` comes closest to it: see
+        `colloc.collocation.worst_instants`.
+        """
+        gait = self.member(parameters)
+        mesh, given = self.phase_mesh(gait), {}
+        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks), strict=True):
+            given[check.name] = np.vstack([self.placed(times, mesh), held_shares(check, gait, times)])
+        blocks = zip(self.names, self.assembly.blocks, strict=True)
+        return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
+
+
+def assembled(
+    layout: Layout, objective: Block, blocks: dict[str, BlockParts], groups: list[Group], implicit: Implicit
+) -> tuple[Assembly, tuple[str, ...], np.ndarray, np.ndarray, dict[str, slice]]:
+    """The assembly of blocks and rows, the blocks' names, the bounds of the rows, and where each group's rows are."""
+    ends = np.cumsum([0] + [g.m for g in groups])
+    scattered = tuple(
+        Block(function, gather, stacked(groups, name, function.n_out * gather.shape[1]), given, implicit.get(name))
+        for name, (function, gather, given) in blocks.items()
+    )
+    return (
+        Assembly(layout.n, objective, scattered, sparse.vstack([g.linear for g in groups]).tocsr()),
+        tuple(blocks),
+        np.concatenate([g.lower for g in groups]),
+        np.concatenate([g.upper for g in groups]),
+        {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, ends, ends[1:], strict=False)},
+    )

@@ -14,7 +14,6 @@ turns the motion into that direction; nothing is imposed on the sideways displac
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -25,6 +24,7 @@ from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_m
 from colloc.collocation.point_equations import (
     N_RATE,
     BlockParts,
+    actuator_rows,
     driven_point,
     gait_check,
     mean_square,
@@ -33,13 +33,11 @@ from colloc.collocation.point_equations import (
     period_rows,
     point_function,
 )
+from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.guesses import widest
-from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
-from colloc.numerics.blocks import Assembly, Block
 from colloc.numerics.constraint_rows import (
     Group,
     equalities,
@@ -48,101 +46,24 @@ from colloc.numerics.constraint_rows import (
     quadrature_group,
     rotation_groups,
     selector,
-    stacked,
 )
 from colloc.numerics.mesh import Mesh
 
 
-@dataclass(frozen=True, eq=False)
-class Transcription:
-    """A problem on a mesh, ready for a solver of nonlinear programs.
+class SeriesProgram(GaitProgram):
+    """The program of a class in whose parameters the angles are linear."""
 
-    Attributes
-    ----------
-    problem : Problem
-    mesh : Mesh
-    layout : Layout
-    assembly : Assembly
-    lower, upper : (n,)
-        Bounds of the variables.
-    constraint_lower, constraint_upper : (m,)
-    groups : dict of str to slice
-        Names of the constraint rows, in order.
-    checks : list of ShapeCheck
-        Shape functions whose largest value in each mesh cell is constrained.
-    velocity : ImplicitVelocity
-        Kept alive here for the functions that call it.
-    """
-
-    problem: Problem
-    mesh: Mesh
-    layout: Layout
-    assembly: Assembly
-    lower: np.ndarray
-    upper: np.ndarray
-    constraint_lower: np.ndarray
-    constraint_upper: np.ndarray
-    groups: dict[str, slice]
-    checks: list[ShapeCheck]
-    velocity: ImplicitVelocity
-
-    def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> Transcription:
-        """The program with other bounds of its rows."""
-        return replace(self, constraint_lower=lower, constraint_upper=upper)
-
-    @property
-    def knots(self) -> None:
-        return None
-
-    @property
-    def lifted(self) -> bool:
-        return self.layout.forces.size > 0
-
-    @property
-    def speed_unit(self) -> float:
-        return RADIANS
-
-    def gait(self, x: np.ndarray) -> Fourier:
-        """The gait of a vector of variables."""
-        return self.member(x[self.layout.parameters[:, 0]])
-
-    def member(self, parameters: np.ndarray) -> Fourier:
-        """The gait of a parameter vector."""
-        return self.problem.gait.fourier(parameters, self.problem.body.n_joint)
-
-    def phase_mesh(self, gait: Fourier) -> Mesh:
-        """The mesh in phases of a gait: the program's own."""
-        return self.mesh
-
-    def check_excess(self, x: np.ndarray) -> float:
-        """How far the shape checks are exceeded at the worst instants of the gait in x [rad]."""
-        gait = self.gait(x)
-        worst = worst_instants(gait, self.mesh, self.checks)
-        excess = 0.0
-        for check, times in zip(self.checks, worst, strict=True):
-            rows, values = self.groups[check.name], check_values(check, gait, times)
-            excess = max(excess, float(np.max(values - self.constraint_upper[rows])))
-            excess = max(excess, float(np.max(self.constraint_lower[rows] - values)))
-        return excess
-
-    def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """Instance parameters of all blocks (objective first), with every check moved to its cell's worst instant.
-
-        An inequality between nodes is kept by constraining it where the gait `parameters` comes closest to it: see
-        `colloc.collocation.worst_instants`.
-        """
-        gait, blocks = self.member(parameters), (self.assembly.objective, *self.assembly.blocks)
-        worst = zip(self.checks, worst_instants(gait, self.mesh, self.checks), strict=True)
-        moved = iter([_check_parameters(self.problem, times, held_shares(check, gait, times)) for check, times in worst])
-        return [next(moved) if b.parameters.shape[0] else b.parameters for b in blocks]
+    def placed(self, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """The matrices from parameters to angles at the instants, a column each."""
+        return _angle_columns(self.problem, times)
 
 
-def _check_parameters(problem: Problem, times: np.ndarray, shares: np.ndarray) -> np.ndarray:
+def _angle_columns(problem: Problem, times: np.ndarray) -> np.ndarray:
     matrix = problem.gait.angle_matrix(times, problem.body.n_joint)
-    return np.vstack([matrix.transpose(0, 2, 1).reshape(times.size, -1).T, shares])
+    return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
 
 
-def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = ()) -> Transcription:
+def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = ()) -> SeriesProgram:
     """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges.
 
     Self-contact is constrained between links two apart, and between the pairs `far` of links farther apart: see
@@ -162,7 +83,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
     for check in checks:
         function = gait_check(check, n_joint, n_parameter)
-        middles = _check_parameters(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1]), np.full(mesh.n, -1.0))
+        middles = np.vstack([_angle_columns(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])), np.full(mesh.n, -1.0)])
         blocks[check.name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
     blocks["shape speed"] = (
         mean_square(ca.DM(problem.gait.mean_square_rate(n_joint) / RADIANS**2)),
@@ -175,8 +96,8 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         "length": lambda: (path_pace(n_joint), layout.rates, none),
         "driven_work": lambda: (driven_point(problem.body, friction), own, none),
     }
-    of_period = period_rows(problem, layout, mesh, densities, RADIANS)
-    blocks |= {name: parts for name, (parts, _) in of_period.items()}
+    besides = period_rows(problem, layout, mesh, densities, RADIANS) | actuator_rows(problem, layout, friction, RADIANS)
+    blocks |= {name: parts for name, (parts, _) in besides.items()}
 
     rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
     groups = [
@@ -194,7 +115,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
             sparse.csr_matrix((1, layout.n)),
             {"shape speed": sparse.eye(1, format="csr")},
         ),
-        *(group for _, group in of_period.values()),
+        *(group for _, group in besides.values()),
     ]
     velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)
 
@@ -202,32 +123,11 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
         return velocity(angles, rates, z, delta)
 
-    ends = np.cumsum([0] + [g.m for g in groups])
-    return Transcription(
-        problem,
-        mesh,
-        layout,
-        Assembly(
-            layout.n,
-            objective_block(problem, layout),
-            tuple(
-                Block(
-                    function,
-                    gather,
-                    stacked(groups, name, function.n_out * gather.shape[1]),
-                    parameters,
-                    velocity_map if name == "point" and problem.formulation != FULL else None,
-                )
-                for name, (function, gather, parameters) in blocks.items()
-            ),
-            sparse.vstack([g.linear for g in groups]).tocsr(),
-        ),
-        *_variable_bounds(problem, layout),
-        np.concatenate([g.lower for g in groups]),
-        np.concatenate([g.upper for g in groups]),
-        {g.name: slice(int(a), int(b)) for g, a, b in zip(groups, ends, ends[1:], strict=False)},
-        checks,
-        velocity,
+    implicit: Implicit = {} if problem.formulation == FULL else {"point": velocity_map}
+    assembly, names, row_lower, row_upper, rows = assembled(layout, objective_block(problem, layout), blocks, groups, implicit)
+    lower, upper = _variable_bounds(problem, layout)
+    return SeriesProgram(
+        problem, mesh, None, layout, assembly, names, lower, upper, row_lower, row_upper, rows, checks, RADIANS, velocity
     )
 
 

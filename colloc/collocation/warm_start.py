@@ -9,7 +9,7 @@ from colloc.collocation.layout import Layout
 from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.mechanics.driven_power import driven_power_in_balance
+from colloc.mechanics.actuators import driven_power_in_balance
 from colloc.numerics.mesh import Mesh
 
 _TOLERANCE = 1e-11

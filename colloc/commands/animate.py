@@ -6,13 +6,12 @@ Exit codes: 0 written, 2 bad file or option.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
-from colloc.results.solution_file import load
+from colloc.results.store import load
 
 _EPILOG = """\
 Orange arrows are the friction on the links; the large disc is the head; the small plane shows the first two joint angles.
@@ -52,7 +51,3 @@ def _animate(options: argparse.Namespace) -> int:
     size = path.stat().st_size
     tell(options, {"status": "written", "file": str(path), "bytes": size}, [f"saved {path} ({size / 1000:.0f} kB)"])
     return OK
-
-
-if __name__ == "__main__":
-    sys.exit(main())

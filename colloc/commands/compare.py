@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -157,7 +156,3 @@ def _compare(options: argparse.Namespace) -> int:
     print("\n".join(f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines))
     print(sentence)
     return OK if same else DIFFERENT
-
-
-if __name__ == "__main__":
-    sys.exit(main())

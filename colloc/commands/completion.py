@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import sys
 from collections.abc import Sequence
 
 from colloc.commands.ending import OK, run
@@ -69,7 +68,3 @@ def _completion(options: argparse.Namespace) -> int:
     script = completion_script({name: module._parser() for name, module in modules.items()})
     tell(options, {"shell": "bash", "script": script}, [script])
     return OK
-
-
-if __name__ == "__main__":
-    sys.exit(main())

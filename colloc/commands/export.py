@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import io
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,7 +16,6 @@ import numpy as np
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
 from colloc.gaits.gait_fields import law_fields
-from colloc.mechanics.law import rate_independent
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -52,8 +50,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Sequence[float] | None) -> dict:
     """What a reader of the samples has to know, as plain numbers and strings."""
-    measured, law = solution.measured, solution.problem.friction
-    paced = {} if rate_independent(law) else {"pace": f"work is that of the gait's own pace in a period of 1 ({law.label})"}
+    measured, reason = solution.measured, solution.problem.paced_by
+    paced = {"pace": f"meant for the gait's own pace in a period of 1, as {reason}"} if reason else {}
     return {
         "name": solution.problem.name,
         "status": solution.status,
@@ -134,7 +132,3 @@ def _export(options: argparse.Namespace) -> int:
         lines.append(f"  note: the result is not certified ({solution.status})")
     tell(options, {**facts, "file": str(path), "samples": samples}, lines)
     return OK
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -80,7 +79,3 @@ def _init(options: argparse.Namespace) -> int:
     line = f"wrote {path}: a problem of {options.links} links. Change it, then: colloc solve {path}"
     tell(options, {"status": "written", "file": str(path), "links": options.links}, [line])
     return OK
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -73,7 +73,3 @@ def _command(words: list[str]) -> int:
         hint = f"do you mean colloc {near[0]}?" if near else f"choose one of {', '.join(SUBCOMMANDS)}."
         raise ProblemError(f"there is no command {words[0]!r}; {hint}")
     return importlib.import_module(f"colloc.commands.{SUBCOMMANDS[words[0]][0]}").main(words[1:])
-
-
-if __name__ == "__main__":
-    sys.exit(main())

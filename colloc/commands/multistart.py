@@ -180,7 +180,3 @@ def _run(options: argparse.Namespace, command: str) -> int:
         print("colloc: interrupted; run the same command again to go on.", file=sys.stderr)
         return INTERRUPTED
     return OK if found else NONE_FOUND
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ Exit codes: 0 opened, 2 bad file or option, 3 not converged, 4 certificate faile
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from colloc.commands.ending import NONE_FOUND, OK, run
 from colloc.commands.multistart import summary_dict, summary_lines
 from colloc.commands.options import add_printing, new_parser, output_path, tell
 from colloc.commands.solve import EXIT
-from colloc.commands.solve import summary_dict as solution_dict
-from colloc.commands.solve import summary_lines as solution_lines
+from colloc.commands.summary import summary_dict as solution_dict
+from colloc.commands.summary import summary_lines as solution_lines
 from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS
 from colloc.results.archive import StartName, archive_at
 from colloc.results.distinct_optima import basins
@@ -72,7 +71,3 @@ def _open(options: argparse.Namespace) -> int:
     save(solution, path)
     tell(options, solution_dict(solution, path, None, None), [*solution_lines(solution, None), f"  saved {path}"])
     return EXIT[solution.status]
-
-
-if __name__ == "__main__":
-    sys.exit(main())

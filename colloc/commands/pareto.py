@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -95,7 +94,3 @@ def _pareto(options: argparse.Namespace) -> int:
         print("\n".join(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}" for k, a, b, _, _, status, _ in rows))
         print(f"  saved {', '.join(map(str, saved))}, {table.with_suffix('')}/00.h5 ...")
     return OK if front.certified else FAILED
-
-
-if __name__ == "__main__":
-    sys.exit(main())

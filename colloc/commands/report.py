@@ -6,7 +6,6 @@ Exit codes: 0 written, 2 bad file or option.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -66,7 +65,3 @@ def _reference(problem_file: str | None) -> Reference | None:
     from colloc.gaits.problem_file import read_problem_file
 
     return read_problem_file(problem_file).reference
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -14,23 +14,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colloc.commands.ending import FAILED, NONE_FOUND, OK, run
-from colloc.commands.finish import finished
+from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
-from colloc.gaits.gait_fields import fields
-from colloc.gaits.objective import EFFICIENCY
+from colloc.commands.summary import summary_dict, summary_lines
 from colloc.gaits.problem import Problem
-from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
-from colloc.gaits.relaxed import Relaxed
-from colloc.mechanics.law import rate_independent
-from colloc.results.level import PRESCRIBED, REDUCED, Level
+from colloc.gaits.problem_file import ProblemFile, read_problem_file
+from colloc.results.level import Level
 from colloc.results.search_step import SearchStep
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
 
 if TYPE_CHECKING:
-    from colloc.bounds.sampled import Bound
+    pass
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
 """Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
@@ -55,7 +51,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fresh", action="store_true", help="do not go on from an interrupted run")
     parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: results/NAME.h5)")
     parser.add_argument(
-        "--starts", type=int, metavar="N", help="starts to find the best gait of (default: 32); 1: the guess alone"
+        "--starts",
+        type=int,
+        metavar="N",
+        help="starts to find the best gait of (default: 32, of relaxed gaits 8); 1: the guess alone",
     )
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="begin no other start after so long")
     parser.add_argument(
@@ -84,117 +83,6 @@ def level_line(level: Level) -> str:
 LEVEL_HEADER = "    delta   mesh   objective         d         W   iter  seconds"
 
 
-def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
-    """What a person wants to know at the end."""
-    lines = [f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"]
-    certificate = solution.certificate
-    best = solution.problem.objective
-    if certificate.replayed:
-        lines += [
-            f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by independent replay "
-            f"({certificate.instants} instants); {certificate.value_at_zero_delta:.6f} +- "
-            f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
-            *_besides(solution),
-            f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
-            f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
-        ]
-        lines += [f"  search          {text}" for text in _search_lines(solution)]
-        law = solution.problem.friction
-        paced = "" if rate_independent(law) else f"; run in a period of 1, as work depends on the pace under {law.label}"
-        gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
-        lines += [f"  gait            {text}" for text in gait]
-        lines += [f"  {check.line()}" for check in certificate.checks]
-        if reference is not None:
-            difference = certificate.efficiency - reference.efficiency
-            agree = "agrees with" if abs(difference) <= reference.tolerance else "DIFFERS from"
-            lines.append(f"  {agree} {reference.efficiency:g} +- {reference.tolerance:g} ({reference.source})")
-    if solution.message:
-        lines.append(f"  {solution.message}")
-    return lines
-
-
-def _besides(solution: Solution) -> list[str]:
-    """What a period comes to that its objective, and what is asked for, make worth telling."""
-    found, problem, lines = solution.certificate, solution.problem, []
-    if problem.objective != EFFICIENCY:
-        lines.append(f"  {EFFICIENCY.label:<15s} {found.efficiency:.6f} +- {found.efficiency_error:.0e}")
-    if problem.uses("length"):
-        lines.append(f"  path length L   {found.length:.6f} rad")
-    if problem.uses("driven_work"):
-        lines.append(f"  driven work W+  {found.driven_work:.6f}")
-    if problem.rotation != 0:
-        lines.append(f"  net rotation    {found.rotation:.6f} rad")
-    return lines
-
-
-def _search_lines(solution: Solution) -> list[str]:
-    """What was solved last, and what the gait is the best of."""
-    level = solution.last
-    if level.program == PRESCRIBED:
-        return [f"nothing is free: the motion is prescribed, measured on a mesh of {level.edges.size - 1} intervals"]
-    rows = f"{level.x.size} variables, {level.lam_g.size} constraints"
-    how = f"{level.iterations} iterations of IPOPT" if level.program != REDUCED else level.status
-    lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {level.kkt_error:.0e}"]
-    return [*lines, *solution.standing]
-
-
-def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
-    """The same as one JSON object."""
-    certificate = solution.certificate
-    result: dict = {
-        "name": solution.problem.name,
-        "status": solution.status,
-        "message": solution.message,
-        "file": str(path),
-        "problem_hash": solution.problem.hash,
-        "seconds": solution.seconds,
-        "delta": solution.last.delta,
-        "objective": solution.problem.objective.fields(),
-        "value": solution.value,
-        "efficiency": solution.efficiency,
-        "distance": solution.distance,
-        "work": solution.work,
-        "iterations": sum(level.iterations for level in solution.levels),
-        "class": solution.problem.gait.describe(),
-        "program": solution.last.program,
-        "variables": int(solution.last.x.size),
-        "constraints": int(solution.last.lam_g.size),
-        "kkt_error": solution.last.kkt_error,
-        "starts": solution.starts,
-        "finite": None if solution.finite is None else solution.finite.value,
-        "others": [
-            {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
-            for a in solution.others
-        ],
-        "gait": fields(solution.gait),
-        "certificate": None,
-        "reference": None,
-        "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
-        "versions": solution.versions,
-    }
-    if certificate.replayed:
-        result["certificate"] = {
-            "passed": certificate.passed,
-            "value": certificate.value,
-            "value_error": certificate.value_error,
-            "value_at_zero_delta": certificate.value_at_zero_delta,
-            "value_error_at_zero_delta": certificate.value_error_at_zero_delta,
-            "rotation": certificate.rotation,
-            "length": certificate.length,
-            "efficiency": certificate.efficiency,
-            "efficiency_error": certificate.efficiency_error,
-            "efficiency_at_zero_delta": certificate.efficiency_at_zero_delta,
-            "error_at_zero_delta": certificate.error_at_zero_delta,
-            "distance_error": certificate.distance_error,
-            "work_error": certificate.work_error,
-            "checks": {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks},
-        }
-    if reference is not None:
-        keys = ("efficiency", "tolerance", "source")
-        result["reference"] = {key: getattr(reference, key) for key in keys}
-    return result
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     return run(_parser(), _solve, arguments)
@@ -217,10 +105,6 @@ def _solve(options: argparse.Namespace) -> int:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
-    if isinstance(problem.gait, Relaxed):
-        from colloc.commands.solve_relaxed import solve_relaxed
-
-        return solve_relaxed(problem, stated, path, options)
     solution = _solved(problem, stated, path, options, quiet)
     if solution.status != SOLVED:
         path = path.with_suffix(".failed.h5")
@@ -243,12 +127,22 @@ def _solve(options: argparse.Namespace) -> int:
         lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
         print("\n".join(lines), flush=True)
 
-    def figure() -> object:
-        from colloc.pictures.figure import solution_figure
+    if not options.no_figure:
+        from colloc.pictures.solution_figure import solution_figure
+        from colloc.pictures.style import save as save_figure
 
-        return solution_figure(solution)
-
-    return finished(options, path, saved, complaints, figure, EXIT[solution.status])
+        with StatusLine(enabled=not quiet) as line:
+            line.say("drawing")
+            try:
+                figure = solution_figure(solution)
+                saved += map(str, save_figure(figure, path.with_suffix(""), ("png", "pdf")[: 1 + options.pdf]))
+            except CollocError as error:
+                complaints.append(f"no figure: {error}")
+    if not options.json:
+        print(f"  saved {', '.join(saved)}")
+    for complaint in complaints:
+        print(f"colloc: {complaint}", file=sys.stderr)
+    return BAD_PROBLEM if complaints else EXIT[solution.status]
 
 
 def _partial(path: Path) -> Path:
@@ -259,11 +153,10 @@ def _partial(path: Path) -> Path:
 def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse.Namespace, quiet: bool) -> Solution:
     """The solution, from the levels that an interrupted run left if there are any; each level is kept as it ends."""
     from colloc.results.store import load, save
-    from colloc.search.global_search import STARTS
     from colloc.search.optimise import best_gait, maximise_efficiency
 
     # a gait that is given on the command line is to be improved, not left for another
-    starts = options.starts or (1 if options.start else stated.starts or STARTS)
+    starts = options.starts or (1 if options.start else stated.starts)
     source = stated.source
     partial = _partial(path)
     levels: list[Level] = []
@@ -283,7 +176,7 @@ def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse
     before_levels = tuple(levels)
     try:
         with StatusLine(enabled=not quiet) as line:
-            line.say(f"{problem.name}: " + ("building" if starts == 1 else f"trying {starts} starts"))
+            line.say(f"{problem.name}: " + ("building" if starts == 1 else "trying starts"))
 
             def ended(level: Level) -> None:
                 levels.append(level)
@@ -295,7 +188,7 @@ def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse
                 what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
                 line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
 
-            def tried(step: SearchStep) -> None:
+            def tried(step: SearchStep | str) -> None:
                 line.say(f"{problem.name}: {step}")
 
             if options.search == SEARCHES[0]:
@@ -315,7 +208,3 @@ def levels_left(problem: Problem, level: Level) -> int:
     if level.delta <= problem.delta:
         return 1
     return math.ceil(math.log10(level.delta / problem.delta) - 1e-9) + (problem.mesh_tolerance > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -189,7 +189,3 @@ def _summary_lines(run, path: Path) -> list[str]:
     if len(failed) > _MOST_FAILURES_SHOWN:
         lines.append(f"  ... and {len(failed) - _MOST_FAILURES_SHOWN} more; all are in the file, with their messages")
     return lines
-
-
-if __name__ == "__main__":
-    sys.exit(main())

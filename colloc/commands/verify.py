@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
 from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import add_printing, add_result, new_parser
 from colloc.results.certificate import certify
 from colloc.results.checks import Certificate
-from colloc.results.relaxed_solution import RelaxedSolution
-from colloc.results.relaxed_store import is_relaxed, load_relaxed
+from colloc.results.realisation import recertified
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -58,8 +57,8 @@ def disagreement(recorded: Certificate, now: Certificate) -> str:
     return ""
 
 
-def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
-    """A new certificate on other instants than the one in the file, whose check of second order is taken over.
+def rechecked(solution: Solution, tolerance: float = 1e-6) -> Solution:
+    """The solution with new certificates, on other instants than before; its check of second order is taken over.
 
     Raises
     ------
@@ -69,38 +68,24 @@ def rechecked(solution: Solution, tolerance: float = 1e-6) -> Certificate:
     solution.last  # noqa: B018  raises
     before = solution.certificate.instants or 1600
     known = next((check for check in solution.certificate.checks if check.name == "second order"), None)
-    return certify(solution, tolerance=tolerance, instants=2 * (3 * before // 8) + 2, second_order=known)
+    instants = 2 * (3 * before // 8) + 2
+    certificate = certify(solution, tolerance=tolerance, instants=instants, second_order=known)
+    if solution.relaxed is None:
+        return replace(solution, certificate=certificate)
+    relaxed = recertified(solution.problem, solution.relaxed, instants, tolerance)
+    return replace(solution, certificate=certificate, relaxed=relaxed)
 
 
-def _verify_relaxed(solution: RelaxedSolution, options: argparse.Namespace) -> int:
-    """The relaxed gait and all finite ones, on other instants than before."""
-    before = solution.certificate.instants
-    with StatusLine(enabled=not (options.quiet or options.json)) as line:
-        line.say(f"{solution.problem.name}: replaying")
-        again = solution.recertified(2 * (3 * before // 8) + 2, options.tolerance)
-    recorded = [("relaxed", solution.certificate), *((f"{r.corners} corners", r.certificate) for r in solution.realised)]
-    now = [again.certificate, *(r.certificate for r in again.realised)]
-    complaints = [disagreement(old, new) for (_, old), new in zip(recorded, now, strict=True)]
-    good = again.status == solution.status == "solved" and not any(complaints)
-    rows = [
-        {
-            "gait": name,
-            "efficiency": new.efficiency,
-            "efficiency_error": new.efficiency_error,
-            "passed": new.passed,
-            "complaint": c,
-        }
-        for (name, _), new, c in zip(recorded, now, complaints, strict=True)
+def _besides(before: Solution, now: Solution) -> list[dict]:
+    """What is said of a relaxed gait and of every finite one near it."""
+    if before.relaxed is None or now.relaxed is None:
+        return []
+    pairs = zip(before.relaxed.certificates.values(), now.relaxed.certificates.items(), strict=True)
+    keys = ("efficiency", "efficiency_error", "passed")
+    return [
+        {"gait": name, **{key: getattr(new, key) for key in keys}, "complaint": disagreement(old, new)}
+        for old, (name, new) in pairs
     ]
-    if options.json:
-        print(json.dumps({"file": options.result, "name": solution.problem.name, "certified": good, "gaits": rows}))
-        return OK if good else FAILED
-    print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
-    for row in rows:
-        failed = "" if row["passed"] else "   a check fails"
-        words = f"{row['gait']:<14s}  {row['efficiency']:.8f} +- {row['efficiency_error']:.0e}{failed}  {row['complaint']}"
-        print(f"  {words}".rstrip())
-    return OK if good else FAILED
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -111,38 +96,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _verify(options: argparse.Namespace) -> int:
     if not 0 < options.tolerance < 1:
         raise ProblemError(f"--tolerance must lie between 0 and 1, not {options.tolerance:g}.")
-    if is_relaxed(options.result):
-        return _verify_relaxed(load_relaxed(options.result), options)
     solution = load(options.result)
     with StatusLine(enabled=not (options.quiet or options.json)) as line:
         line.say(f"{solution.problem.name}: replaying")
-        certificate = rechecked(solution, options.tolerance)
+        again = rechecked(solution, options.tolerance)
+    certificate, gaits = again.certificate, _besides(solution, again)
     complaint = disagreement(solution.certificate, certificate)
-    good = certificate.passed and not complaint and solution.status == "solved"
+    good = certificate.passed and not complaint and solution.success and not any(gait["complaint"] for gait in gaits)
     if options.json:
-        checks = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in certificate.checks}
-        keys = (
-            "value",
-            "value_error",
-            "efficiency",
-            "efficiency_error",
-            "efficiency_at_zero_delta",
-            "error_at_zero_delta",
-            "distance",
-            "distance_error",
-            "work",
-            "work_error",
-            "instants",
-        )
         facts = {
-            "file": options.result,
-            "objective": solution.problem.objective.name,
-            "name": solution.problem.name,
-            "certified": good,
-            "complaint": complaint,
-        }
-        facts["changed"] = solution.changed
-        print(json.dumps({**facts, **{key: getattr(certificate, key) for key in keys}, "checks": checks}))
+            "file": options.result, "objective": solution.problem.objective.name, "name": solution.problem.name,
+            "certified": good, "complaint": complaint, "changed": solution.changed, "gaits": gaits,
+        }  # fmt: skip
+        print(json.dumps({**facts, **certificate.facts()}))
         return OK if good else FAILED
     print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
     print(
@@ -154,6 +120,10 @@ def _verify(options: argparse.Namespace) -> int:
         print(f"  in the file     {recorded.value:.8f} +- {recorded.value_error:.0e} ({recorded.instants} instants)")
     if not options.quiet:
         print("\n".join(f"  {check.line()}" for check in certificate.checks))
+    for gait in gaits:
+        failed = "" if gait["passed"] else "   a check fails"
+        words = f"{gait['gait']:<14s}  {gait['efficiency']:.8f} +- {gait['efficiency_error']:.0e}{failed}  {gait['complaint']}"
+        print(f"  {words}".rstrip())
     if solution.changed:
         print("  the file was changed after colloc wrote it; what is said here is of the file as it is now")
     if complaint:
@@ -161,7 +131,3 @@ def _verify(options: argparse.Namespace) -> int:
     if solution.status != "solved" and certificate.passed:
         print(f"  the solve itself ended as: {solution.status}. {solution.message}")
     return OK if good else FAILED
-
-
-if __name__ == "__main__":
-    sys.exit(main())

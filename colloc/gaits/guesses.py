@@ -1,4 +1,4 @@
-"""Gaits to start from where none is given: travelling waves of bending, of a size that any body can do.
+"""Gaits to start from: what is asked of them, and, where none is given, travelling waves of a size that any body can do.
 
 With joint j at s_j along the body, tail at 0, head at 1,
 
@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.system.errors import ProblemError
 
@@ -26,6 +27,12 @@ _PHASES = np.linspace(0.0, 1.0, 201)
 SAFE = 1 - 1e-3
 """Shapes as large as may be are scaled by this, to be clearly admissible."""
 _BISECTIONS = 40
+_CHECKED_PHASES = 2000
+_SLACK = 1e-6
+"""Depth of a crossing at which a guess still counts as admissible: what a certificate allows."""
+_AT_THE_BOUND = 1e-2
+"""An optimum that lies on the lower bound of the shape speed is a good guess for a richer class, although sampling cuts its
+corners and makes it a little shorter."""
 
 
 Limit = float | tuple[float, ...]
@@ -97,3 +104,36 @@ def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share:
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
     size = min(share * largest_factor(body, joint_limit, unit.angles(_PHASES)), _LARGEST)
     return Fourier(unit.mean, size * unit.cos, size * unit.sin)
+
+
+def check_guess(body: Body, gait_class: Any, stated: Any, joint_limit: Limit, smallest_shape_speed: float) -> None:
+    """Raise a `ProblemError` for a gait that no search can begin with: of another body, at rest, or inadmissible."""
+    if stated.n_joint != body.n_joint:
+        raise ProblemError(f"guess has {stated.n_joint} {body.coordinate}s but the body has {body.n_joint}.")
+    if isinstance(gait_class, Harmonic):
+        near = fourier_through(stated, gait_class)
+        guess = gait_class.fourier(gait_class.parameters(near), body.n_joint)
+        rms = guess.shape_speed
+    else:
+        guess = stated
+        points = symmetric_samples(guess, gait_class.symmetry)
+        rms = np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * gait_class.fraction)
+    if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
+        raise ProblemError(
+            f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
+            f"{smallest_shape_speed:g}); does it have the symmetry {gait_class.symmetry!r} of its class?"
+        )
+    angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
+    stretched, limit = under_one_limit(angles, joint_limit)
+    largest = body.largest_angles(stretched).max()
+    if largest > limit + body.usual.excess:
+        each = np.abs(body.limited @ stretched).max(axis=1, initial=0.0)
+        which = body.limit_names[np.argmax(each)] if each.size else "the tangent"
+        beyond = f"{which} reaches {largest:.4g} rad, beyond the limit {limit:.4g}"
+        raise ProblemError(f"guess is inadmissible: {beyond}; make its amplitude smaller.")
+    depth = body.crossing_depth(angles)
+    if depth.max() > _SLACK:
+        when = np.argmax(depth) / _CHECKED_PHASES
+        if body.drawn_width:
+            raise ProblemError(f"guess is inadmissible: links overlap at phase {when:.3f}.")
+        raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait_function import GaitFunction
-from colloc.gaits.symmetry import SYMMETRIES, fraction
+from colloc.gaits.gait import ClassOfGaits, GaitFunction
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
@@ -149,7 +148,7 @@ def ellipse(A0: float, A1: float, B1: float) -> Fourier:
 
 @named_arguments
 @dataclass(frozen=True)
-class Harmonic:
+class Harmonic(ClassOfGaits):
     """The class of gaits with `harmonics` harmonics and a given symmetry.
 
     A member is a parameter vector p; angles are linear in it. Without a symmetry that fixes it, the start phase is
@@ -170,29 +169,16 @@ class Harmonic:
     harmonics: int = 1
     symmetry: str = "none"
 
-    free = True
-    unit_speed = False
-    delta_start = None
     moves_knots = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.harmonics, (int, np.integer)) or not 1 <= self.harmonics <= 64:
             raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
-        if self.symmetry not in SYMMETRIES:
-            raise ProblemError(f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}.")
-
-    @property
-    def fraction(self) -> float:
-        """The part of the period that has to be solved; symmetry gives the rest."""
-        return fraction(self.symmetry)
+        self._check_symmetry()
 
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
         return round(self.fraction * (30 + 10 * self.harmonics))
-
-    def coarse_intervals(self, n_joint: int) -> int:
-        """Intervals on which starts are told apart."""
-        return self.intervals(n_joint) // 2
 
     def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
         """Intervals that a mesh with so many points on each needs at least, and for what."""
@@ -205,10 +191,6 @@ class Harmonic:
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series that stand for its gaits: its members are such."""
         return self
-
-    def own_checks(self, gait: Fourier) -> list[tuple[str, float, float, str]]:
-        """What a certificate checks of a member beyond what all gaits have to keep."""
-        return []
 
     def describe(self) -> str:
         """The class in words, for reports."""

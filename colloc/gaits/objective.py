@@ -1,20 +1,19 @@
 """What a gait is to be best at: one expression of what a period comes to.
 
-The expression is stated once, as text. It is evaluated with floats for a value, with numbers that carry their gradient for the
-search in the reduced space and for error bars, and with CasADi's symbols for the full program.
+The expression is stated once, as text (`colloc.numerics.expression`). It is evaluated with floats for a value, with numbers
+that carry their gradient for the search in the reduced space and for error bars, and with CasADi for the full program.
 """
 
 from __future__ import annotations
 
-import ast
-import operator
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
+from colloc.numerics.expression import Dual, Formula, formula
 from colloc.system.errors import ProblemError
 
 QUANTITIES = {
@@ -31,65 +30,6 @@ _SAMPLES = (
 )
 """Periods at which an expression is tried when it is stated."""
 _PROPORTIONAL_TO_FRICTION = ("work", "driven_work")
-_LONGEST = 300
-"""Characters of an expression; it is evaluated by recursion."""
-_OPERATIONS: dict[type, Callable] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv, ast.Pow: operator.pow,
-    ast.USub: operator.neg, ast.UAdd: operator.pos,
-}  # fmt: skip
-_FUNCTIONS: dict[str, Callable] = {"sqrt": lambda a: a**0.5, "abs": abs}
-Number = TypeVar("Number")
-
-
-@dataclass(frozen=True, eq=False)
-class Dual:
-    """A number and its gradient: arithmetic follows the rules of differentiation."""
-
-    value: float
-    slope: np.ndarray | float = 0.0
-
-    __array_ufunc__ = None  # so that NumPy's numbers leave the arithmetic to this class
-
-    def __neg__(self) -> Dual:
-        return Dual(-self.value, -self.slope)
-
-    def __pos__(self) -> Dual:
-        return self
-
-    def __abs__(self) -> Dual:
-        return Dual(abs(self.value), np.sign(self.value) * self.slope)
-
-    def __add__(self, other: Dual | float) -> Dual:
-        b = _dual(other)
-        return Dual(self.value + b.value, self.slope + b.slope)
-
-    def __sub__(self, other: Dual | float) -> Dual:
-        b = _dual(other)
-        return Dual(self.value - b.value, self.slope - b.slope)
-
-    def __mul__(self, other: Dual | float) -> Dual:
-        b = _dual(other)
-        return Dual(self.value * b.value, self.value * b.slope + b.value * self.slope)
-
-    def __truediv__(self, other: Dual | float) -> Dual:
-        b = _dual(other)
-        quotient = self.value / b.value
-        return Dual(quotient, (self.slope - quotient * b.slope) / b.value)
-
-    def __pow__(self, power: float) -> Dual:
-        return Dual(self.value**power, power * self.value ** (power - 1) * self.slope)
-
-    def __rsub__(self, other: float) -> Dual:
-        return _dual(other) - self
-
-    def __rtruediv__(self, other: float) -> Dual:
-        return _dual(other) / self
-
-    __radd__, __rmul__ = __add__, __mul__
-
-
-def _dual(number: Dual | float) -> Dual:
-    return number if isinstance(number, Dual) else Dual(number)
 
 
 @dataclass(frozen=True)
@@ -99,7 +39,8 @@ class Objective:
     Parameters
     ----------
     expression : str
-        Of `QUANTITIES`: numbers, ``+ - * / **``, brackets, ``sqrt()`` and ``abs()``; powers have constant exponents.
+        Of `QUANTITIES`: numbers, ``+ - * / **``, brackets, and `colloc.numerics.expression.FUNCTIONS`; powers have constant
+        exponents.
     name : str, optional
         By default that of `NAMED`, or the expression.
 
@@ -119,18 +60,20 @@ class Objective:
 
     expression: str
     name: str = ""
-    _tree: ast.expr = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        known = NAMED.get(self.expression)
-        tree = _parsed(known or self.expression)
-        object.__setattr__(self, "expression", ast.unparse(tree))
-        object.__setattr__(self, "_tree", tree)
+        try:
+            stated = formula(NAMED.get(self.expression, self.expression), tuple(QUANTITIES))
+        except (ProblemError, TypeError) as error:
+            known = f"It may be one of {', '.join(NAMED)}, or a formula like 'distance / work'."
+            raise ProblemError(f"objective: {error} {known}") from None
+        object.__setattr__(self, "expression", stated.text)
         names = {expression: name for name, expression in NAMED.items()}
         object.__setattr__(self, "name", self.name or names.get(self.expression, self.expression))
         try:
-            values = [self(sample) for sample in _SAMPLES]
-            rises = [self.partials(sample).get("distance", 0.0) for sample in _SAMPLES]
+            with np.errstate(all="ignore"):
+                values = [self(sample) for sample in _SAMPLES]
+                rises = [self.partials(sample).get("distance", 0.0) for sample in _SAMPLES]
         except (ArithmeticError, TypeError, ValueError):
             values, rises = [np.nan], []
         if not all(isinstance(value, float) and np.isfinite(value) for value in values):
@@ -141,15 +84,19 @@ class Objective:
                 "which it moves, so it can only be asked to go far."
             )
 
-    def __call__(self, period: Mapping[str, Number]) -> Number:
-        """The value for quantities of a period: floats, `Dual` numbers or CasADi's symbols."""
-        return _evaluated(self._tree, period)
+    def __call__(self, period: Mapping[str, Any]) -> Any:
+        """The value for quantities of a period: floats or CasADi's symbols."""
+        value = self._formula(period)
+        return float(value) if isinstance(value, np.ndarray) else value
+
+    @property
+    def _formula(self) -> Formula:
+        return formula(self.expression, tuple(QUANTITIES))
 
     @cached_property
     def uses(self) -> tuple[str, ...]:
         """The quantities that it speaks of, in the order of `QUANTITIES`."""
-        named = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
-        return tuple(name for name in QUANTITIES if name in named)
+        return tuple(name for name in QUANTITIES if name in self._formula.names)
 
     @cached_property
     def degree(self) -> float | None:
@@ -163,14 +110,14 @@ class Objective:
         near = float(np.round(powers[0], 6))
         return near if np.allclose(powers, near, rtol=0, atol=1e-9) else None
 
-    def with_slopes(self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]) -> Dual:
-        """The value and its gradient, from the quantities of a period and their gradients."""
-        return _dual(self({name: Dual(period[name], slopes[name]) for name in self.uses}))
+    def gradient(self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]) -> np.ndarray | float:
+        """Of the value, from the quantities of a period and their gradients."""
+        return self._formula.differentiated({name: Dual(period[name], (slopes[name],)) for name in self.uses}).slopes[0]
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
         """Derivative with respect to each quantity that it uses."""
         unit = np.eye(len(self.uses))
-        slope = self.with_slopes(period, dict(zip(self.uses, unit, strict=True))).slope
+        slope = self.gradient(period, dict(zip(self.uses, unit, strict=True)))
         return dict(zip(self.uses, np.broadcast_to(slope, len(self.uses)).tolist(), strict=True))
 
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:
@@ -198,57 +145,6 @@ class Objective:
         return {"expression": self.expression, "name": self.name}
 
 
-def _parsed(expression: object) -> ast.expr:
-    if not isinstance(expression, str) or len(expression) > _LONGEST:
-        raise ProblemError(f"an objective is a text like 'distance / work', not {expression!r}.")
-    try:
-        tree = ast.parse(expression.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError):
-        raise ProblemError(f"the objective {expression!r} is no expression; write one like 'distance / work'.") from None
-    _check(tree, expression)
-    return tree
-
-
-def _check(node: ast.expr, text: str) -> None:
-    """Refuse what is not arithmetic of known quantities: expressions come from files, and nothing of a file is executed."""
-    match node:
-        case ast.Constant(value=bool()):
-            pass
-        case ast.Constant(value=int() | float()):
-            return
-        case ast.Name(id=name) if name in QUANTITIES:
-            return
-        case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATIONS:
-            return _check(operand, text)
-        case ast.BinOp(left=base, op=ast.Pow(), right=ast.Constant() | ast.UnaryOp(operand=ast.Constant()) as power):
-            _check(power, text)
-            return _check(base, text)
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS and not isinstance(op, ast.Pow):
-            _check(left, text)
-            return _check(right, text)
-        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in _FUNCTIONS:
-            return _check(argument, text)
-    raise ProblemError(
-        f"the objective {text!r} holds {ast.unparse(node)!r}; it may speak of {', '.join(QUANTITIES)}, numbers, + - * / **, "
-        f"{' and '.join(f'{name}()' for name in _FUNCTIONS)}, or be one of {', '.join(NAMED)}."
-    )
-
-
-def _evaluated(node: ast.expr, period: Mapping[str, Any]) -> Any:
-    match node:
-        case ast.Constant(value=value):
-            return float(value)  # type: ignore[arg-type]
-        case ast.Name(id=name):
-            return period[name]
-        case ast.UnaryOp(op=op, operand=operand):
-            return _OPERATIONS[type(op)](_evaluated(operand, period))
-        case ast.BinOp(left=left, op=op, right=right):
-            return _OPERATIONS[type(op)](_evaluated(left, period), _evaluated(right, period))
-        case ast.Call(func=ast.Name(id=name), args=[argument]):
-            return _FUNCTIONS[name](_evaluated(argument, period))
-    raise AssertionError(ast.dump(node))
-
-
 NAMED = {
     "efficiency": "distance / work",
     "speed": "distance / length",
@@ -258,7 +154,7 @@ NAMED = {
 }
 """Objectives that a problem may name: distance per work; per path in shape space, which is the speed of a body whose shape
 changes at unit rate; rotation per work; distance per work where no actuator recovers energy from being driven backwards
-(`colloc.mechanics.driven_power`); and for viscous drag, whose work grows with the pace, Lighthill's efficiency: the work of
+(`colloc.mechanics.actuators`); and for viscous drag, whose work grows with the pace, Lighthill's efficiency: the work of
 towing the straight body as far in the same time, at unit drag along it, per work."""
 _SHORT = {"efficiency": "d/W", "speed": "d/L", "turning": "θ/W", "driven efficiency": "d/W+", "towing": "d²/W"}
 EFFICIENCY, SPEED, TURNING, DRIVEN, TOWING = (Objective(name) for name in NAMED)

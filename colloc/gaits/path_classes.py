@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.paths import ArcPath, Corners
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, SYMMETRIES, fraction
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
@@ -29,14 +30,9 @@ JOINS, CURVATURE = 1e-8, 1e-6
 """Largest jump [rad] and relative excess of the curvature that a certificate allows."""
 
 
-def _check_symmetry(symmetry: object) -> None:
-    if symmetry not in SYMMETRIES:
-        raise ProblemError(f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {symmetry!r}.")
-
-
 @named_arguments
 @dataclass(frozen=True)
-class FreePath:
+class FreePath(ClassOfGaits):
     """Closed paths of bounded curvature at unit shape speed: |q''| <= curvature in arc length.
 
     Parameters
@@ -59,27 +55,20 @@ class FreePath:
     symmetry: str = NONE
     winding: int | None = None
 
-    free = True
     unit_speed = True
     delta_start = _DELTA_START
-    moves_knots = False
     of_arcs = True
 
     def __post_init__(self) -> None:
         value = self.curvature
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
             raise ProblemError(f"gait.curvature must be a positive finite number, not {value!r}.")
-        _check_symmetry(self.symmetry)
+        self._check_symmetry()
         if self.winding is not None:
             if isinstance(self.winding, bool) or not isinstance(self.winding, (int, np.integer)):
                 raise ProblemError(f"gait.winding must be a whole number, not {self.winding!r}.")
             if self.symmetry == ANTIPODAL and self.winding % 2 == 0:
                 raise ProblemError(f"gait.winding must be odd for an antipodal path, not {self.winding}.")
-
-    @property
-    def fraction(self) -> float:
-        """The part of the period that has to be solved; symmetry gives the rest."""
-        return fraction(self.symmetry)
 
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants, each of which is an arc."""
@@ -97,14 +86,6 @@ class FreePath:
         """The class in words, for reports."""
         turns = "" if self.winding is None else f", winding {self.winding}"
         return f"paths of curvature <= {self.curvature:g} per rad, symmetry {self.symmetry}{turns}"
-
-    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
-        """Intervals that a mesh needs at least, and for what."""
-        return 4, "a path"
-
-    def first_edges(self, edges: np.ndarray) -> np.ndarray:
-        """The mesh from which a finer one is grown: its own, because its arcs are the intervals."""
-        return edges
 
     def laid_on(self, path: ArcPath, edges: np.ndarray) -> ArcPath:
         """A member with every interval of a mesh an arc, or as it is if those are too many."""
@@ -148,7 +129,7 @@ class FreePath:
 
 @named_arguments
 @dataclass(frozen=True)
-class Polygon:
+class Polygon(ClassOfGaits):
     """Closed polygons with a given number of corners, which are free.
 
     Parameters
@@ -174,16 +155,13 @@ class Polygon:
     axis: str = "corner"
     shortest_side: float = 0.02
 
-    free = True
     unit_speed = True
     delta_start = _DELTA_START
-    moves_knots = False
-    of_arcs = False
 
     def __post_init__(self) -> None:
         if isinstance(self.corners, bool) or not isinstance(self.corners, (int, np.integer)) or not 2 <= self.corners <= 64:
             raise ProblemError(f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}.")
-        _check_symmetry(self.symmetry)
+        self._check_symmetry()
         if self.axis not in ("corner", "side"):
             raise ProblemError(f"gait.axis must be 'corner' or 'side', not {self.axis!r}.")
         if self.symmetry == ANTIPODAL and self.corners % 2:
@@ -191,18 +169,9 @@ class Polygon:
         if not isinstance(self.shortest_side, (int, float, np.number)) or not 0 < self.shortest_side < np.pi:
             raise ProblemError(f"gait.shortest_side must lie in (0, pi), not {self.shortest_side!r}.")
 
-    @property
-    def fraction(self) -> float:
-        """The part of the period that has to be solved; symmetry gives the rest."""
-        return fraction(self.symmetry)
-
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: some on every side."""
         return max(24, 4 * self.pieces)
-
-    def coarse_intervals(self, n_joint: int) -> int:
-        """Intervals on which starts are told apart."""
-        return self.intervals(n_joint) // 2
 
     def describe(self) -> str:
         """The class in words, for reports."""
@@ -229,21 +198,9 @@ class Polygon:
         """Intervals that a mesh needs at least, and for what."""
         return 2 * self.pieces, "the sides"
 
-    def first_edges(self, edges: np.ndarray) -> np.ndarray:
-        """The mesh from which a finer one is grown: its own, because corners are knots."""
-        return edges
-
-    def laid_on(self, gait: Corners, edges: np.ndarray) -> Corners:
-        """A member as it is: the mesh does not matter."""
-        return gait
-
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for its gaits."""
         return Harmonic(harmonics, self.symmetry)
-
-    def own_checks(self, gait: Corners) -> list[tuple[str, float, float, str]]:
-        """What a certificate checks of a member beyond what all gaits have to keep."""
-        return []
 
     def size(self, n_joint: int, n_interval: int | None = None) -> int:
         """Number of parameters."""

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.arcs import advance, direction
-from colloc.gaits.gait_function import GaitFunction
+from colloc.gaits.gait import GaitFunction
 from colloc.gaits.symmetry import SYMMETRIES, both_halves, fraction, imaged, reduced
 from colloc.system.errors import ProblemError
 
 _BESIDE = 1e-10
 _FINE_PHASES = 20000
+_MOST_TOLD = 64
+"""Vertices of a polygon that are told one by one."""
 
 
 def _finite(name: str, value: object, ndim: int) -> np.ndarray:
@@ -35,8 +37,41 @@ def _checked_symmetry(symmetry: str) -> None:
         raise ProblemError(f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not {symmetry!r}.")
 
 
+class _UnitSpeed(GaitFunction):
+    """A gait that runs along its path at constant shape speed."""
+
+    length: float
+
+    def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles and rates."""
+        raise NotImplementedError
+
+    @property
+    def delta_unit(self) -> float:
+        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
+        return self.length
+
+    @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
+        return self.length
+
+    @property
+    def shape_speed(self) -> float:
+        """Root-mean-square shape speed, in rad per radian of phase."""
+        return self.length / (2 * np.pi)
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
+        return self._both(t)[0]
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
+        return self._both(t)[1]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class ArcPath(GaitFunction):
+class ArcPath(_UnitSpeed):
     """A closed path of circular arcs that join smoothly.
 
     Parameters
@@ -92,16 +127,6 @@ class ArcPath(GaitFunction):
     def n_joint(self) -> int:
         return self.shapes.shape[0]
 
-    @property
-    def delta_unit(self) -> float:
-        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
-        return self.length
-
-    @property
-    def speed_unit(self) -> float:
-        """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
-        return self.length
-
     def _at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)[k]
@@ -113,19 +138,6 @@ class ArcPath(GaitFunction):
         t0, t1 = self.tangents[:, k], self.tangents[:, k + 1]
         angles = self.shapes[:, k] + self.length * h * advance(t0, t1, tau)
         return imaged(self.symmetry, angles, self.length * direction(t0, t1, tau), image)
-
-    def angles(self, t: np.ndarray) -> np.ndarray:
-        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
-        return self._both(t)[0]
-
-    def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates ``(n_joint, n_time)`` per period at phases t."""
-        return self._both(t)[1]
-
-    @property
-    def shape_speed(self) -> float:
-        """Root-mean-square shape speed, in rad per radian of phase."""
-        return self.length / (2 * np.pi)
 
     @property
     def corner_phases(self) -> np.ndarray:
@@ -174,7 +186,7 @@ class ArcPath(GaitFunction):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Corners(GaitFunction):
+class Corners(_UnitSpeed):
     """A closed polygon.
 
     Parameters
@@ -217,24 +229,9 @@ class Corners(GaitFunction):
         return self.corners.shape[0]
 
     @property
-    def length(self) -> float:
+    def length(self) -> float:  # type: ignore[override]
         """Of the whole closed path [rad]."""
         return float(self._lengths().sum()) / fraction(self.symmetry)
-
-    @property
-    def delta_unit(self) -> float:
-        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
-        return self.length
-
-    @property
-    def speed_unit(self) -> float:
-        """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
-        return self.length
-
-    @property
-    def shape_speed(self) -> float:
-        """Root-mean-square shape speed, in rad per radian of phase."""
-        return self.length / (2 * np.pi)
 
     @property
     def corner_phases(self) -> np.ndarray:
@@ -254,15 +251,10 @@ class Corners(GaitFunction):
         slope = np.diff(vertices) / np.diff(phases)
         return imaged(self.symmetry, vertices[:, k] + slope[:, k] * (phase - phases[k]), slope[:, k], image)
 
-    def angles(self, t: np.ndarray) -> np.ndarray:
-        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
-        return self._both(t)[0]
-
-    def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
-        return self._both(t)[1]
-
     def lines(self, coordinate: str = "joint") -> list[str]:
-        """Length and corners."""
+        """Length and, if they are few, corners."""
+        n = self.corners.shape[1]
+        if n > _MOST_TOLD:
+            return [f"path of length {self.length:.4f} rad, {n} vertices"]
         corners = [f"vertex ({', '.join(f'{a:+.4f}' for a in corner)})" for corner in self.corners.T]
         return [f"path of length {self.length:.4f} rad", *corners]

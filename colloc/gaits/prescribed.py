@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait_function import GaitFunction
+from colloc.gaits.gait import ClassOfGaits, GaitFunction
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves, fraction
+from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves
 from colloc.system.errors import ProblemError
 
 _INTERVALS_A_STAGE = 4
@@ -63,7 +63,7 @@ class Phases(GaitFunction):
 
 
 @dataclass(frozen=True)
-class Prescribed:
+class Prescribed(ClassOfGaits):
     """Nothing is free: a problem of this class asks what a given motion achieves.
 
     Parameters
@@ -77,23 +77,15 @@ class Prescribed:
     stages: tuple[float, ...] = (0.0, 1.0)
     symmetry: str = NONE
 
+    symmetries = (NONE, ANTIPODAL)
     free = False
-    unit_speed = False
-    delta_start = None
-    moves_knots = False
 
     def __post_init__(self) -> None:
         stages = tuple(float(t) for t in self.stages)
         object.__setattr__(self, "stages", stages)
-        if self.symmetry not in (NONE, ANTIPODAL):
-            raise ProblemError(f"gait.symmetry of a prescribed motion must be none or antipodal, not {self.symmetry!r}.")
+        self._check_symmetry()
         if len(stages) < 2 or stages[0] != 0.0 or stages[-1] != self.fraction or min(np.diff(stages)) <= 0:
             raise ProblemError(f"gait.stages must ascend from 0 to {self.fraction:g}, not {stages}.")
-
-    @property
-    def fraction(self) -> float:
-        """The part of the period that has to be solved."""
-        return fraction(self.symmetry)
 
     def intervals(self, n_joint: int) -> int:
         """Intervals of a first mesh: some in every stage."""
@@ -108,10 +100,6 @@ class Prescribed:
         each = max(1, round(n / (len(self.stages) - 1)))
         parts = [np.linspace(a, b, each + 1)[:-1] for a, b in zip(self.stages, self.stages[1:], strict=False)]
         return np.concatenate([*parts, self.stages[-1:]])
-
-    def first_edges(self, edges: np.ndarray) -> np.ndarray:
-        """The mesh from which a finer one is grown."""
-        return edges
 
     def describe(self) -> str:
         """The class in words, for reports."""
@@ -128,7 +116,3 @@ class Prescribed:
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series that stand for its gaits: the circle is one."""
         return Harmonic(1, self.symmetry)
-
-    def own_checks(self, gait: Phases) -> list[tuple[str, float, float, str]]:
-        """What a certificate checks of a member beyond what all gaits have to keep."""
-        return []

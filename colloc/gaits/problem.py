@@ -12,13 +12,13 @@ import numpy as np
 
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.guesses import Limit, checked_limit, travelling_wave, under_one_limit
+from colloc.gaits.guesses import Limit, check_guess, checked_limit, travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.path_classes import FreePath
-from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
+from colloc.mechanics.actuators import ActuatorLimits, checked_actuator_limit
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
@@ -31,14 +31,8 @@ SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 LONGEST_NAME = 200
 """File systems allow 255 bytes, and results of a problem add endings to its name."""
-_AIMS = 3
-"""The last fields say what is asked of a gait: objective, rotation, at_least."""
-_CHECKED_PHASES = 2000
-_SLACK = 1e-6
-"""Depth of a crossing at which a guess still counts as admissible: what a certificate allows."""
-_AT_THE_BOUND = 1e-2
-"""An optimum that lies on the lower bound of the shape speed is a good guess for a richer class, although sampling cuts its
-corners and makes it a little shorter."""
+_AIMS = 5
+"""The last fields say what is asked of a gait, from the objective on; files that know of nothing else leave them out."""
 
 
 @named_arguments
@@ -92,6 +86,9 @@ class Problem:
         symmetry.
     at_least : mapping or pairs of (Objective or str, float)
         Values of a period that must be reached, as ``{"distance": 0.3}``.
+    torque_limit, power_limit : float or sequence of float, optional
+        The most that the joints' actuators can do, all or each: magnitude of the moment [weight x body length], power
+        delivered [weight x body length / period]. With a power limit the pace matters.
 
     Examples
     --------
@@ -124,6 +121,8 @@ class Problem:
     objective: Objective = EFFICIENCY
     rotation: float | None = 0.0
     at_least: tuple[tuple[Objective, float], ...] = ()
+    torque_limit: Limit | None = None
+    power_limit: Limit | None = None
 
     def __post_init__(self) -> None:
         self._check_body()
@@ -136,13 +135,14 @@ class Problem:
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
         self._check_aims()
+        self._check_actuators()
         if self.guess is None:
             free = self.gait.free
             self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
         if not isinstance(self.guess, gait_fields.GAITS):
             raise ProblemError(f"guess must be a {_names(gait_fields.GAITS)}, not {type(self.guess).__name__}.")
         self._check_symmetry()
-        self._check_guess()
+        check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
     def _fill(self, **usual: object) -> None:
         """Put values where none are given."""
@@ -208,10 +208,36 @@ class Problem:
             raise ProblemError(
                 f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class without symmetry."
             )
-        if self.uses("driven_work") and self.formulation != FULL:
-            raise ProblemError(f"driven_work needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
         if not self.gait.free and (self.objective != EFFICIENCY or self.at_least):
             raise ProblemError("nothing is free in a prescribed motion; leave objective and at_least out.")
+
+    def _check_actuators(self) -> None:
+        for name in ("torque_limit", "power_limit"):
+            object.__setattr__(self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint))
+        limits = self.actuator_limits
+        asks = "driven_work" if self.uses("driven_work") else "a limit on actuators" if limits.names else ""
+        if asks and self.formulation != FULL:
+            raise ProblemError(f"{asks} needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
+        if limits.names and self.gait.mixes:
+            raise ProblemError(
+                "a relaxed gait moves in several directions at once, which no actuator does: leave its limits out."
+            )
+
+    @property
+    def actuator_limits(self) -> ActuatorLimits:
+        """What the actuators can do, joint by joint."""
+        each = (
+            () if limit is None else np.broadcast_to(limit, self.body.n_joint)
+            for limit in (self.torque_limit, self.power_limit)
+        )
+        return ActuatorLimits(*(tuple(float(value) for value in limit) for limit in each))
+
+    @property
+    def paced_by(self) -> str:
+        """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
+        if self.power_limit is not None:
+            return "the joints' power is limited"
+        return "" if rate_independent(self.friction) else f"work depends on the pace under {self.friction.label}"
 
     @property
     def aims(self) -> tuple[Objective, ...]:
@@ -240,51 +266,22 @@ class Problem:
                 f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
                 f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."
             )
-        if BILATERAL in needed and np.ndim(self.joint_limit) and self.joint_limit != self.joint_limit[::-1]:  # type: ignore[index]
-            raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same joint_limit.")
+        for name in ("joint_limit", "torque_limit", "power_limit"):
+            limit = getattr(self, name)
+            if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
+                raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same {name}.")
         if self.gait.unit_speed and self.body.n_joint < 2:
             raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
         if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
             raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
-        if self.gait.unit_speed and not rate_independent(self.friction):
+        if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
-            raise ProblemError(f"{what}, but under {self.friction.label} the work depends on it; use Harmonic (period 1).")
+            raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
         if self.body.n_joint == 1 and self.friction.reversible:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
                 "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
             )
-
-    def _check_guess(self) -> None:
-        if self.guess.n_joint != self.body.n_joint:
-            raise ProblemError(f"guess has {self.guess.n_joint} {self.body.coordinate}s but the body has {self.body.n_joint}.")
-        if isinstance(self.gait, Harmonic):
-            near = fourier_through(self.guess, self.gait)
-            guess: AnyGait = self.gait.fourier(self.gait.parameters(near), self.body.n_joint)
-            rms = guess.shape_speed
-        else:
-            guess = self.guess
-            points = symmetric_samples(guess, self.gait.symmetry)
-            rms = np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.gait.fraction)
-        if rms < self.smallest_shape_speed * (1 - _AT_THE_BOUND):
-            raise ProblemError(
-                f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
-                f"{self.smallest_shape_speed:g}); does it have the symmetry {self.gait.symmetry!r} of its class?"
-            )
-        angles = guess.angles(np.arange(_CHECKED_PHASES) / _CHECKED_PHASES)
-        stretched, limit = under_one_limit(angles, self.joint_limit)
-        largest = self.body.largest_angles(stretched).max()
-        if largest > limit + self.body.usual.excess:
-            each = np.abs(self.body.limited @ stretched).max(axis=1, initial=0.0)
-            which = self.body.limit_names[np.argmax(each)] if each.size else "the tangent"
-            beyond = f"{which} reaches {largest:.4g} rad, beyond the limit {limit:.4g}"
-            raise ProblemError(f"guess is inadmissible: {beyond}; make its amplitude smaller.")
-        depth = self.body.crossing_depth(angles)
-        if depth.max() > _SLACK:
-            when = np.argmax(depth) / _CHECKED_PHASES
-            if self.body.drawn_width:
-                raise ProblemError(f"guess is inadmissible: links overlap at phase {when:.3f}.")
-            raise ProblemError(f"guess is inadmissible: links cross each other at phase {when:.3f}.")
 
     def __repr__(self) -> str:
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
@@ -303,7 +300,6 @@ class Problem:
         for name in ("guess", "gait", "body"):
             stated[name] = gait_fields.fields(stated[name])
         stated["friction"] = gait_fields.law_fields(self.friction)
-        # what is as usual is left out, as files that know of nothing else leave it out
         usual = [f.name for f in dataclasses.fields(self)[-_AIMS:] if stated[f.name] == f.default]
         stated |= {"objective": self.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in self.at_least]}
         return {name: value for name, value in stated.items() if name not in usual}

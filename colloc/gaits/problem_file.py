@@ -37,6 +37,11 @@ class Reference:
     tolerance: float
     source: str
 
+    def verdict(self, efficiency: float) -> str:
+        """Whether an efficiency agrees with it, in words."""
+        verb = "agrees with" if abs(efficiency - self.efficiency) <= self.tolerance else "DIFFERS from"
+        return f"{verb} {self.efficiency:g} +- {self.tolerance:g} ({self.source})"
+
 
 @dataclass(frozen=True)
 class ProblemFile:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.symmetry import BILATERAL, BOTH, SYMMETRIES, fraction
+from colloc.gaits.paths import Corners
+from colloc.gaits.symmetry import BILATERAL, BOTH, NONE, SYMMETRIES
 from colloc.system.errors import ProblemError
 
 _PIECES, _PARAMETERS = 240, 400
@@ -15,7 +17,7 @@ _PIECES, _PARAMETERS = 240, 400
 
 
 @dataclass(frozen=True)
-class Relaxed:
+class Relaxed(ClassOfGaits):
     """Relaxed gaits: at each instant a mixture of a few directions of joint rates, constant on every piece of the period.
 
     Parameters
@@ -34,11 +36,10 @@ class Relaxed:
     directions: int = 3
     symmetry: str = BOTH
 
-    free = True
+    symmetries = (*SYMMETRIES, BOTH)
     unit_speed = True
+    mixes = True
     delta_start = 0.01
-    moves_knots = False
-    of_arcs = False
 
     def __post_init__(self) -> None:
         if (
@@ -47,13 +48,7 @@ class Relaxed:
             or not 1 <= self.directions <= 9
         ):
             raise ProblemError(f"gait.directions must be a whole number from 1 to 9, not {self.directions!r}.")
-        if self.symmetry not in (*SYMMETRIES, BOTH):
-            raise ProblemError(f"gait.symmetry must be one of {', '.join((*SYMMETRIES, BOTH))}, not {self.symmetry!r}.")
-
-    @property
-    def fraction(self) -> float:
-        """The part of the period that has to be solved; symmetry gives the rest."""
-        return fraction(self.symmetry)
+        self._check_symmetry()
 
     def intervals(self, n_joint: int) -> int:
         """Pieces of the part that is solved."""
@@ -64,10 +59,22 @@ class Relaxed:
         """The class in words, for reports."""
         return f"relaxed gaits that mix {self.directions} directions, symmetry {self.symmetry}"
 
-    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
-        """Pieces that a mesh needs at least, and for what."""
-        return 4, "a path"
-
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for the mean shapes of its gaits."""
-        return Harmonic(harmonics, BILATERAL if self.symmetry == BOTH else self.symmetry)
+        return Harmonic(harmonics, self.finite.symmetry)
+
+    # finite gaits that come near: polygons
+    @property
+    def finite(self) -> Relaxed:
+        """The class in the symmetry of its finite gaits: one that has both is kept as a bilateral half."""
+        return replace(self, symmetry=BILATERAL) if self.symmetry == BOTH else self
+
+    def size(self, n_joint: int, n_interval: int) -> int:
+        """Number of parameters of a polygon of so many straight pieces: its vertices."""
+        return n_joint * (n_interval + 1)
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> Corners:
+        """The polygon of a parameter vector; its phases follow from its sides."""
+        vertices = parameters.reshape(-1, n_joint).T
+        symmetry = self.finite.symmetry
+        return Corners(vertices[:, :-1] if symmetry == NONE else vertices, symmetry)

@@ -14,10 +14,11 @@ panels that meet at y = 0, or at the end nearest to it: a law may have a kink th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.laws.c_formula import own_law_header
 from colloc.mechanics.law import Law, Matrix
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
@@ -79,7 +80,21 @@ def _gathered(values: Array) -> Array:
 class ByQuadrature:
     """What a law says of links, from what it says of a point."""
 
-    kernel_numbers: ClassVar[tuple[float, ...]] = ()
+    @property
+    def formulas(self) -> tuple[str, ...]:
+        """Force along and across, and the potential if there is one, which the law's `unit` divides; velocities are multiplied
+        by its `speed_unit` before."""
+        raise NotImplementedError
+
+    @property
+    def kernel_source(self) -> str:
+        return own_law_header(*self.formulas)
+
+    @property
+    def kernel_numbers(self: Any) -> tuple[float, ...]:
+        """Largest force, degree, units of force and speed, and whether there is a potential, and a reversal."""
+        degree = np.nan if self.degree is None else self.degree
+        return self.largest, degree, self.unit, self.speed_unit, float(self.associated), float(self.reversible)
 
     def link_force(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
         tangential = normal = couple = 0.0 * (vs + vn + w)

@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.laws.expression import Dual, differentiated, evaluated, parsed
 from colloc.laws.link_quadrature import ByQuadrature
 from colloc.mechanics.friction import check_positive, regularised_speed
 from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
+from colloc.numerics.expression import Dual, Formula, formula
 from colloc.system.argument_names import named_arguments
 from colloc.system.errors import ProblemError
 
@@ -94,9 +94,13 @@ class OwnLaw(ByQuadrature):
             if jump.max() > _JUMP:
                 raise ProblemError(f"friction: the force jumps where {what} changes its sign; let it vanish or agree there.")
 
-    @cached_property
-    def _codes(self):
-        return tuple(parsed(text, VARIABLES) for text in (self.tangential, self.normal))
+    @property
+    def formulas(self) -> tuple[str, ...]:
+        return self.tangential, self.normal
+
+    @property
+    def _read(self) -> tuple[Formula, ...]:
+        return tuple(formula(text, VARIABLES) for text in self.formulas)
 
     @cached_property
     def degree(self) -> float | None:
@@ -114,7 +118,7 @@ class OwnLaw(ByQuadrature):
 
     @cached_property
     def regularised(self) -> bool:
-        return any(name in code.co_names for code in self._codes for name in ("speed", "delta"))
+        return any(name in each.names for each in self._read for name in ("speed", "delta"))
 
     @cached_property
     def _at_unit_speed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -147,7 +151,7 @@ class OwnLaw(ByQuadrature):
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta + 0.0 * vs))
         at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta}
-        fs, fn = (evaluated(code, at) / self.unit for code in self._codes)
+        fs, fn = (each(at) / self.unit for each in self._read)
         return fs, fn
 
     def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
@@ -160,7 +164,7 @@ class OwnLaw(ByQuadrature):
             "speed": Dual(r, (vs / r, vn / r)),
             "delta": Dual(delta + zero, (zero, zero)),
         }
-        rows = [differentiated(code, at).slopes for code in self._codes]
+        rows = [each.differentiated(at).slopes for each in self._read]
         return tuple(tuple(zero - self.speed_unit / self.unit * slope for slope in row) for row in rows)
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:

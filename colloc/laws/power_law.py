@@ -56,6 +56,21 @@ class PowerLaw(Coefficients, ByQuadrature):
         return self.power != 1
 
     @property
+    def unit(self) -> float:
+        """Of the compiled kernel, which is one for all laws whose coefficients have the same ratios."""
+        return 1.0 / self.mu_t
+
+    speed_unit = 1.0
+
+    @property
+    def formulas(self) -> tuple[str, ...]:
+        forward, backward = (f"{mu / self.mu_t:.14g}" for mu in (self.mu_f, self.mu_b))
+        growth = f"speed ** {self.power - 1.0!r}"
+        along = forward if self.reversible else f"where(vs > 0, {forward}, {backward})"
+        potential = (f"speed ** {self.power + 1.0!r} / {self.power + 1.0!r}",) if self.associated else ()
+        return f"-{along} * vs * {growth}", f"-vn * {growth}", *potential
+
+    @property
     def label(self) -> str:
         return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g}) x speed^{self.power:g}"
 

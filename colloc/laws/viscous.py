@@ -44,6 +44,7 @@ class Viscous:
     reversible = associated = True
     regularised = False
     kernel_numbers: ClassVar[tuple[float, ...]] = ()
+    kernel_source = ""
 
     def __post_init__(self) -> None:
         check_positive(self, "normal", "tangential")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.law import Law
+from colloc.mechanics.law import Law, Matrix
 from colloc.mechanics.link_friction import LinkForce, power
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
@@ -36,7 +36,19 @@ def instant(
     """Posture, link velocities and friction for joint angles, joint rates ``(n_joint, n_time)`` and z ``(3, n_time)``."""
     posture = body.posture(angles, reference)
     velocity = body.velocity(posture, rates, z, reference)
-    return Instant(posture, velocity, friction.link_force(*velocity, body.length_column(), delta))
+    own, pressure = friction.link_force(*velocity, body.length_column(), delta), body.pressure_column()
+    return Instant(posture, velocity, LinkForce(*(pressure * part for part in own)))
+
+
+def link_stiffness(body: Links, friction: Law, velocity: LinkVelocity, delta: Array) -> Matrix:
+    """Minus the derivative of the friction on the links with respect to (vs, vn, w), 3 x 3 of ``(n_link, n_time)``."""
+    pressure = body.pressure_column()
+    return tuple(tuple(pressure * a for a in row) for row in friction.link_jacobian(*velocity, body.length_column(), delta))
+
+
+def dissipation_potential(body: Links, friction: Law, velocity: LinkVelocity, delta: Array) -> np.ndarray:
+    """The function of z whose gradient is minus `net_force`, ``(n_time,)``; of associated laws only."""
+    return (body.pressure_column() * friction.link_potential(*velocity, body.length_column(), delta)).sum(axis=0)
 
 
 def net_force(posture: Posture, force: LinkForce) -> Array:
@@ -53,7 +65,7 @@ def total_power(velocity: LinkVelocity, force: LinkForce) -> Array:
     return namespace(velocity.vs, force.normal).sum_rows(power(*velocity, force))
 
 
-def _pulled_back(posture: Posture, blocks: tuple[tuple[Array, Array, Array], ...]) -> np.ndarray:
+def _pulled_back(posture: Posture, blocks: Matrix) -> np.ndarray:
     """``sum over links of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn, w)/dz and K the given 3 x 3 of link arrays."""
     c, s, x, y = posture
     arm_s, arm_n = x * s - y * c, x * c + y * s
@@ -72,7 +84,7 @@ def balance_jacobian(body: Links, friction: Law, posture: Posture, velocity: Lin
 
     Symmetric positive definite for an associated law: the Hessian of the dissipation potential.
     """
-    return _pulled_back(posture, friction.link_jacobian(*velocity, body.length_column(), delta))
+    return _pulled_back(posture, link_stiffness(body, friction, velocity, delta))
 
 
 def secant_matrix(body: Links, friction: Law, posture: Posture, velocity: LinkVelocity, delta: Array) -> np.ndarray:
@@ -80,4 +92,5 @@ def secant_matrix(body: Links, friction: Law, posture: Posture, velocity: LinkVe
 
     One step of the paper's fixed point (eqs. ftbtilde to deltatilde) is ``z + A(z)^-1 net_force(z)``.
     """
-    return _pulled_back(posture, friction.link_secant(*velocity, body.length_column(), delta))
+    secant, pressure = friction.link_secant(*velocity, body.length_column(), delta), body.pressure_column()
+    return _pulled_back(posture, tuple(tuple(pressure * a for a in row) for row in secant))

@@ -51,6 +51,9 @@ class Chain(Links):
     width : float
         Of every link [body lengths]: links do not overlap but neighbours about their joint (`colloc.mechanics.width`). By
         default links are lines, which must not cross but may lie on each other. Friction is that of the lines either way.
+    weights : tuple of float
+        Of the links from tail to head, in parts of the body's weight, 1; by default in proportion to their lengths. What a
+        law says of a length is multiplied by the weight per length there, so drag of a fluid goes with the default only.
 
     Examples
     --------
@@ -87,7 +90,9 @@ class Chain(Links):
 
     def describe(self) -> str:
         wide = f", {self.width:.4g} wide" if self.width else ""
-        return f"links of lengths {', '.join(f'{length:.4g}' for length in self.lengths)} from the tail{wide} [body lengths]"
+        heavy = f", of weights {', '.join(f'{weight:.4g}' for weight in self.weights)}" if self.weights else ""
+        lengths = ", ".join(f"{length:.4g}" for length in self.lengths)
+        return f"links of lengths {lengths} from the tail{wide} [body lengths]{heavy}"
 
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         now = instant(self, friction, angles, rates, z, delta)
@@ -96,10 +101,10 @@ class Chain(Links):
 
     def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
         """Laws of the links, scaled like velocities (see `colloc.mechanics.law.Law.scaled_laws`)."""
-        n, posture, length = self.n_link, self.posture(angles), self.length_column()
+        n, posture, length, pressure = self.n_link, self.posture(angles), self.length_column(), self.pressure_column()
         velocity = self.velocity(posture, rates, z)
         force = LinkForce(forces[:n, :], forces[n : 2 * n, :], forces[2 * n :, :])
-        laws = friction.scaled_laws(*velocity, length, delta, force)
+        laws = friction.scaled_laws(*velocity, length, delta, LinkForce(*(part / pressure for part in force)))
         stack = namespace(angles, z, forces).stack
         centre = stack(list(self.centre_velocity(posture, velocity)))
         return Lifted(stack(laws), net_force(posture, force), centre, total_power(velocity, force))
@@ -108,7 +113,7 @@ class Chain(Links):
         return namespace(angles, rates, z).stack(list(instant(self, friction, angles, rates, z, delta).force))
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        return friction.largest_link_forces(self.length_column())
+        return friction.largest_link_forces(self.length_column()) * np.tile(self.pressure_column(), (3, 1))
 
     def solve(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
@@ -202,7 +207,8 @@ class Chain(Links):
         places, forces = [], []
         for share in (np.arange(many) + 0.5) / many - 0.5:
             along = share * self.length_column()
-            fs, fn = friction.density(velocity.vs, velocity.vn + along * velocity.w, delta)
+            own = friction.density(velocity.vs, velocity.vn + along * velocity.w, delta)
+            fs, fn = (self.pressure_column() * part for part in own)
             places.append([posture.x + along * posture.cos, posture.y + along * posture.sin])
             forces.append([fs * posture.cos - fn * posture.sin, fs * posture.sin + fn * posture.cos])
         return np.concatenate(places, axis=1), np.concatenate(forces, axis=1)

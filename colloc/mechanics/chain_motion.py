@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from colloc.mechanics.balance import balance_jacobian, instant, total_power
+from colloc.mechanics.balance import balance_jacobian, instant, link_stiffness, total_power
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
 from colloc.mechanics.compiled_balance import motion
 from colloc.mechanics.implicit_slopes import implicit_changes
@@ -106,12 +106,12 @@ def _slopes(
         now.posture,
         now.velocity,
         now.force,
-        friction.link_jacobian(*now.velocity, body.length_column(), delta),
+        link_stiffness(body, friction, now.velocity, np.full((1, n_time), delta)),
         balance_jacobian(body, friction, now.posture, now.velocity, np.full((1, n_time), delta)),
         lambda a: np.einsum("ik,kjt->ijt", path, a),
         dphi,
         dw,
     )
-    length = body.length_column()[:, :, None]
+    weight = body.weight_column()[:, :, None]
     tail = (d.vs[0], d.vn[0] - 0.5 * body.lengths[0] * d.w[0], d.w[0])
-    return np.stack([*tail, (length * d.vx).sum(axis=0), (length * d.vy).sum(axis=0), d.power])
+    return np.stack([*tail, (weight * d.vx).sum(axis=0), (weight * d.vy).sum(axis=0), d.power])

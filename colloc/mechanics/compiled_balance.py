@@ -12,9 +12,9 @@ from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import address, each_piece
 
 
-def body_arguments(body: Links, friction: Law) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths and numbers of the law as the kernel takes them."""
-    return np.array(body.lengths), np.array(friction.kernel_numbers, dtype=float)
+def body_arguments(body: Links, friction: Law) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lengths, pressures and numbers of the law as the kernel takes them."""
+    return np.array(body.lengths), body.pressure_column().ravel(), np.array(friction.kernel_numbers, dtype=float)
 
 
 def balance(
@@ -31,12 +31,12 @@ def balance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3, n_time)``."""
     n_time = angles.shape[1]
-    lengths, coefficients = body_arguments(body, friction)
+    chain = body_arguments(body, friction)
     angles, rates = np.ascontiguousarray(angles), np.ascontiguousarray(rates)
     start = None if start is None else np.ascontiguousarray(start)
     z, anchor_velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
     iterations, anchor = np.empty(n_time, dtype=np.int64), np.empty(n_time, dtype=np.int64)
-    before = (body.n_link, address(lengths), address(coefficients), n_time)
+    before = (body.n_link, *map(address, chain), n_time)
     after = (
         *map(address, (angles, rates)),
         delta,
@@ -67,12 +67,12 @@ def motion(
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, 2 n_joint, n_time)``."""
     n_time = angles.shape[1]
-    lengths, coefficients = body_arguments(body, friction)
+    chain = body_arguments(body, friction)
     given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity)]
     anchor = np.ascontiguousarray(anchor, dtype=np.int64)
     values = np.empty((_ROWS, n_time))
     slopes = np.empty((_DIFFERENTIATED_ROWS, 2 * body.n_joint, n_time)) if with_slopes else None
-    before = (body.n_link, address(lengths), address(coefficients), n_time)
+    before = (body.n_link, *map(address, chain), n_time)
     after = (*map(address, given[:2]), delta, *map(address, (anchor, given[2], values, slopes)))
     each_piece(n_time, lambda first, last: library.colloc_motion(*before, first, last, *after))
     return values, slopes
@@ -91,12 +91,12 @@ def loaded(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The fields of `colloc.bounds.loaded_balance.Loaded`."""
     n_time = angles.shape[1]
-    lengths, coefficients = body_arguments(body, friction)
+    chain = body_arguments(body, friction)
     given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, load, start)]
     velocity, potential, power = np.empty((3, n_time)), np.empty(n_time), np.empty(n_time)
     forces, residual, leftover_power = np.empty((body.n_link, 3, n_time)), np.empty((2, n_time)), np.empty(n_time)
     found = velocity, potential, power, forces, residual, leftover_power
-    before = (body.n_link, address(lengths), address(coefficients), n_time)
+    before = (body.n_link, *map(address, chain), n_time)
     after = (*map(address, given), delta, steps, *map(address, found))
     each_piece(n_time, lambda first, last: library.colloc_loaded(*before, first, last, *after))
     return found

@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from colloc.mechanics.balance import Instant, balance_jacobian, instant, net_force, secant_matrix
+from colloc.mechanics.balance import Instant, balance_jacobian, dissipation_potential, instant, net_force, secant_matrix
 from colloc.mechanics.bodies import BalanceSolution
 from colloc.mechanics.compiled_balance import balance
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
@@ -46,7 +46,7 @@ class _Batch:
         now = self.at(select, z, delta)
         force = net_force(now.posture, now.force)
         if self.friction.associated:
-            merit = self.friction.link_potential(*now.velocity, self.body.length_column(), delta).sum(axis=0)
+            merit = dissipation_potential(self.body, self.friction, now.velocity, delta)
         else:
             merit = 0.5 * np.sum(force * force, axis=0)
         return np.stack([*now.posture, *now.velocity]), force, merit

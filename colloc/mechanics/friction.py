@@ -85,6 +85,7 @@ class Friction(Coefficients):
 
     degree = 0.0
     regularised = True
+    kernel_source = ""
 
     def __post_init__(self) -> None:
         check_positive(self, "mu_t", "mu_f", "mu_b")

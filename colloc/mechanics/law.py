@@ -101,6 +101,10 @@ class Law(Protocol):
     def kernel_numbers(self) -> tuple[float, ...]:
         """The law as the compiled kernel takes it; empty where it does not know the law."""
 
+    @property
+    def kernel_source(self) -> str:
+        """C that the kernel is compiled with (own_law.h); empty where it has the law in closed form."""
+
 
 def rate_independent(law: Law) -> bool:
     """The force does not depend on the speed: distance and work belong to the path, and its pacing is a gauge."""

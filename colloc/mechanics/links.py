@@ -48,10 +48,13 @@ class Links:
         Link lengths from tail to head; they add up to the body length, 1.
     width : float
         Of every link [body lengths], see `colloc.mechanics.width`; by default links are lines.
+    weights : tuple of float
+        Of the links, in parts of the body's; by default the body is as heavy everywhere.
     """
 
     lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)
     width: float = field(default=0.0, metadata=STATED_IF_SET)
+    weights: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
         try:
@@ -69,6 +72,22 @@ class Links:
         if isinstance(width, bool) or not isinstance(width, (int, float, np.number)) or not 0 <= width < min(lengths):
             raise ProblemError(f"body.width must be a number from 0 to below the shortest link, not {width!r}.")
         object.__setattr__(self, "width", float(width))
+        object.__setattr__(self, "weights", self._checked_weights())
+
+    def _checked_weights(self) -> tuple[float, ...]:
+        try:
+            weights = tuple(float(value) for value in self.weights)
+        except (TypeError, ValueError):
+            raise ProblemError(f"body.weights must be a sequence of numbers, not {self.weights!r}.") from None
+        if not weights:
+            return ()
+        if len(weights) != self.n_link:
+            raise ProblemError(f"body.weights has {len(weights)} values; give one for each of the {self.n_link} links.")
+        if not all(np.isfinite(weights)) or min(weights) <= 0:
+            raise ProblemError(f"body.weights must be positive and finite, not {weights}.")
+        if abs(sum(weights) - 1.0) > 1e-12:
+            raise ProblemError(f"body.weights must add up to the body's weight 1, not {sum(weights):.12g}.")
+        return weights
 
     @property
     def in_series(self) -> bool:
@@ -85,12 +104,20 @@ class Links:
 
     @property
     def symmetric(self) -> bool:
-        """The lengths read the same from both ends."""
-        return bool(np.allclose(self.lengths, self.lengths[::-1], rtol=0, atol=1e-14))
+        """Lengths and weights read the same from both ends."""
+        return all(np.allclose(own, own[::-1], rtol=0, atol=1e-14) for own in (self.lengths, self.weights))
 
     def length_column(self) -> np.ndarray:
         """Lengths as an ``(n_link, 1)`` column."""
         return np.array(self.lengths)[:, None]
+
+    def pressure_column(self) -> np.ndarray:
+        """Weight per length of the links, over that of a body which is as heavy everywhere, ``(n_link, 1)``."""
+        return np.array(self.weights)[:, None] / self.length_column() if self.weights else np.ones((self.n_link, 1))
+
+    def weight_column(self) -> np.ndarray:
+        """Weights as an ``(n_link, 1)`` column."""
+        return np.array(self.weights or self.lengths)[:, None]
 
     def _joint_sum(self, reference: int | None) -> np.ndarray:
         """``(n_link, n_joint)``: joint quantities to link angles, relative to the reference link (the tail link: 0)."""
@@ -139,16 +166,16 @@ class Links:
     def centre_of_mass(self, posture: Posture) -> tuple[Array, Array]:
         """Centre of mass relative to the reference, two ``(1, n_time)`` rows."""
         xp = namespace(posture.x)
-        length = self.length_column()
-        return xp.sum_rows(length * posture.x), xp.sum_rows(length * posture.y)
+        weight = self.weight_column()
+        return xp.sum_rows(weight * posture.x), xp.sum_rows(weight * posture.y)
 
     def centre_velocity(self, posture: Posture, link: LinkVelocity) -> tuple[Array, Array]:
         """Velocity of the centre of mass in body-frame axes, two ``(1, n_time)`` rows."""
         xp = namespace(link.vs)
-        length = self.length_column()
+        weight = self.weight_column()
         return (
-            xp.sum_rows(length * (link.vs * posture.cos - link.vn * posture.sin)),
-            xp.sum_rows(length * (link.vs * posture.sin + link.vn * posture.cos)),
+            xp.sum_rows(weight * (link.vs * posture.cos - link.vn * posture.sin)),
+            xp.sum_rows(weight * (link.vs * posture.sin + link.vn * posture.cos)),
         )
 
     def joints(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

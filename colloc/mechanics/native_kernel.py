@@ -42,7 +42,7 @@ _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
 
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
-_BODY = (ctypes.c_int, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
+_BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_loaded": (*_BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
@@ -57,7 +57,8 @@ _switched_off = False
 
 def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
-    return library() if body.in_series and friction.kernel_numbers and not _switched_off else None
+    known = body.in_series and friction.kernel_numbers and not _switched_off
+    return library(friction.kernel_source) if known else None
 
 
 @contextlib.contextmanager
@@ -72,25 +73,25 @@ def numpy_instead() -> Iterator[None]:
 
 
 @cache
-def library() -> ctypes.CDLL | None:
-    """The kernel, loaded, and compiled before if need be; None if that cannot be."""
+def library(own_law: str = "") -> ctypes.CDLL | None:
+    """The kernel, loaded, and compiled before if need be, by itself or with a law's own C; None if that cannot be."""
     folder = cache_folder()
     if folder is None:
         return None
     try:
         with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
-            name = f"kernel-{_fingerprint(sources)}"
+            name = f"kernel-{_fingerprint(sources, own_law)}"
             own = (found for found in folder.glob(f"{name}-*.so") if is_private(found))
             whole = (found for found in own if found.stem.endswith(_digest(found)))
-            file = next(whole, None) or _compiled(sources, folder, name)
+            file = next(whole, None) or _compiled(sources, own_law, folder, name)
             return None if file is None else _loaded(file)
     except (OSError, StoreError):
         return None
 
 
-def _fingerprint(sources: Path) -> str:
+def _fingerprint(sources: Path, own_law: str) -> str:
     """Of everything that the library is made of."""
-    content = hashlib.sha256(" ".join((*_FLAGS, sys.platform, platform.machine())).encode())
+    content = hashlib.sha256(" ".join((*_FLAGS, sys.platform, platform.machine(), own_law)).encode())
     for source in sorted(sources.glob("*.[ch]")):
         content.update(source.read_bytes())
     return content.hexdigest()[:32]
@@ -101,14 +102,18 @@ def _digest(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
 
 
-def _compiled(sources: Path, folder: Path, name: str) -> Path | None:
+def _compiled(sources: Path, own_law: str, folder: Path, name: str) -> Path | None:
     """The library, put in the folder; None without a compiler, or where nothing can be kept."""
     make_private(folder)
     if c_compiler() is None or not os.access(folder, os.W_OK):
         return None
     with tempfile.TemporaryDirectory(prefix="colloc-") as scratch:
         made = Path(scratch) / "kernel.so"
-        compile_library(sources / _MAIN, _FLAGS, made)
+        flags = [*_FLAGS]
+        if own_law:
+            (Path(scratch) / "own_law.h").write_text(own_law, encoding="ascii")
+            flags += ["-DOWN_LAW", f"-I{scratch}", f"-I{sources}"]
+        compile_library(sources / _MAIN, flags, made)
         file = folder / f"{name}-{_digest(made)}.so"
         make_private(folder)
         with replaced_file(file) as unfinished:

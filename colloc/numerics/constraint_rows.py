@@ -34,7 +34,13 @@ def selector(columns: np.ndarray, n: int) -> sparse.csr_matrix:
 
 def stacked(groups: list[Group], block: str, n_source: int) -> sparse.csr_matrix:
     """The scatter matrix of a block with `n_source` outputs into all rows."""
-    return sparse.vstack([g.parts.get(block, sparse.csr_matrix((g.m, n_source))) for g in groups]).tocsr()
+    # a body with many checks has a group and a block for each: most parts are empty, and no matrix is made for those
+    parts = [g.parts.get(block) for g in groups]
+    counts = [np.zeros(g.m, dtype=int) if part is None else np.diff(part.indptr) for g, part in zip(groups, parts, strict=True)]
+    there = [part for part in parts if part is not None]
+    data, columns = (np.concatenate([getattr(part, name) for part in there]) for name in ("data", "indices"))
+    ends = np.concatenate([[0], np.cumsum(np.concatenate(counts))])
+    return sparse.csr_matrix((data, columns, ends), shape=(ends.size - 1, n_source))
 
 
 def equalities(name: str, linear: sparse.spmatrix, parts: dict[str, sparse.csr_matrix] | None = None) -> Group:

@@ -12,16 +12,13 @@ from matplotlib.figure import Figure
 from colloc.pictures.figure import draw_shape_path
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
-from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
 
 _ARROW = 0.12
 """Length [body lengths] of the arrow of the largest friction."""
 
 
-def pictures(
-    solution: Solution | RelaxedSolution, count: int, periods: int, *, arrows: bool = True, width: int = 900
-) -> Iterator[np.ndarray]:
+def pictures(solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900) -> Iterator[np.ndarray]:
     """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes.
 
     Parameters
@@ -47,7 +44,7 @@ def pictures(
 class _Scene:
     """A figure whose artists move."""
 
-    def __init__(self, solution: Solution | RelaxedSolution, shown: Frames, arrows: bool, width: int) -> None:
+    def __init__(self, solution: Solution, shown: Frames, arrows: bool, width: int) -> None:
         self.shown, self.hinges = shown, solution.problem.body.hinges
         low, high = _window(shown)
         planar = solution.problem.gait.free and solution.problem.body.n_joint >= 2

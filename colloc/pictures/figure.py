@@ -1,4 +1,4 @@
-"""Panels about a solution, and the figure of them all. Titles are left to who places a panel."""
+"""Panels about a solution. Titles are left to who places a panel."""
 
 from __future__ import annotations
 
@@ -8,16 +8,14 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from colloc.gaits.guesses import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import lab_outline
-from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, Picture, snapshot_colours, styled
-from colloc.results.relaxed_solution import RelaxedSolution
-from colloc.results.solution import SOLVED, Solution
+from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours
+from colloc.results.solution import Solution
 
 _GAP, _NARROWEST, _MARGIN = 0.2, 0.3, 0.08
 """Between snapshots, the room for the words below one, and above and below [body lengths]."""
@@ -31,7 +29,7 @@ _ROUND = 9
 _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def draw_filmstrip(axes: Axes, solution: Solution | RelaxedSolution, count: int = 11) -> None:
+def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     """The body at equal steps of a period, side by side and apart; below, the phase and how far its centre has come."""
     t = np.linspace(0.0, 1.0, count)
     motion = solution.sample(t)
@@ -85,7 +83,7 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body
     axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
 
 
-def draw_lab(axes: Axes, solution: Solution | RelaxedSolution) -> None:
+def draw_lab(axes: Axes, solution: Solution) -> None:
     """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of them, apart.
 
     As many periods as it takes for the body to leave the place where it began, and one body if that takes too many.
@@ -219,49 +217,3 @@ def _key(axes: Axes, of: str = "") -> None:
         handles, labels, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(labels), fontsize=7, handlelength=1,
         columnspacing=0.8, handletextpad=0.3, borderpad=0, borderaxespad=0.3,
     )  # fmt: skip
-
-
-def _headline(solution: Solution) -> str:
-    problem = solution.problem
-    verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
-    return (
-        f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}   "
-        f"{problem.friction.label},  δ = {solution.last.delta:.0e}{verdict}\n"
-        f"class: {problem.gait.describe()}"
-    )
-
-
-def solution_figure(solution: Solution) -> Figure:
-    """Filmstrip, lab paths, joint angles, speeds and power of a solution."""
-    t = np.linspace(0.0, 1.0, 1201)
-    angles = solution.gait.angles(t)
-    with styled():
-        figure = Picture(figsize=(11, 8.2))
-        figure.set_layout_engine("none")  # the places are known
-        colour = INK if solution.status == SOLVED else VERMILION
-        figure.text(0.015, 0.985, _headline(solution), fontsize=11, va="top", color=colour)
-        strip = figure.add_axes((0.015, 0.76, 0.97, 0.135))
-        draw_filmstrip(strip, solution)
-        figure.text(0.015, 0.905, "one period, frame by frame: phase, and below it how far the centre has come (disc: head)")
-        grid = figure.add_gridspec(
-            2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33, width_ratios=(2, 1),
-            height_ratios=(1.35, 1),
-        )  # fmt: skip
-        lab, plane, speeds, power = (figure.add_subplot(grid[k]) for k in range(4))
-        draw_lab(lab, solution)
-        planar = len(angles) == 2 and solution.problem.gait.free
-        if planar:
-            draw_shape_path(plane, solution.problem, angles)
-        else:  # no one plane shows them all
-            draw_angles(plane, t, angles, solution.problem.body)
-        draw_speeds(speeds, solution, t)
-        draw_power(power, solution, t)
-        titles = (
-            "in the lab (black: at the end)",
-            "shape space (disc: t = 0)" if planar else f"{solution.problem.body.quantity}s",
-            "speeds along the body; what is near δ sticks",
-            f"W = {solution.measured.work:.4f} a period (ticks: mesh)",
-        )
-        for axes, title in zip((lab, plane, speeds, power), titles, strict=True):
-            axes.set_title(title)
-    return figure

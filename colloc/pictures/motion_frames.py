@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
-from colloc.results.relaxed_solution import RelaxedSolution
+from colloc.results.motion import turned
 from colloc.results.solution import Solution
 
 _STRAIGHT = 1e-2
@@ -49,13 +49,7 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
     return tail[:, None] + turned(np.stack(body.outline(angles)), theta)
 
 
-def turned(vectors: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """Vectors ``(2, ..., n_time)`` of the body's axes in those of the lab."""
-    (x, y), c, s = vectors, np.cos(theta), np.sin(theta)
-    return np.stack([c * x - s * y, s * x + c * y])
-
-
-def frames(solution: Solution | RelaxedSolution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
+def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
     """Sample a solution's motion and the friction that acts on it.
 
     Parameters

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from colloc.pictures.animation import pictures
-from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
@@ -72,7 +71,7 @@ def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
 
 
 def write_movie(
-    solution: Solution | RelaxedSolution,
+    solution: Solution,
     path: Path,
     *,
     periods: int = 2,
@@ -86,7 +85,7 @@ def write_movie(
 
     Parameters
     ----------
-    solution : Solution or RelaxedSolution
+    solution : Solution
     path : Path
         Ends in ``.gif`` or ``.mp4``.
     periods : int

@@ -20,6 +20,7 @@ from colloc.pictures.figure import (
     draw_speeds,
     set_log,
 )
+from colloc.pictures.relaxed_figure import draw_mixture, draw_realised, draw_shares
 from colloc.pictures.style import BLUE, GREY, ORANGE, VERMILION, save, styled
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
@@ -60,7 +61,7 @@ def draw_convergence(axes: Axes, solution: Solution) -> None:
 
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Estimated error of the objective from every mesh interval, ``(n,)``, magnitudes."""
-    return np.abs(mesh_error(solution.problem, solution.mesh, solution.gait, solution.delta_per_period).value)
+    return np.abs(mesh_error(solution.resolved, solution.mesh, solution.gait, solution.delta_per_period).value)
 
 
 def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:
@@ -91,6 +92,10 @@ def panels(solution: Solution) -> dict[str, Panel]:
     }
     for j in range(len(angles) - 1 if solution.problem.gait.free else 0):
         found[f"shape-{j + 1}-{j + 2}"] = Panel(COLUMN, 3.2, _plane(solution, angles, j))
+    if (relaxed := solution.relaxed) is not None:
+        found["mixture"] = Panel(COLUMN, 3.2, lambda axes: draw_mixture(axes, solution.problem, relaxed.gait))
+        found["shares"] = Panel(COLUMN, 2.2, lambda axes: draw_shares(axes, relaxed.gait))
+        found["realised"] = Panel(COLUMN, 2.4, lambda axes: draw_realised(axes, relaxed))
     return found
 
 

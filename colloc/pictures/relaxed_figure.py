@@ -1,17 +1,15 @@
-"""Panels about a relaxed solution, and the figure of them all."""
+"""Panels about a relaxed gait and the finite ones near it."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from colloc.gaits.mixture import Mixture
 from colloc.gaits.problem import Problem
-from colloc.pictures.figure import draw_allowed, draw_filmstrip, draw_lab, set_log
-from colloc.pictures.style import BLUE, GREY, INK, ORANGE, VERMILION, styled
-from colloc.results.relaxed_solution import RelaxedSolution
-from colloc.results.solution import SOLVED
+from colloc.pictures.figure import draw_allowed, set_log
+from colloc.pictures.style import BLUE, GREY, ORANGE, VERMILION
+from colloc.results.relaxation import Relaxation
 
 _LOOP = 0.25
 """Length [rad] of the directions of a mixture together, as drawn."""
@@ -41,14 +39,14 @@ def draw_mixture(axes: Axes, problem: Problem, gait: Mixture, first: int = 0, se
     axes.legend(loc="lower left")
 
 
-def draw_realised(axes: Axes, solution: RelaxedSolution) -> None:
+def draw_realised(axes: Axes, relaxed: Relaxation) -> None:
     """What finite gaits lose to the relaxed one, against the number of repeats."""
-    repeats = np.array([r.repeats for r in solution.realised])
-    lost = np.array([solution.certificate.efficiency - r.certificate.efficiency for r in solution.realised])
+    repeats = np.array([r.repeats for r in relaxed.realised])
+    lost = np.array([relaxed.certificate.efficiency - r.certificate.efficiency for r in relaxed.realised])
     axes.plot(repeats, lost, "o-", color=BLUE, label="finite gaits")
     if lost[-1] > 0:
         axes.plot(repeats, lost[-1] * repeats[-1] / repeats, "--", color=GREY, label="like 1/m")
-    for r, y in zip(solution.realised, lost, strict=True):
+    for r, y in zip(relaxed.realised, lost, strict=True):
         axes.annotate(
             f"{r.corners} corners\n{r.certificate.efficiency:.4f}",
             (r.repeats, y),
@@ -76,34 +74,3 @@ def draw_shares(axes: Axes, gait: Mixture) -> None:
         )
     axes.set(xlim=(0, 1), ylim=(0, 1.05), xlabel="phase t", ylabel="share of the time")
     axes.legend(loc="center right", title="direction")
-
-
-def relaxed_figure(solution: RelaxedSolution) -> Figure:
-    """Filmstrip and lab paths of the best finite gait, the mixture in shape space and time, and what finite gaits lose."""
-    problem, mu, best = solution.problem, solution.problem.friction, solution.best
-    verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
-    headline = (
-        f"{problem.name}: efficiency d/W = {best.certificate.efficiency:.5f} with {best.corners} corners, relaxed "
-        f"{solution.certificate.efficiency:.5f}   {mu.label},  "
-        f"δ = {problem.delta:.0e}{verdict}\nclass: {problem.gait.describe()}"
-    )
-    with styled():
-        figure = Figure(figsize=(11, 8.2))
-        figure.set_layout_engine("none")  # the places are known
-        figure.text(0.015, 0.985, headline, fontsize=11, va="top", color=INK if solution.status == SOLVED else VERMILION)
-        strip = figure.add_axes((0.015, 0.76, 0.97, 0.135))
-        draw_filmstrip(strip, solution)
-        figure.text(0.015, 0.905, "one period of the finite gait: phase, and below it how far the centre has come (disc: head)")
-        grid = figure.add_gridspec(
-            2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33, width_ratios=(2, 1.15),
-            height_ratios=(1.5, 1),
-        )  # fmt: skip
-        lab, plane, shares, realised = (figure.add_subplot(grid[k]) for k in range(4))
-        draw_lab(lab, solution)
-        draw_mixture(plane, problem, solution.relaxed)
-        draw_shares(shares, solution.relaxed)
-        draw_realised(realised, solution)
-        titles = ("in the lab (black: at the end)", "shape space", "the mixture", "finite gaits")
-        for axes, title in zip((lab, plane, shares, realised), titles, strict=True):
-            axes.set_title(title)
-    return figure

@@ -36,6 +36,7 @@ PLAIN = {
     "joint limits": "No joint bends further than it may, at any instant.",
     "tangent angle": "The body bends no further from its own direction than it may, so that it cannot cross itself.",
     "self-contact": "No part of the body passes through another, at any instant.",
+    "actuators": "No joint has to do more than it can, at any instant.",
     "replay gap": "An independent replay of the motion finds the same value.",
     "replay error": "The replay itself is as exact as was asked for.",
     "work = dissipation": "All work of what bends the body goes into friction: energy is conserved.",
@@ -48,7 +49,7 @@ PLAIN = {
 """What a check means for a reader who knows nothing of optimisation, by its name."""
 
 
-class Picture(NamedTuple):
+class Drawn(NamedTuple):
     """A panel as SVG, and where its axes lie: left, right, top, bottom as percent, and limits of both axes."""
 
     caption: str
@@ -92,6 +93,10 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
         captions["power"] = "power against friction; ticks: mesh"
         found["gait_pictures"] = [_plane(drawn[name], body.coordinate, j) for j, name in enumerate(planes)]
         found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
+        if solution.relaxed is not None:
+            mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
+            mixed["realised"] = "what finite gaits lose to it"
+            found["gait_pictures"] += [_picture(drawn[name], text) for name, text in mixed.items()]
         found["convergence_pictures"] = [
             _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
             _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
@@ -108,6 +113,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             headline=_headline(solution),
             gap=gap.strip(),
             reference=_comparison(solution, reference),
+            relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
             plain=PLAIN,
             policy=_POLICY,
             fields={name: json.dumps(value) for name, value in solution.problem.to_dict().items()},
@@ -142,9 +148,7 @@ def _headline(solution: Solution) -> str:
 def _comparison(solution: Solution, reference: Reference | None) -> str:
     if reference is None or not solution.certificate.replayed:
         return ""
-    agrees = abs(solution.certificate.efficiency - reference.efficiency) <= reference.tolerance
-    verb = "agrees with" if agrees else "DIFFERS from"
-    return f"{verb} {reference.efficiency:g} ± {reference.tolerance:g}: {reference.source}"
+    return reference.verdict(solution.tends_to.efficiency)
 
 
 def _commands(solution: Solution) -> str:
@@ -158,11 +162,11 @@ def _commands(solution: Solution) -> str:
     )
 
 
-def _plane(panel: Panel, coordinate: str, j: int) -> Picture:
+def _plane(panel: Panel, coordinate: str, j: int) -> Drawn:
     return _picture(panel, f"{coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1))
 
 
-def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False) -> Picture:
+def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False) -> Drawn:
     """The panel as SVG that takes its text colour and font from the page; nothing in it comes from a file but numbers."""
     text, figure = StringIO(), panel.figure()
     with styled():
@@ -179,7 +183,7 @@ def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, 
     box = 100 * axes.get_position().get_points()
     (left, low), (right, high) = box.round(2).tolist()
     sides = (left, right, round(100 - high, 2), round(100 - low, 2))
-    return Picture(caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase)
+    return Drawn(caption, Markup(svg), sides, (*axes.get_xlim(), *axes.get_ylim()), joints, has_phase)
 
 
 def motion_data(shown: Frames, body: Body) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 
 _ACCURACY, _STEPS, _INTERVALS = 1e-8, 30, 30
+_ELSE_FREE = {"at_least": (), "torque_limit": None, "power_limit": None}
 
 
 class _Nearest:
@@ -70,7 +71,7 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
         delta *= path_length(gait)
     harmonics: Harmonic = seed_class(problem)
     space, v = space_near(
-        problem.with_(gait=harmonics, guess=gait, intervals=_INTERVALS + 4 * harmonics.harmonics, at_least=()), gait
+        problem.with_(gait=harmonics, guess=gait, intervals=_INTERVALS + 4 * harmonics.harmonics, **_ELSE_FREE), gait
     )
     program, area = ReducedProgram(space, delta), harmonics.enclosed_area(problem.body.n_joint)
     return space.member(minimised(_Nearest(program, v, area), v, np.inf, _ACCURACY, _STEPS).v)

@@ -86,14 +86,15 @@ class HarmonicSpace:
         """See `colloc.reduced.motion.Shapes`."""
         return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
 
-    def move_checks(self, v: np.ndarray) -> float:
-        """Place the checks at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+        """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad]."""
         gait, n_joint, limit = self.member(v), self.problem.body.n_joint, self.problem.joint_limit
         self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
         for check, (cells, times) in zip(self.checks, peaks(gait, self.mesh, self.checks, limit), strict=True):
             self.watched[check.name] = cells
             if not cells.size:
                 continue
+            times = times + later * self.mesh.h[cells]
             values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
             self._placed.append((check, held_shares(check, gait, times), matrix))
             excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.bounds(limit)

@@ -172,8 +172,11 @@ class MixtureSpace:
         since = np.cumsum(weights[:, ::-1], axis=1)[:, ::-1]
         return self._on_parameters(since[:, 0], since[:, 1:], np.zeros(1), np.zeros(1), *self._split(v))
 
-    def move_checks(self, v: np.ndarray) -> float:
-        """Choose the instants at which checks may bind; how far the gait exceeds any bound [rad, or body lengths]."""
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+        """Choose the instants at which checks may bind; how far the gait exceeds any bound [rad, or body lengths].
+
+        They are ends and middles of pieces, and move with those alone: `later` changes nothing.
+        """
         angles, limit = self.member(v).shapes @ self._watch.T, self.problem.joint_limit
         self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
         closing = np.zeros(len(self._first))

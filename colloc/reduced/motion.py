@@ -153,7 +153,7 @@ class ReducedMotion:
         """What grows the length of path or the driven work at every column, ``(n_column,)``, and its derivatives along (angles,
         rates)."""
         if name == "driven_work":
-            from colloc.reduced.driven_slopes import driven_slopes  # loads CasADi, which a certificate can do without
+            from colloc.reduced.actuator_slopes import driven_slopes  # loads CasADi, which a certificate can do without
 
             return driven_slopes(self.body, self.friction, s.angles, s.rates, s.solved.z, s.delta)
         size = np.linalg.norm(s.rates, axis=0)

@@ -209,8 +209,8 @@ class PathSpace:
         on_local = np.einsum("kto,tso->kst", np.concatenate([on_shape, on_pace[:, :, None]], axis=2), slope)
         return (on_local.reshape(on_local.shape[0], -1) @ self._scatter) @ frame
 
-    def move_checks(self, v: np.ndarray) -> float:
-        """Place the checks at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+        """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad]."""
         p, fit = self.full_parameters(v), self._fit
         gait, limit = fit.member(p), self.problem.joint_limit
         mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
@@ -219,6 +219,7 @@ class PathSpace:
             self.watched[check.name] = cells
             if not cells.size:
                 continue
+            times = times + later * mesh.h[cells]
             tau, values = np.full(mesh.n, 0.5), check_values(check, gait, times)
             tau[cells] = np.clip((times - mesh.edges[cells]) / mesh.h[cells], 0.0, 1.0)
             given[check.name][:-1] = self._geometry.given(tau)

@@ -12,6 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
+from colloc.reduced.actuator_rows import ActuatorRows
 from colloc.reduced.motion import ReducedMotion, Shapes
 
 
@@ -53,8 +54,9 @@ class SearchSpace(Shapes, Protocol):
     def with_far(self, far: Pairs) -> SearchSpace:
         """The class with other pairs of links kept apart."""
 
-    def move_checks(self, v: np.ndarray) -> float:
-        """Place every check at the worst instants of the gait v; how far the gait exceeds any bound there [rad]."""
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+        """Place every check at the worst instants of the gait v, or later by a share of its mesh cell; how far the gait exceeds
+        any bound there [rad]."""
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near an optimum; None for 1."""
@@ -67,13 +69,16 @@ class SearchSpace(Shapes, Protocol):
 class ReducedProgram:
     """Maximise a problem's objective over a class of gaits on a mesh, at one delta.
 
-    Rows: net rotation where it is prescribed and no symmetry closes it, what must be reached at least, the space's.
+    Rows: net rotation where it is prescribed and no symmetry closes it, what must be reached at least, what actuators can do,
+    the space's.
 
     Attributes
     ----------
     lower, upper : (n,)
     delta : float
         In the units of the class; may be changed.
+    actuators : ActuatorRows, optional
+        Where the problem limits them.
     """
 
     def __init__(self, space: SearchSpace, delta: float) -> None:
@@ -85,28 +90,44 @@ class ReducedProgram:
         least = [value for _, value in problem.at_least]
         self._objective, self._closes, self._reached = problem.objective, bool(turns), [aim for aim, _ in problem.at_least]
         self._own_lower, self._own_upper = np.array([*turns, *least]), np.array([*turns, *np.full(len(least), np.inf)])
+        limits = problem.actuator_limits
+        self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
         self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
+
+    def place_rows(self, v: np.ndarray) -> float:
+        """Place all rows that depend on where the gait v is, the space's and the actuators'; how far it exceeds any bound."""
+        excess = self.move_checks(v)
+        if self.actuators is None:
+            return excess
+        gait = self.space.member(v)
+        return max(excess, self.actuators.place(v, self.delta, gait, self.space.phase_mesh(gait)))
 
     @property
     def row_lower(self) -> np.ndarray:
         """Lower bounds of the rows; they change as the checks move."""
-        return np.concatenate([self._own_lower, self.space.row_lower])
+        return np.concatenate([self._own_lower, self._of_actuators[0], self.space.row_lower])
 
     @property
     def row_upper(self) -> np.ndarray:
         """Upper bounds of the rows."""
-        return np.concatenate([self._own_upper, self.space.row_upper])
+        return np.concatenate([self._own_upper, self._of_actuators[1], self.space.row_upper])
+
+    @property
+    def _of_actuators(self) -> tuple[np.ndarray, np.ndarray]:
+        return (np.empty(0), np.empty(0)) if self.actuators is None else self.actuators.bounds()
 
     @property
     def row_names(self) -> list[tuple[str, int]]:
         """What each row is: its kind, and which of the full program's rows of that kind."""
         own = [("period", k) for k in range(self._own_lower.size)]
+        if self.actuators is not None:
+            own += [(f"actuators, share {share}", int(point)) for share, point in self.actuators.placed.T]
         return own + [(kind, int(cell)) for kind, cells in self.space.watched.items() for cell in cells]
 
-    def move_checks(self, v: np.ndarray) -> float:
-        """As `SearchSpace.move_checks`."""
-        return self.space.move_checks(v)
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+        """As `SearchSpace.move_checks`; rows of actuators stay where they are."""
+        return self.space.move_checks(v, later)
 
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""
@@ -117,7 +138,7 @@ class ReducedProgram:
         return -self._slope(self._objective, v)
 
     def _slope(self, aim: Objective, v: np.ndarray) -> np.ndarray:
-        return aim.with_slopes(self.motion.values(v, self.delta), self._slopes(v)).slope + np.zeros_like(v)
+        return aim.gradient(self.motion.values(v, self.delta), self._slopes(v)) + np.zeros_like(v)
 
     def _slopes(self, v: np.ndarray) -> dict[str, np.ndarray]:
         key = v.tobytes()
@@ -126,12 +147,14 @@ class ReducedProgram:
         return self._gradients[2]
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        """Net rotation, if it is a row, what must be reached, and the rows of the space."""
+        """Values of the rows."""
         values = self.motion.values(v, self.delta) if self._own_lower.size else {}
         own = [values["rotation"]] if self._closes else []
-        return np.concatenate([own, [aim(values) for aim in self._reached], self.space.rows(v)])
+        done = np.empty(0) if self.actuators is None else self.actuators.values(v, self.delta)
+        return np.concatenate([own, [aim(values) for aim in self._reached], done, self.space.rows(v)])
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
         own = [self._slopes(v)["rotation"]] if self._closes else []
-        return np.vstack([*own, *(self._slope(aim, v) for aim in self._reached), self.space.row_slopes(v)])
+        done = np.empty((0, v.size)) if self.actuators is None else self.actuators.slopes(v, self.delta)
+        return np.vstack([*own, *(self._slope(aim, v) for aim in self._reached), *done, self.space.row_slopes(v)])

@@ -5,8 +5,7 @@ On the free directions Z, along which no equation and no bound that carries a mu
     Z' (grad L(v + h Z) - grad L(v - h Z)) / 2h,      L = -d/W + multipliers . rows,
 
 has to be positive. A row is a shape check at the worst instant of a stretch of the gait, and that instant moves with the gait:
-rows held at their instants would lack the curvature that this adds (Hettich and Kortanek, SIAM Review 35, 1993, section 3), so
-every check is moved with v.
+rows held at their instants lack the curvature that this adds (Hettich and Kortanek, SIAM Review 35, 1993, section 3).
 
 The Hessian is formed from exact gradients by differences. Stick and slip make second derivatives jump as they move over a mesh
 point; that shows in the part that is not symmetric, and in a change with the step h. Beside such a jump a direction may look
@@ -26,6 +25,8 @@ from colloc.numerics.sqp import NonlinearProgram, stationarity
 
 _STEP, _LONG_STEP = 1e-6, 1e-3
 """Of the differences, over the length of the parameters' vector; and of those that confirm a negative curvature."""
+_SHIFT = 1e-3
+"""Of checks, as a share of a mesh cell, by which their derivatives in time are found."""
 _HELD = 1e-7
 """Multiplier from which a bound counts as held."""
 _ONE_ROW = 1e-2
@@ -64,12 +65,12 @@ class CheckedProgram(NonlinearProgram, Protocol):
     def row_names(self) -> list[tuple[str, int]]:
         """What each row is: of which kind, and of which stretch of the gait."""
 
-    def move_checks(self, v: np.ndarray) -> object:
-        """Place every check at the worst instants of v; rows may appear and go."""
+    def move_checks(self, v: np.ndarray, later: float = 0.0) -> object:
+        """Place every check at the worst instants of v, or so much later as a share of its stretch; rows may appear and go."""
 
 
 class Lagrangian:
-    """Objective plus multipliers times rows near a point v, every check at the worst instant that it has where it is evaluated.
+    """Objective plus multipliers times rows near a point v.
 
     Attributes
     ----------
@@ -82,19 +83,39 @@ class Lagrangian:
         rows, slopes, on_rows = program.rows(v), program.row_slopes(v), self.conditions.on_rows
         self._held = [(name, on_rows[k], rows[k], slopes[k]) for k, name in enumerate(program.row_names) if on_rows[k]]
 
-    def __call__(self, at: np.ndarray) -> tuple[float, np.ndarray]:
-        """Its value and gradient ``(n,)``."""
+    def slope(self, at: np.ndarray) -> np.ndarray:
+        """Gradient ``(n,)`` with the checks at the instants that are the worst ones of v."""
+        return self._program.gradient(at) + self.conditions.on_rows @ self._program.row_slopes(at)
+
+    def of_moving_instants(self) -> np.ndarray:
+        """What is added to the Hessian at v, ``(n, n)``, as every check moves with the gait.
+
+        The largest value of a check c(t, v) has the second derivative c_vv - c_tv c_tv' / c_tt.
+        """
+        program, v, on_rows = self._program, self._v, self.conditions.on_rows
+        around = []
+        for later in (-_SHIFT, 0.0, _SHIFT):
+            program.move_checks(v, later)
+            around.append((program.rows(v), program.row_slopes(v)))
+        program.move_checks(v)
+        (low, below), (here, _), (high, above) = around
+        bend = low - 2 * here + high
+        # an instant on the edge of its cell stays there
+        turns = (on_rows != 0) & (on_rows * bend < 0) & (np.abs(high - low) < np.abs(bend))
+        w = (above - below)[turns] / 2
+        return -w.T @ ((on_rows[turns] / bend[turns])[:, None] * w)
+
+    def value(self, at: np.ndarray) -> float:
+        """Its value with every check at the worst instant that it has at this point."""
         program = self._program
         program.move_checks(at)
-        value, slope = program.objective(at), program.gradient(at).copy()
+        value, rows = program.objective(at), program.rows(at)
         place = {name: k for k, name in enumerate(program.row_names)}
-        rows, slopes = program.rows(at), program.row_slopes(at)
         for name, multiplier, row, row_slope in self._held:
             k = place.get(name)
             value += multiplier * (rows[k] if k is not None else row + row_slope @ (at - self._v))
-            slope += multiplier * (slopes[k] if k is not None else row_slope)
         program.move_checks(self._v)
-        return float(value), slope
+        return float(value)
 
 
 def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
@@ -122,16 +143,18 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     if free.shape[1] == 0:
         return Curvature(np.inf, 0.0, 0, np.zeros(v.size), conditions.kkt_error)
 
+    moving = lagrangian.of_moving_instants()
+
     def product(z: np.ndarray, step: float) -> np.ndarray:
-        return (lagrangian(v + step * z)[1] - lagrangian(v - step * z)[1]) / (2 * step)
+        return (lagrangian.slope(v + step * z) - lagrangian.slope(v - step * z)) / (2 * step) + moving @ z
 
     step = _STEP * (float(np.linalg.norm(v)) or 1.0)
     hessian = free.T @ np.stack([product(z, step) for z in free.T], axis=1)
     values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
-    confirmed, far, here = values.copy(), step * _LONG_STEP / _STEP, lagrangian(v)[0]
+    confirmed, far, here = values.copy(), step * _LONG_STEP / _STEP, lagrangian.value(v)
     for k in np.flatnonzero(values < 0):
         along = far * free @ vectors[:, k]
-        confirmed[k] = max(values[k], (lagrangian(v + along)[0] - 2 * here + lagrangian(v - along)[0]) / far**2)
+        confirmed[k] = max(values[k], (lagrangian.value(v + along) - 2 * here + lagrangian.value(v - along)) / far**2)
     first = int(np.argmin(confirmed))
     least = free @ vectors[:, first]
     # what a wrong coupling of two directions does to the smaller eigenvalue

@@ -9,11 +9,12 @@ import numpy as np
 from colloc.gaits.guesses import under_one_limit
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.problem import Problem
+from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.reduced.program import ReducedProgram
 from colloc.results.checks import Certificate, Check
 from colloc.results.delta_limit import Limit, extrapolated_limit
+from colloc.results.level import REALISED
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import MixedPath, Path, Replay, replay
@@ -31,12 +32,6 @@ SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
 _MOST_PARAMETERS = 150
 
 _FINE_PHASES = 20000
-
-
-def gait_path(solution: Solution) -> Path:
-    """Joint angles and rates of the solution's gait as a function of phase."""
-    gait = solution.gait
-    return lambda t: (gait.angles(t), gait.rates(t))
 
 
 def certify(
@@ -67,18 +62,16 @@ def certify(
     True
     """
     problem = solution.resolved
-    path = gait_path(solution)
     if instants is None:
         usual = problem.body.usual
         each = 0.5 * usual.instants_a_point / problem.gait.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * solution.mesh.n_point)))
+    gait = solution.gait
+    at = problem, gait, solution.delta_per_period, gait.corner_phases, instants, tolerance
+    if solution.last.program == REALISED:  # it need not be an optimum, nor is it collocated to be measured by that
+        return gait_certificate(*at)
     return gait_certificate(
-        problem,
-        path,
-        solution.delta_per_period,
-        solution.gait.corner_phases,
-        instants,
-        tolerance,
+        *at,
         claimed=solution.value,
         before=(*_optimality(solution), second_order or _second_order(solution)),
         after=(*_class(solution), *_mesh(solution)),
@@ -118,13 +111,14 @@ def gait_certificate(
     """
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
-    settings["driven"] = problem.uses("driven_work")
+    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits}
     known = measured(problem.body, problem.friction, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
         *before,
         *_motion(problem, path, fine, breaks, tolerance, claimed),
         *_reached(problem, fine),
+        *_actuators(problem, fine),
         _one_motion(problem, fine),
         *after,
         *_delta(problem, fine, known.limit.value),
@@ -174,6 +168,7 @@ def measured(
     objective: Objective = EFFICIENCY,
     rotation: float | None = 0.0,
     driven: bool = False,
+    limits: ActuatorLimits = UNLIMITED,
 ) -> Measured:
     """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
 
@@ -185,9 +180,8 @@ def measured(
     for part in (1.0, 0.1, 0.01) if smoothed else (1.0,):
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
-        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "near": near, "objective": objective}
-        settings["driven"] = driven
-        replays.append(replay(*at, **settings))  # type: ignore[arg-type]
+        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}
+        replays.append(replay(*at, **settings, near=near, objective=objective))  # type: ignore[arg-type]
     known = []
     for aim in (objective, EFFICIENCY):
         values = [aim(each.period) for each in replays]
@@ -227,15 +221,17 @@ def _second_order(solution: Solution) -> Check:
     problem, level = solution.resolved, solution.last
     if not problem.gait.free:
         return Check("second order", 0.0, SADDLE, "nothing is free in a prescribed motion")
-    from colloc.reduced.second_order import curvature  # both load CasADi
+    from colloc.reduced.program import ReducedProgram  # these load CasADi
+    from colloc.reduced.second_order import curvature
     from colloc.reduced.spaces import space_near
 
     space, v = space_near(problem, solution.gait, level.edges, level.scheme)
     space = space.with_far(problem.body.far_pairs)
-    space.move_checks(v)
+    program = ReducedProgram(space, level.delta)
+    program.place_rows(v)
     if v.size > _MOST_PARAMETERS:
         return Check("second order", 0.0, SADDLE, f"not measured, for {v.size} parameters")
-    found = curvature(ReducedProgram(space, level.delta), v)
+    found = curvature(program, v)
     size = abs(level.value)
     least, error = found.smallest / size, found.error / size
     value = max(-least - error, 0.0)
@@ -293,6 +289,15 @@ def _reached(problem: Problem, fine: Replay) -> list[Check]:
         lacks = max(least - aim(fine.period), 0.0) / max(abs(least), 1e-300)
         checks.append(Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay"))
     return checks
+
+
+def _actuators(problem: Problem, fine: Replay) -> list[Check]:
+    """What the joints have to do, against what they can."""
+    names = problem.actuator_limits.names
+    if not names:
+        return []
+    most, excess = names[np.argmax(fine.shares)], max(float(fine.shares.max()) - 1.0, 0.0)
+    return [Check("actuators", excess, GAP, f"excess over a limit, relative, in replay; nearest to its own: {most}")]
 
 
 def _beyond(value: float, unknown: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -110,6 +111,15 @@ class Certificate:
     @property
     def passed(self) -> bool:
         return all(check.passed for check in self.checks)
+
+    def facts(self) -> dict[str, Any]:
+        """All of it as plain numbers (JSON); what was not measured is left out."""
+        numbers = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "checks"}
+        listed = {c.name: {"value": c.value, "threshold": c.threshold, "passed": c.passed} for c in self.checks}
+        return {name: value for name, value in numbers.items() if not np.isnan(value)} | {
+            "passed": self.passed,
+            "checks": listed,
+        }
 
     @property
     def failures(self) -> list[Check]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-REDUCED, PRESCRIBED = "reduced", "prescribed"
+REDUCED, PRESCRIBED, REALISED = "reduced", "prescribed", "realised"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +40,7 @@ class Level:
         Value of the problem's objective, where that is not the efficiency.
     program : str
         What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
-        formulation; "prescribed" where nothing is free.
+        formulation; "prescribed" where nothing is free, "realised" where a gait stands for a relaxed one.
     knots : (n_arc + 1,), optional
         Phases where the arcs of a free path meet; they are among the edges. By default they are the edges.
     panels : int

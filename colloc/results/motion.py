@@ -46,6 +46,12 @@ class SampledMotion:
         return f"<SampledMotion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
 
 
+def turned(vectors: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Vectors ``(2, ..., n_time)`` of the body's axes in those of the lab."""
+    (x, y), c, s = vectors, np.cos(theta), np.sin(theta)
+    return np.stack([c * x - s * y, s * x + c * y])
+
+
 class Column(NamedTuple):
     """Values with their units and the names of their dimensions, time last."""
 

@@ -21,8 +21,10 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate
-from colloc.results.level import Level
+from colloc.results.collocated_motion import CollocatedMotion
+from colloc.results.level import REALISED, Level
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
+from colloc.results.relaxation import Relaxation
 from colloc.results.solution_card import solution_card
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -62,6 +64,8 @@ class Solution:
         Distinct gaits they led to, the one of this solution first; empty for a single start.
     finite : Solution, optional
         The best gait of finite size, where this one is as small as the bound on the shape speed allows; saved by itself.
+    relaxed : Relaxation, optional
+        The relaxed gait that the gait of this solution comes near, for a class of relaxed gaits.
 
     Examples
     --------
@@ -86,6 +90,7 @@ class Solution:
     starts: int = 1
     others: tuple[Alternative, ...] = ()
     finite: Solution | None = None
+    relaxed: Relaxation | None = None
 
     def __repr__(self) -> str:
         facts = [self.problem.name, self.status]
@@ -128,6 +133,11 @@ class Solution:
         return self.certificate if self.certificate.replayed else self.last
 
     @property
+    def tends_to(self) -> Certificate:
+        """The certificate, of a relaxed gait that of the limit: what a value from elsewhere is held against."""
+        return self.certificate if self.relaxed is None else self.relaxed.certificate
+
+    @property
     def value(self) -> float:
         """Of the problem's objective, at the last level; the certificate says whether to believe it."""
         return self.last.value
@@ -163,9 +173,11 @@ class Solution:
 
     @property
     def resolved(self) -> Problem:
-        """The problem, its body on the panels of the last level."""
-        panels = self.last.panels
-        return self.problem.with_(body=self.problem.body.on_panels(panels)) if panels else self.problem
+        """The problem of the last level: the body on its panels, and of relaxed gaits the class of finite ones."""
+        panels, problem = self.last.panels, self.problem
+        if self.last.program == REALISED:
+            return problem.with_(gait=problem.gait.finite)
+        return problem.with_(body=problem.body.on_panels(panels)) if panels else problem
 
     @property
     def layout(self) -> Layout:
@@ -183,86 +195,22 @@ class Solution:
         """Regularisation speed of the last level in body lengths per period, whatever the class measures it in."""
         return self.last.delta * self.gait.delta_unit
 
+    @property
+    def motion(self) -> CollocatedMotion:
+        """What the variables of the last level say of the motion."""
+        return CollocatedMotion(self.resolved, self.mesh, self.layout, self.last.x, self.gait, self.delta_per_period)
+
     def at_points(self) -> tuple[np.ndarray, Sliding]:
         """Phases of the collocation points and the body there, from the variables of the last level (per period)."""
-        problem = self.resolved
-        angles, rates, z = self._point_motion()
-        delta = np.full((1, z.shape[1]), self.delta_per_period)
-        return self.mesh.times, problem.body.sliding(problem.friction, angles, rates, z, delta)
-
-    def _point_motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles, rates and tail velocities per period at the collocation points."""
-        x, layout, problem = self.last.x, self.layout, self.resolved
-        if layout.z.size:
-            unit = self.gait.speed_unit
-            return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
-        gait, times = self.gait, self.mesh.times
-        angles, rates = gait.angles(times), gait.rates(times)
-        return angles, rates, problem.body.solve(problem.friction, angles, rates, self.delta_per_period).z
+        return self.mesh.times, self.motion.at_points
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers; whole periods add up.
-
-        Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's, so that the error
-        between nodes is visible. The lab frame has the centre of mass at the origin and the motion along +x at t = 0.
-        """
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        if t.ndim != 1 or not np.isfinite(t).all():
-            raise ValueError("t must be finite phases, a number or a one-dimensional array.")
-        period, phase = np.divmod(t, 1.0)
-        symmetry, body = self.problem.gait.symmetry, self.problem.body
-        second = phase > self.problem.gait.fraction
-        reduced = {"none": phase, "bilateral": np.where(second, 1.0 - phase, phase), "antipodal": phase - 0.5 * second}[
-            symmetry
-        ]
-        z, theta, centre, end = self._interpolated(reduced)
-        angles, rates = self.gait.angles(phase), self.gait.rates(phase)
-        if symmetry == "bilateral":
-            # seen from the head the body repeats itself with reversed rates
-            head, heading = body.seen_from_head(self.gait.angles(reduced), self.gait.rates(reduced), z)
-            z = np.where(second, head, z)
-            theta = np.where(second, theta + heading, theta)
-            centre = np.where(second, 2 * end[:, None] - centre, centre)
-            end = 2 * end
-        elif symmetry == "antipodal":
-            mirror, x_theta = np.array([[1.0], [-1.0], [-1.0]]), self.last.x[self.layout.theta[0]]
-            z = np.where(second, mirror * z, z)
-            turns = 2 * np.pi * np.round((x_theta[0] + x_theta[-1]) / (2 * np.pi))
-            theta = np.where(second, turns - theta, theta)
-            centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
-            end = np.array([2 * end[0], 0.0])
-        centre = centre + period * end[:, None]
-        cx, cy = body.centre(angles)
-        c, s = np.cos(theta), np.sin(theta)
-        tail = centre - np.stack([c * cx - s * cy, s * cx + c * cy])
-        return SampledMotion(t, angles, rates, z, theta, centre, tail)
-
-    def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """z, theta and centre of mass at phases t of the solved part, and the centre's displacement at its end."""
-        mesh, layout, x, scheme = self.mesh, self.layout, self.last.x, self.mesh.scheme
-        k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
-        tau = (t - mesh.edges[k]) / mesh.h[k]
-        value, integral = scheme.lagrange(tau), scheme.integrals(tau)
-        z_points = self._point_motion()[2]
-        _, now = self.at_points()
-        site_theta = np.empty(mesh.n_point)
-        site_theta[mesh.points] = x[layout.theta[0]][mesh.sites]
-        cx, cy = now.centre
-        c, s = np.cos(site_theta), np.sin(site_theta)
-        lab = np.stack([c * cx - s * cy, s * cx + c * cy])
-        steps = np.einsum("ks,cks,k->ck", np.broadcast_to(scheme.b, (mesh.n, scheme.s)), lab[:, mesh.points], mesh.h)
-        edges = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
-        points = mesh.points[k]
-        z = np.einsum("ts,cts->ct", value, z_points[:, points])
-        theta = x[layout.theta[0, mesh.edge_sites[k]]] + mesh.h[k] * np.einsum("ts,ts->t", integral, z_points[2, points])
-        centre = edges[:, k] + mesh.h[k] * np.einsum("ts,cts->ct", integral, lab[:, points])
-        return z, theta, centre, edges[:, -1]
+        """The motion at phases t, any real numbers; whole periods add up: `CollocatedMotion.sample`."""
+        return self.motion.sample(t)
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
-        problem = self.resolved
-        delta = np.full((1, motion.t.size), self.delta_per_period)
-        return problem.body.sliding(problem.friction, motion.angles, motion.rates, motion.z, delta).power[0]
+        return self.motion.sliding(motion.angles, motion.rates, motion.z).power[0]
 
     def plot(self) -> Any:
         """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it."""

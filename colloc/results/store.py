@@ -8,6 +8,8 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
     /levels/000/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, efficiency, objective (NaN: the efficiency), ...
     /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, efficiency, efficiency_error, ...
+    /relaxed/{durations,directions,start}, attribute symmetry and those of `results.relaxation.Optimality`, with
+        /relaxed/certificate and /relaxed/realised/000/{corners,certificate}, attributes repeats, sense, symmetry
 """
 
 from __future__ import annotations
@@ -21,12 +23,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.gaits.gait_fields import fields, gait_from
+from colloc.gaits.gait_fields import AnyGait, fields, gait_from
+from colloc.gaits.mixture import Mixture
+from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem, statement_hash
 from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.level import Level
 from colloc.results.motion import SAMPLES, motion_columns
+from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
 from colloc.system.errors import ChangedFileWarning, StoreError
 from colloc.system.store_file import (
@@ -63,7 +68,11 @@ _GAIT_ARRAYS = {
     "length": ("rad", ""),
     "corners": ("rad", "joint, vertex"),
     "schedule": ("period", "stage"),
+    "durations": ("rad", "piece, direction"),
+    "directions": ("", "piece, direction, joint"),
+    "start": ("rad", "joint"),
 }
+_MIXTURE = ("durations", "directions", "start")
 
 
 def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -73,6 +82,17 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
     ------
     StoreError
         If the folder cannot be made or written.
+
+    Examples
+    --------
+    >>> import colloc, os, tempfile
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> solution = colloc.solve(problem, starts=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = colloc.save(solution, os.path.join(folder, "quick.h5"))
+    ...     again = colloc.load(path)
+    >>> again.certificate == solution.certificate
+    True
     """
     path = Path(path)
     with new_file(path) as file:
@@ -90,6 +110,13 @@ def load(path: str | os.PathLike[str]) -> Solution:
     ------
     StoreError
         If the file is missing, damaged, or not a colloc solution. Nothing in the file is executed.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> colloc.load("nothing.h5")
+    Traceback (most recent call last):
+    colloc.system.errors.StoreError: there is no file nothing.h5.
     """
     changed = was_changed(Path(path), FORMAT)
     try:
@@ -130,24 +157,54 @@ def _write(file: h5py.File, solution: Solution) -> None:
     if solution.levels:
         _write_motion(file, solution)
     if solution.certificate.replayed:
-        write_certificate(file.create_group("certificate"), solution.certificate)
+        _write_certificate(file.create_group("certificate"), solution.certificate)
+    if solution.relaxed is not None:
+        _write_relaxation(file.create_group("relaxed"), solution.relaxed)
+
+
+def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
+    for name, value in fields(gait).items():
+        if name in _GAIT_ARRAYS:
+            units, dims = _GAIT_ARRAYS[name]
+            put(group, name, value, units=units, dims=dims)
+        else:
+            put_attribute(group, name, value)
 
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
-    gait = file.create_group("gait")
-    for name, value in fields(solution.gait).items():
-        if name in _GAIT_ARRAYS:
-            units, dims = _GAIT_ARRAYS[name]
-            put(gait, name, value, units=units, dims=dims)
-        else:
-            put_attribute(gait, name, value)
+    _write_gait(file.create_group("gait"), solution.gait)
     group = file.create_group("motion")
     motion = solution.sample(np.linspace(0.0, 1.0, SAMPLES))
     for name, column in motion_columns(motion, solution.power(motion)).items():
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
 
 
-def write_certificate(group: h5py.Group, certificate: Certificate) -> None:
+def _write_relaxation(group: h5py.Group, relaxed: Relaxation) -> None:
+    _write_gait(group, relaxed.gait)
+    for field in dataclasses.fields(Optimality):
+        put_attribute(group, field.name, getattr(relaxed.optimality, field.name))
+    _write_certificate(group.create_group("certificate"), relaxed.certificate)
+    for index, realised in enumerate(relaxed.realised):
+        one = group.create_group(f"realised/{index:03d}")
+        _write_gait(one, realised.gait)
+        for name in ("repeats", "sense"):
+            put_attribute(one, name, getattr(realised, name))
+        _write_certificate(one.create_group("certificate"), realised.certificate)
+
+
+def _read_relaxation(group: h5py.Group) -> Relaxation:
+    mixture = Mixture(**{name: array(group, name) for name in _MIXTURE}, symmetry=str(attribute(group, "symmetry")))
+    optimality = Optimality(**{field.name: attribute(group, field.name) for field in dataclasses.fields(Optimality)})
+    realised = []
+    for name in sorted(child(group, "realised")):
+        one = child(child(group, "realised"), name)
+        gait = Corners(array(one, "corners"), str(attribute(one, "symmetry")))
+        repeats, sense = (int(attribute(one, name)) for name in ("repeats", "sense"))
+        realised.append(Realised(repeats, sense, gait, _read_certificate(child(one, "certificate"))))
+    return Relaxation(mixture, optimality, _read_certificate(child(group, "certificate")), tuple(realised))
+
+
+def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
     """Write a certificate into a group of its own."""
     for field in dataclasses.fields(certificate):
         if field.name != "checks":
@@ -156,8 +213,8 @@ def write_certificate(group: h5py.Group, certificate: Certificate) -> None:
         put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
 
-def read_certificate(group: h5py.Group) -> Certificate:
-    """The certificate that `write_certificate` wrote."""
+def _read_certificate(group: h5py.Group) -> Certificate:
+    """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
     stated = [f.name for f in dataclasses.fields(Certificate) if f.default is dataclasses.MISSING or f.name in group.attrs]
@@ -180,7 +237,7 @@ def _read(file: h5py.File) -> Solution:
         levels.append(Level(**arrays, **rest, knots=knots))
     certificate = UNCERTIFIED
     if "certificate" in file:
-        certificate = read_certificate(child(file, "certificate"))
+        certificate = _read_certificate(child(file, "certificate"))
     solution = Solution(
         problem,
         levels,
@@ -195,6 +252,8 @@ def _read(file: h5py.File) -> Solution:
         for other in others:  # earlier files know of the efficiency only
             other.setdefault("value", other.pop("efficiency", np.nan))
         solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
+    if "relaxed" in file:
+        solution.relaxed = _read_relaxation(child(file, "relaxed"))
     if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
         raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     return solution

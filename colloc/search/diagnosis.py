@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.numerics.multiplier_estimate import quasi_definite_factors
 from colloc.search.nlp import NlpResult, Solver
@@ -63,6 +64,9 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         point, which = divmod(index, body.n_force)
         kind, link = divmod(which, body.n_force // 3)
         return f"the friction law of the {_LAWS[kind]} on link {link + 1}", float(mesh.times[point])
+    if name == ACTUATORS:
+        point, which = divmod(index, len(transcription.problem.actuator_limits.names))
+        return f"the limit on the {transcription.problem.actuator_limits.names[which]}", float(mesh.times[point])
     if name == "orientation":
         return "the rotation between nodes", float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
     if name == "rotation":
@@ -112,6 +116,8 @@ def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> 
 def _advice(group: str) -> str:
     if group in ("balance", "force law"):
         return "start the continuation at a larger delta_start, use more intervals, or another formulation"
+    if group == ACTUATORS:
+        return "allow the joints more, or start from another guess"
     if group == "at least":
         return "ask for less, or start from a guess that reaches it"
     if group == "rotation":
@@ -121,7 +127,7 @@ def _advice(group: str) -> str:
     return "use more intervals or another guess"
 
 
-def redundant_equations(solver: Solver[GaitProgram], x: np.ndarray, delta: float) -> list[str]:
+def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
     """Kinds of equations that are (nearly) linear combinations of others at x; an optimiser fails on those.
 
     Parameters

@@ -11,6 +11,7 @@ import dataclasses
 
 import numpy as np
 
+from colloc.gaits.guesses import Limit
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.law import Law
@@ -28,7 +29,14 @@ def in_friction_units(problem: Problem) -> tuple[Problem, float]:
     if unit == 1.0 or any(aim.degree is None for aim in problem.aims):
         return problem, 1.0
     least = tuple((aim, in_unit(value, 1 / unit, aim)) for aim, value in problem.at_least)
-    return problem.with_(friction=problem.friction.in_units_of(unit), at_least=least), unit
+    limits = {name: _over(getattr(problem, name), unit) for name in ("torque_limit", "power_limit")}
+    return problem.with_(friction=problem.friction.in_units_of(unit), at_least=least, **limits), unit
+
+
+def _over(limit: Limit | None, unit: float) -> Limit | None:
+    if limit is None:
+        return None
+    return tuple(each / unit for each in limit) if isinstance(limit, tuple) else limit / unit
 
 
 def restated(level: Level, unit: float, objective: Objective) -> Level:

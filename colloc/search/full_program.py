@@ -12,10 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from colloc.collocation.layout import Layout, problem_layout
+from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import heading, transcribed
 from colloc.results.level import REDUCED, Level
 from colloc.search.diagnosis import explanation
@@ -112,14 +114,19 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     problem = space.problem.with_(scheme=space.mesh.scheme.name)
     program = transcribed(problem, found.gait, space.phase_mesh(found.gait).edges, space.far)
     x = feasible_point(program, space.full_parameters(found.v), delta)
-    program = heading(program, x)
+    reduced = found.program or ReducedProgram(space, delta)
+    program = _limited(reduced, heading(program, x))
     solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
     before = solver.measured(x, delta, *_multipliers(found, program))
+    if found.conditions.violation > RADIUS:  # no gait within reach is admissible
+        kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
+        return level_of(program, kept, delta, REDUCED), explanation(program, kept, delta)
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
     for _ in range(_ROUNDS):  # the gait may have moved so far that other instants are the worst
-        if not result.optimal or space.move_checks(result.x[own]) <= _ADMISSIBLE:
+        if not result.optimal or reduced.place_rows(result.x[own]) <= _ADMISSIBLE:
             break
+        solver.transcription = program = _limited(reduced, program)
         result = solver.solve_within(result.x, delta, (result.lam_x, result.lam_g), RADIUS).accumulated(result)
     if result.optimal:
         return level_of(program, result, delta, problem.formulation), ""
@@ -132,11 +139,20 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     return level_of(program, kept, delta, REDUCED), f"{explanation(program, kept, delta)} {ended}."
 
 
+def _limited(reduced: ReducedProgram, program: GaitProgram) -> GaitProgram:
+    """The full program with the bounds on actuators where the reduced one has them."""
+    return program if reduced.actuators is None else reduced.actuators.laid_on(program)
+
+
 def _multipliers(found: Found, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
     conditions, space, reached = found.conditions, found.space, len(found.space.problem.at_least)
     of_period, on_rows = np.split(conditions.on_rows, [conditions.on_rows.size - space.row_lower.size])
+    if found.program is not None and found.program.actuators is not None:
+        limited = found.program.actuators
+        of_period, on_actuators = np.split(of_period, [of_period.size - limited.placed.shape[1]])
+        lam_g[program.groups[ACTUATORS]] = limited.multipliers(on_actuators)
     if reached:
         lam_g[program.groups["at least"]] = of_period[-reached:]
     at = 0

@@ -48,6 +48,8 @@ _FEWEST = 12
 _LEVELS = (1.0, 0.2)
 """Deltas at which starts are compared, in units of the problem's first one."""
 _SAME_EFFICIENCY, _SAME_GAIT = 1e-3, 0.05
+_BROKEN = 1e-2
+"""Violation of a row beyond which a gait is not compared with others."""
 _FOLLOWED, _PROMISING, _CLOSE = 3, 0.8, 0.01
 """How many gaits are followed to the final delta, the share of the best value that they need at the coarse one, and how
 far they may be from the best at the final one to be optimised on the whole mesh."""
@@ -154,6 +156,8 @@ def _follow(space: SearchSpace, v: np.ndarray, start: int, deltas: list[float], 
         if is_viscous(found):
             continue  # as far as this delta goes, the start is as it was
         space, v, radius = found.space, found.v, NEXT_RADIUS
+        if found.conditions.violation > _BROKEN:
+            continue  # no member of the class yet, whatever its value
         at = next((c for c in here if same_gait(problem, c.found, found)), None)
         new = at is None
         if at is None:

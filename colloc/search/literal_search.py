@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, nearest_parameters, transcribed
@@ -24,7 +23,8 @@ from colloc.search.nlp import NlpResult, Solver
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, deltas
 from colloc.verification.refinement import planned_mesh
 
-_MESHES = 3
+_MESHES, _ITERATIONS = 8, 1500
+"""Meshes at the final delta, and iterations of IPOPT on each, at most: from a guess it may need five hundred."""
 
 
 def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None = None) -> Solution:
@@ -44,7 +44,7 @@ def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None =
     def solved(delta: float) -> NlpResult:
         nonlocal message
         x = feasible_point(program, parameters, delta)
-        solver = Solver(heading(program, x))
+        solver = Solver(heading(program, x), {"max_iter": _ITERATIONS})
         result = solver.solve(x, delta, None, radius)
         levels.append(restated(level_of(program, result, delta, problem.formulation), unit, problem.objective))
         if on_level is not None:
@@ -57,12 +57,14 @@ def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None =
         if not result.optimal:
             break
         parameters, radius = result.x[program.layout.parameters[:, 0]], NEXT_RADIUS
+    kept = np.empty(0)
     for _ in range(_MESHES if result.optimal and problem.mesh_tolerance > 0 else 0):
         gait = program.member(parameters)
         mesh = program.phase_mesh(gait)
-        plan = planned_mesh(problem, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance)
+        plan = planned_mesh(problem, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
         if plan is None:
             break
+        kept = np.concatenate([kept, plan.kept])
         program = transcribed(problem.with_(scheme=plan.scheme), gait, plan.edges)
         parameters, radius = nearest_parameters(program, gait), REMESH_RADIUS
         result = solved(delta)
@@ -72,7 +74,7 @@ def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None =
     return Solution(stated, levels, seconds=time.perf_counter() - begin, message=message)
 
 
-def _why(solver: Solver[GaitProgram], x: np.ndarray, result: NlpResult, delta: float) -> str:
+def _why(solver: Solver, x: np.ndarray, result: NlpResult, delta: float) -> str:
     """What failed, and whether the equations were to blame from the start."""
     redundant, text = redundant_equations(solver, x, delta), explanation(solver.transcription, result, delta)
     if redundant:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.collocation.program import Program
+from colloc.collocation.program import GaitProgram
 from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
 from colloc.search.stop_request import StopRequest
@@ -95,7 +94,6 @@ class NlpResult:
 
 
 OPTIMAL_TOLERANCE = 1e-6
-AnyProgram = TypeVar("AnyProgram", bound=Program)
 _REGIONS, _ALIKE, _WIDEST = 20, 3, 1.0
 """Trust regions that may follow each other, and how many of them have the first one's radius. A gait that still moves then is
 not near its optimum at all (paths of three joints, whose basins end between deltas, go 2 rad and more), so regions double,
@@ -105,10 +103,10 @@ _INSIDE = 0.999
 over the multiplier, which is small where efficiency is flat."""
 
 
-class Solver(Generic[AnyProgram]):
+class Solver:
     """A transcription bound to IPOPT; built once, solved for many deltas and starts."""
 
-    def __init__(self, transcription: AnyProgram, options: dict[str, object] | None = None) -> None:
+    def __init__(self, transcription: GaitProgram, options: dict[str, object] | None = None) -> None:
         self.transcription = transcription
         self.oracles: Oracles = oracles(transcription.assembly)
         own = LIFTED_OPTIONS if transcription.lifted else {}

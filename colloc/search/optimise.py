@@ -15,13 +15,15 @@ from colloc.gaits.symmetry import NONE
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
 from colloc.results.level import Level
+from colloc.results.search_step import SearchStep
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.friction_unit import in_friction_units, in_unit, restated
 from colloc.search.full_program import answer, level_found
-from colloc.search.global_search import STARTS, Watch, best_of
+from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
 from colloc.search.prescribed import measured
 from colloc.search.reduced_search import Found, descended, refined, searched
+from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.search.saddles import off_saddles
 from colloc.system.errors import NotConvergedError
 
@@ -121,6 +123,8 @@ def maximise_efficiency(
     >>> maximise_efficiency(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral"))).status
     'solved'
     """
+    if problem.gait.mixes and not literal:
+        return best_gait(problem, 1, on_level)
     begin = time.perf_counter()
     solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
     if problem.gait.free and is_trivial(solution):
@@ -136,20 +140,20 @@ def maximise_efficiency(
 
 def best_gait(
     problem: Problem,
-    starts: int = STARTS,
+    starts: int | None = None,
     on_level: Report | None = None,
     seconds: float = np.inf,
     before: Sequence[Level] = (),
-    watch: Watch = lambda step: None,
+    watch: Callable[[SearchStep | str], object] = lambda step: None,
 ) -> Solution:
     """Maximise a problem's objective over the whole class, as far as many starts can tell, and certify the result.
 
     Parameters
     ----------
     problem : Problem
-    starts : int
+    starts : int, optional
         The guess, known gaits and seeded samples (`colloc.search.global_search.starting_gaits`). With 1 the guess alone, as
-        `maximise_efficiency`.
+        `maximise_efficiency`. By default 32, of relaxed gaits 8.
     on_level : callable, optional
         Called with every `colloc.results.solution.Level` of the best gait.
     seconds : float
@@ -157,14 +161,22 @@ def best_gait(
     before : sequence of Level
         Levels of an interrupted run; it goes on from the last one.
     watch : callable
-        Called with every `colloc.results.search_step.SearchStep` before the first level.
+        Called with every `colloc.results.search_step.SearchStep` before the first level; of relaxed gaits with what is under
+        way, in words.
 
     Returns
     -------
     Solution
         ``solution.starts`` and ``solution.others`` say what it is the best of; where it shrank to the bound on the shape speed,
-        ``solution.finite`` is the best gait that did not, if there is one.
+        ``solution.finite`` is the best gait that did not, if there is one. A class of relaxed gaits is answered by the best
+        finite gait near its optimum, which is ``solution.relaxed``.
     """
+    if problem.gait.mixes:
+        solution = best_relaxed_gait(problem, starts or RELAXED_STARTS, seconds=seconds, report=watch)
+        if on_level is not None:
+            on_level(solution.last)
+        return solution
+    starts = starts or STARTS
     if starts == 1 or before or not problem.gait.free:
         return maximise_efficiency(problem, on_level, before)
     begin = time.perf_counter()
@@ -208,6 +220,8 @@ def _certified(solution: Solution) -> None:
     except NotConvergedError as error:
         solution.message = f"the replay failed: {error}"
         return
+    if solution.message and not solution.last.optimal:
+        return  # why the search ended says more than what does not hold for that
     failed = solution.certificate.failures
     if failed:
         failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)

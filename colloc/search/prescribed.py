@@ -1,17 +1,20 @@
-"""A motion with nothing free, collocated: no optimiser, only its balance on a mesh that is refined until it is accurate."""
+"""Gaits that are collocated as they are, by no optimiser: prescribed motions, and finite gaits that stand for relaxed ones."""
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.warm_start import balanced_variables
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.level import PRESCRIBED, Level
+from colloc.results.level import PRESCRIBED, REALISED, Level
 from colloc.verification.refinement import planned_mesh
 
 _MESHES = 4
@@ -28,11 +31,22 @@ def measured(problem: Problem) -> tuple[Level, str]:
             break
         mesh = Mesh(scheme(plan.scheme), plan.edges)
         message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
-    layout = problem_layout(problem, mesh)
-    x = balanced_variables(problem, layout, mesh, gait, np.empty(0), problem.delta)
+    return replace(_level(problem, mesh, gait, np.empty(0), PRESCRIBED), seconds=time.perf_counter() - begin), message
+
+
+def realised(problem: Problem, gait: Corners) -> Level:
+    """What a polygon achieves with an interval for every side; the problem's class is that of finite gaits."""
+    level = _level(problem, Mesh(scheme(problem.scheme), gait.phases), gait, gait.vertices.ravel(order="F"), REALISED)
+    return replace(level, knots=gait.phases)
+
+
+def _level(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, word: str) -> Level:
+    """The gait with everything else following from its balance."""
+    begin, layout = time.perf_counter(), problem_layout(problem, mesh)
+    x = balanced_variables(problem, layout, mesh, gait, parameters, problem.delta)
     periods, seconds = 1.0 / problem.gait.fraction, time.perf_counter() - begin
     distance, work = (periods * float(x[row[0, -1]]) for row in (layout.distance, layout.work))
     return Level(
         problem.delta, mesh.edges, x, np.zeros_like(x), np.empty(0), distance / work, distance, work,
-        0.0, 0.0, 0.0, PRESCRIBED, True, 0, seconds, seconds, mesh.scheme.name, PRESCRIBED,
-    ), message  # fmt: skip
+        0.0, 0.0, 0.0, word, True, 0, seconds, seconds, mesh.scheme.name, word,
+    )  # fmt: skip

@@ -36,7 +36,7 @@ _DRIER, _LOST = 0.1, 0.5
 _ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
 _ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
 """Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
-_ADMISSIBLE = 1e-8
+_ADMISSIBLE, _ALIKE = 1e-8, 1e-3
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
 _MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
@@ -59,6 +59,8 @@ class Found:
         Of the reduced program.
     accuracy : float
         Of it that was asked for.
+    program : ReducedProgram, optional
+        Whose conditions these are; by default the program of that space at that delta.
     iterations, evaluations : int
     seconds : float
     curvature : (n, n), optional
@@ -75,13 +77,14 @@ class Found:
     evaluations: int
     seconds: float
     curvature: np.ndarray | None = None
+    program: ReducedProgram | None = None
 
     @classmethod
     def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
         """A gait as it is, to go on from."""
-        space.move_checks(v)
         program = ReducedProgram(space, delta)
-        return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0)
+        program.place_rows(v)
+        return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0, program=program)
 
     @property
     def optimal(self) -> bool:
@@ -109,23 +112,27 @@ def settled(
     """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
-    space.move_checks(v)
+    program.place_rows(v)
+    violation = np.inf
     for _ in range(rounds or _ROUNDS[accuracy]):
-        before = v
+        before, worse = v, violation
         fresh = curvature is None
         if fresh and accuracy < VERY_ROUGH:
             curvature = space.metric(v)
         result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
-        admissible = space.move_checks(v) <= _ADMISSIBLE
+        admissible = program.place_rows(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < STATIONARY[accuracy]
         # what was learned across kinks may end the search too early: then it begins anew
         curvature = result.curvature if stationary else None
         if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < _AT_REST)):
             break
-    seconds = time.perf_counter() - begin
-    return Found(space, v, delta, result.objective, conditions, accuracy, iterations, evaluations, seconds, curvature)
+        violation = conditions.violation
+        if violation > STATIONARY[ROUGH] and abs(violation - worse) < _ALIKE * worse and not result.on_edge:
+            break  # the rows contradict each other near here
+    counts = iterations, evaluations, time.perf_counter() - begin
+    return Found(space, v, delta, result.objective, conditions, accuracy, *counts, curvature, program)
 
 
 def settled_apart(

@@ -20,8 +20,12 @@ from colloc.gaits.problem import Problem
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.results.relaxed_solution import Optimality, RelaxedSolution, realised_gaits, relaxed_certificate
+from colloc.results.alternative import Alternative
+from colloc.results.realisation import realised_gaits, relaxed_certificate
+from colloc.results.relaxation import Optimality, Relaxation
+from colloc.results.solution import Solution
 from colloc.search.global_search import starting_gaits
+from colloc.search.prescribed import realised
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 
@@ -97,11 +101,13 @@ def relaxed_gaits(
     problem: Problem,
     starts: int,
     seconds: float = np.inf,
-    report: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], object] = lambda _: None,
     first: tuple = (),
     least_extent: float = 0.0,
-) -> list[Found]:
-    """Relaxed gaits at the problem's delta, most efficient first; the first is a local optimum, the others are nearly.
+) -> list[tuple[Found, int]]:
+    """Relaxed gaits at the problem's delta, most efficient first, and how many starts led to about each on few pieces.
+
+    The first is a local optimum, the others are nearly.
 
     Parameters
     ----------
@@ -136,18 +142,23 @@ def relaxed_gaits(
         return found.gait.extent < least_extent, found.objective
 
     known.sort(key=rank)
-    ends: list[Found] = []
+    ends: list[tuple[Found, int]] = []
     for found in _promising(known):
         if ends and time.perf_counter() - begin > seconds:
             break
         report(f"following {-found.objective:.4f}")
         with suppress(CollocError):
-            ends.append(descended(found))
+            ends.append((descended(found), sum(_alike(found, other) for other in known)))
     if not ends:
         raise NotConvergedError("no start led to a relaxed gait; give another guess.")
-    best, *others = sorted(ends, key=rank)
+    (best, count), *others = sorted(ends, key=lambda end: rank(end[0]))
     report(f"refining {-best.objective:.4f}")
-    return [refined(best), *others]
+    return [(refined(best), count), *others]
+
+
+def _alike(one: Found, other: Found) -> bool:
+    """Whether two gaits on few pieces are the same, as far as their efficiency tells."""
+    return abs(one.objective / other.objective - 1) <= _SAME
 
 
 def _tried(problem: Problem, gait: AnyGait, pieces: int) -> Found:
@@ -169,7 +180,7 @@ def _promising(known: list[Found]) -> list[Found]:
     for found in known:
         if found.objective > _PROMISING * known[0].objective or len(chosen) == _FOLLOWED:
             break
-        if all(abs(found.objective / other.objective - 1) > _SAME for other in chosen):
+        if not any(_alike(found, other) for other in chosen):
             chosen.append(found)
     return chosen
 
@@ -201,10 +212,10 @@ def best_relaxed_gait(
     starts: int,
     repeats: tuple[int, ...] = (1, 2, 4),
     seconds: float = np.inf,
-    report: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], object] = lambda _: None,
     first: tuple = (),
     least_extent: float = 0.0,
-) -> RelaxedSolution:
+) -> Solution:
     """The best relaxed gait that so many starts lead to, and finite gaits near it, all certified.
 
     Parameters
@@ -217,14 +228,14 @@ def best_relaxed_gait(
     if problem.objective != EFFICIENCY or problem.at_least or problem.rotation != 0:
         raise ProblemError("relaxed gaits are measured by their efficiency alone; leave objective, rotation and at_least out.")
     begin = time.perf_counter()
-    best, *others = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
-    solution = certified(best, repeats, report)
+    ends = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
+    solution = certified(ends[0][0], repeats, report)
     solution.seconds, solution.starts = time.perf_counter() - begin, starts
-    solution.others = tuple((-other.objective, other.gait.extent) for other in others)
+    solution.others = tuple(Alternative(-f.objective, f.delta, count, False, f.gait) for f, count in ends)
     return solution
 
 
-def certified(best: Found, repeats: tuple[int, ...] = (1,), report: Callable[[str], None] = lambda _: None) -> RelaxedSolution:
+def certified(best: Found, repeats: tuple[int, ...] = (1,), report: Callable[[str], object] = lambda _: None) -> Solution:
     """A relaxed gait, and finite gaits near it, with their certificates."""
     report("certifying the relaxed gait")
     problem, conditions, gait = best.space.problem, best.conditions, best.gait
@@ -233,11 +244,7 @@ def certified(best: Found, repeats: tuple[int, ...] = (1,), report: Callable[[st
     price = float(prices(best)[0][free].min(initial=0.0))
     optimality = Optimality(-best.objective, conditions.kkt_error, conditions.violation, price, best.iterations)
     certificate = relaxed_certificate(problem, gait, optimality)
-    return RelaxedSolution(
-        problem,
-        gait,
-        optimality,
-        certificate,
-        realised_gaits(problem, gait, repeats, certificate.efficiency, report),
-        best.seconds,
-    )
+    finite = realised_gaits(problem, gait, repeats, certificate.efficiency, report)
+    relaxed = Relaxation(gait, optimality, certificate, finite)
+    level = realised(problem.with_(gait=problem.gait.finite), relaxed.best.gait)
+    return Solution(problem, [level], relaxed.best.certificate, best.seconds, message=relaxed.message, relaxed=relaxed)

@@ -37,12 +37,13 @@ def off_saddles(found: Found, lacks: str, report: Report) -> tuple[Found, str]:
 def _better(found: Found) -> Iterator[Found]:
     """Gaits that the search comes to from beside a saddle, and that are better."""
     program = ReducedProgram(found.space, found.delta)
+    program.place_rows(found.v)
     here = curvature(program, found.v)
     if here.smallest + here.error < -_FALLS * abs(found.objective):
         lagrangian, length = Lagrangian(program, found.v), np.linalg.norm(found.v)
-        value = lagrangian(found.v)[0]
+        value = lagrangian.value(found.v)
         ways = [side * step * length * here.direction for step in STEPS for side in (1.0, -1.0)]
-        for beside in [found.v + way for way in ways if lagrangian(found.v + way)[0] < value]:
+        for beside in [found.v + way for way in ways if lagrangian.value(found.v + way) < value]:
             other = settled_apart(found.space, beside, found.delta, NEXT_RADIUS, ROUGH)
             if other.objective < found.objective - _GAIN * abs(found.objective):
                 yield other

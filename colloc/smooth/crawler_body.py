@@ -14,6 +14,7 @@ bump grows at the rear (p = LAP), travels (p falls to 0) and is flattened at the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -104,30 +105,36 @@ class CrawlerBody(PanelBody):
         c, s = xp.cos(k * p), xp.sin(k * p)
         return self.reach * c, -self.reach * k * s, -self.reach * k * k * c
 
-    def _profile(self, x: Array, b: Array) -> tuple[Array, Array, Array]:
-        """``sum b_m phi_m(x)`` and its first two derivatives, b ``(modes, n_time)``; value and both vanish at the ends."""
-        xp = namespace(x, b)
-        inside = x * x < 1
-        y = xp.where(inside, 1 - x * x, 0.0 * x)
-        value = slope = curvature = 0.0
+    @cached_property
+    def _powers(self) -> np.ndarray:
+        """Coefficients of x^k in the polynomials that (1 - x^2)^3 is multiplied by, ``(modes, modes)``, k along the rows."""
+        polynomials = np.zeros((self.modes, self.modes))
         for m in range(self.modes):
-            t, dt, ddt = (_chebyshev(m, order, xp.where(inside, x, 0.0 * x)) for order in (0, 1, 2))
-            amplitude = b[m : m + 1, :] * (-ODD_SCALE if m == 1 else 1.0)
-            value += amplitude * y**3 * t
-            slope += amplitude * (y**3 * dt - 6 * x * y**2 * t)
-            curvature += amplitude * (y**3 * ddt - 12 * x * y**2 * dt + (24 * x * x * y - 6 * y**2) * t)
-        return value, slope, curvature
+            polynomials[: m + 1, m] = np.polynomial.chebyshev.cheb2poly(np.eye(m + 1)[m])
+        polynomials[:, 1] *= -ODD_SCALE
+        return polynomials
+
+    def _profile(self, x: Array, b: Array, order: int = 0) -> Array:
+        """``sum b_m phi_m(x)``, or its first or second derivative, b ``(modes, n_time)``; all three vanish at the ends."""
+        xp = namespace(x, b)
+        y = xp.where(x * x < 1, 1 - x * x, 0.0 * x)
+        p, *slopes = (_polynomial(np.polynomial.polynomial.polyder(self._powers, k), b, x) for k in range(order + 1))
+        if order == 0:
+            return y**3 * p
+        if order == 1:
+            return y**3 * slopes[0] - 6 * x * y**2 * p
+        return y**3 * slopes[1] - 12 * x * y**2 * slopes[0] + (24 * x * x * y - 6 * y**2) * p
 
     def _x(self, s: np.ndarray, centre: Array) -> Array:
         return 2 * (s - 0.5) / self.width - 2 * centre
 
     def tangent(self, s: np.ndarray, angles: Array) -> Array:
-        return self._profile(self._x(s, self._place(angles[0:1, :])[0]), angles[1:, :])[0]
+        return self._profile(self._x(s, self._place(angles[0:1, :])[0]), angles[1:, :])
 
     def turning(self, s: np.ndarray, angles: Array, rates: Array) -> Array:
         centre, pace, _ = self._place(angles[0:1, :])
         x = self._x(s, centre)
-        return self._profile(x, rates[1:, :])[0] - 2 * pace * rates[0:1, :] * self._profile(x, angles[1:, :])[1]
+        return self._profile(x, rates[1:, :]) - 2 * pace * rates[0:1, :] * self._profile(x, angles[1:, :], 1)
 
     def angle(self, s: np.ndarray, q: Array) -> Array:
         return self.tangent(_column(s, q), q)
@@ -138,11 +145,10 @@ class CrawlerBody(PanelBody):
     def angle_slopes(self, s: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         centre, pace, bent = self._place(q[0:1])
         x, dp = self._x(s[:, None], centre), rates[0:1]
-        _, slope, curvature = self._profile(x, q[1:])
-        turned = self._profile(x, rates[1:])[1]
+        slope, curvature = (self._profile(x, q[1:], order) for order in (1, 2))
+        turned = self._profile(x, rates[1:], 1)
         one = np.eye(self.modes)[:, :, None]
-        modes = [self._profile(x, unit) for unit in one]
-        phi, dphi = (np.stack([mode[order] for mode in modes], axis=1) for order in (0, 1))
+        phi, dphi = (np.stack([self._profile(x, unit, order) for unit in one], axis=1) for order in (0, 1))
         angle = np.concatenate([-2 * (pace * slope)[:, None], phi], axis=1)
         place = -2 * pace * turned - 2 * bent * dp * slope + 4 * pace**2 * dp * curvature
         rate = np.concatenate([place[:, None], -2 * (pace * dp) * dphi], axis=1)
@@ -156,7 +162,7 @@ class CrawlerBody(PanelBody):
     # shapes
     def modes_at(self, x: np.ndarray) -> np.ndarray:
         """Profiles at places ``(n,)`` across the bump, -1 to 1, ``(n, modes)``."""
-        return np.concatenate([self._profile(x[:, None], unit[:, None])[0] for unit in np.eye(self.modes)], axis=1)
+        return np.concatenate([self._profile(x[:, None], unit[:, None]) for unit in np.eye(self.modes)], axis=1)
 
     @property
     def _places(self) -> np.ndarray:
@@ -222,11 +228,10 @@ def _column(s: np.ndarray, q: Array) -> Array:
     return s[:, None] if isinstance(q, np.ndarray) else type(q)(s[:, None])
 
 
-def _chebyshev(degree: int, order: int, x: Array) -> Array:
-    """A derivative of a Chebyshev polynomial."""
-    coefficients = np.polynomial.chebyshev.cheb2poly(np.eye(degree + 1)[degree])
-    coefficients = np.polynomial.polynomial.polyder(coefficients, order) if order else coefficients
+def _polynomial(powers: np.ndarray, b: Array, x: Array) -> Array:
+    """``sum_k (powers b)_k x^k`` by Horner's rule, b ``(modes, n_time)``."""
+    coefficients = namespace(b).matmul(powers, b)
     value = 0.0 * x
-    for coefficient in coefficients[::-1]:
-        value = value * x + float(coefficient)
+    for k in reversed(range(len(powers))):
+        value = value * x + coefficients[k : k + 1, :]
     return value

@@ -1,18 +1,29 @@
-"""The smooth body of a few modes as a `colloc.mechanics.bodies.Body`."""
+"""The smooth body of a few modes as a `colloc.mechanics.bodies.Body`: ``Theta(s, t) = sum_m q_m(t) phi_m(s)``, s from 0 to 1.
+
+Modes have zero mean, so that Theta is measured from the mean direction of the body and the orientation of that direction is
+the rigid rotation. The shape coordinates q take the place of joint angles [rad].
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
-from colloc.smooth.modes import Modes
+from colloc.smooth.curve import Panels
 from colloc.smooth.panel_body import PanelBody
+from colloc.system.errors import ProblemError
+
+LEGENDRE, FOURIER = "legendre", "fourier"
 
 _PLACES_A_MODE = 4
 """Where on the body |Theta| is bounded."""
 
 
-class ModalBody(Modes, PanelBody):
+@dataclass(frozen=True)
+class ModalBody(PanelBody):
     """A smooth body of unit length with a few bending modes; its shape coordinates are their amplitudes [rad].
 
     Parameters
@@ -33,8 +44,42 @@ class ModalBody(Modes, PanelBody):
     'implicit velocity'
     """
 
+    modes: int = 4
+    basis: str = LEGENDRE
+    panels: int = 8
+    order: int = 6
+
     coordinate, quantity = "mode", "mode"
     symmetric = True
+
+    def __post_init__(self) -> None:
+        if self.basis not in (LEGENDRE, FOURIER):
+            raise ProblemError(f"basis must be {LEGENDRE!r} or {FOURIER!r}, not {self.basis!r}.")
+        for name, least, most in (("modes", 1, 20), ("panels", 1, 200), ("order", 2, 12)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
+                raise ProblemError(f"{name} must be a whole number from {least} to {most}, not {value!r}.")
+        if self.basis == FOURIER and self.modes % 2:
+            raise ProblemError(f"fourier modes come in pairs (sine and cosine); {self.modes} is odd.")
+
+    @property
+    def grid(self) -> Panels:
+        """The panels, the same at all times."""
+        return Panels(np.linspace(0.0, 1.0, self.panels + 1)[:, None], self.order)
+
+    def modes_at(self, s: np.ndarray) -> np.ndarray:
+        """Modes at arc lengths s, ``(*s.shape, modes)``."""
+        s = np.asarray(s, dtype=float)
+        if self.basis == LEGENDRE:
+            return np.polynomial.legendre.legvander(2 * s - 1, self.modes)[..., 1:]
+        k = 2 * np.pi * np.arange(1, self.modes // 2 + 1)
+        waves = k * s[..., None]
+        return np.stack([np.sin(waves), np.cos(waves)], axis=-1).reshape(*s.shape, self.modes)
+
+    @property
+    def parities(self) -> np.ndarray:
+        """``(modes,)``: 1 for modes that are even about the middle of the body, -1 for odd ones."""
+        return np.resize([-1.0, 1.0], self.modes)
 
     @property
     def n_joint(self) -> int:
@@ -83,3 +128,36 @@ class ModalBody(Modes, PanelBody):
     @property
     def bending(self) -> np.ndarray:
         return np.diff(self.limited, axis=0)
+
+    def laid(self, lengths: np.ndarray) -> np.ndarray:
+        """``(modes, n_joint)``: amplitudes of the smooth shape nearest (in the mean square) to a chain of given joint angles.
+
+        The chain's tangent angle is a staircase; only its mean direction, which is a rigid rotation, is left out.
+        """
+        lengths = np.asarray(lengths, dtype=float)
+        ends = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
+        steps = np.tril(np.ones((lengths.size, lengths.size - 1)), -1)
+        nodes, weights = np.polynomial.legendre.leggauss(2 * self.modes + 4)
+        s = ends[:-1, None] + np.diff(ends)[:, None] * 0.5 * (nodes + 1)
+        w = np.diff(ends)[:, None] * 0.5 * weights
+        moments = np.einsum("lg,lgm->ml", w, self.modes_at(s)) @ steps
+        return np.linalg.solve(_gram(self), moments)
+
+    def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
+        """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can: factors ``(modes,)`` of the cosine and the sine of
+        the phase."""
+        grid = _FINE
+        s, w = grid.nodes[:, 0], grid.weights[:, 0]
+        project = np.linalg.solve(_gram(self), self.modes_at(s).T * w)
+        phase = 2 * np.pi * waves * (s - 0.5)
+        return -project @ np.sin(phase), project @ np.cos(phase)
+
+
+_FINE = Panels(np.linspace(0.0, 1.0, 41)[:, None], 8)
+
+
+@cache
+def _gram(body: ModalBody) -> np.ndarray:
+    """Inner products of the modes."""
+    values = body.modes_at(_FINE.nodes[:, 0])
+    return values.T @ (_FINE.weights * values)

@@ -23,7 +23,7 @@ _ANCHOR_MOVES = 5
 _STEPS = 1000
 
 
-class Shapes(Protocol):
+class PanelShapes(Protocol):
     """Tangent angles on fixed panels, as functions of a few shape coordinates."""
 
     @property
@@ -40,7 +40,7 @@ class Shapes(Protocol):
         """Derivatives of both along (shape, rates), ``(n_place, 2 n_joint, n_time)`` each, or 1 where the same at all times."""
 
 
-def panel_sliding(body: Shapes, friction: Law, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
+def panel_sliding(body: PanelShapes, friction: Law, q: Array, rates: Array, z: Array, delta: Array) -> Sliding:
     """The balance for shapes and their rates ``(n_joint, n_time)`` (paper, eqs. ftb and W); NumPy and CasADi."""
     xp, grid = namespace(q, rates, z), body.grid
     s = grid.nodes[:, 0]
@@ -51,7 +51,7 @@ def panel_sliding(body: Shapes, friction: Law, q: Array, rates: Array, z: Array,
     return Sliding(resultant(now, fs, fn), mean_velocity(now, vs, vn), power)
 
 
-def _fields(body: Shapes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
+def _fields(body: PanelShapes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
     own = body.grid
     s, ends = own.nodes[:, 0], own.edges[:, 0]
     grid = Panels(np.broadcast_to(own.edges, (ends.size, q.shape[1])), own.order)
@@ -59,7 +59,7 @@ def _fields(body: Shapes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
 
 
 def solved_on_panels(
-    body: Shapes,
+    body: PanelShapes,
     friction: Law,
     q: np.ndarray,
     rates: np.ndarray,
@@ -71,7 +71,7 @@ def solved_on_panels(
 
     Parameters
     ----------
-    body : Shapes
+    body : PanelShapes
     friction : Law
     q, rates : (n_joint, n_time)
     delta : float
@@ -116,7 +116,7 @@ class _At(NamedTuple):
 
 
 def _at_anchor(
-    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+    body: PanelShapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
 ) -> _At:
     batch = PanelBatch(_fields(body, q, rates), friction, np.arange(q.shape[1]), reference)
     now = Curve(*batch.curve)
@@ -125,7 +125,7 @@ def _at_anchor(
 
 
 def panel_motion(
-    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: PanelShapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> BalancedMotion:
     """The motion at instants that were solved for."""
     n = q.shape[1]
@@ -141,7 +141,7 @@ def panel_motion(
 
 
 def panel_slopes(
-    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: PanelShapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> np.ndarray:
     """Derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to shapes and rates."""
     slopes = np.empty((6, 2 * len(q), q.shape[1]))
@@ -153,7 +153,7 @@ def panel_slopes(
 
 
 def _slopes(
-    body: Shapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
+    body: PanelShapes, friction: Law, q: np.ndarray, rates: np.ndarray, delta: float, reference: int, z: np.ndarray
 ) -> np.ndarray:
     """The nodes take the place of a chain's links: their weights that of lengths, without a couple."""
     batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q, rates, delta, reference, z)

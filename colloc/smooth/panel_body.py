@@ -16,7 +16,7 @@ from colloc.smooth.smooth_body import SmoothBody
 
 
 class PanelBody(SmoothBody):
-    """A body with a few shape coordinates; it answers `colloc.smooth.panel_balance.Shapes`."""
+    """A body with a few shape coordinates; it answers `colloc.smooth.panel_balance.PanelShapes`."""
 
     symmetries = ("none", "antipodal")
     usual = Usual(

@@ -13,17 +13,13 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sampling import LATIN_HYPERCUBE
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, Outcome, basins, counts
 from colloc.results.level import Level
-from colloc.results.relaxed_solution import RelaxedSolution
 from colloc.results.search_step import SearchStep
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait, maximise_efficiency
-from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.studies.campaign import run_starts
 from colloc.studies.run import Progress, StudyRun
 from colloc.studies.study import Study, read_study_file
@@ -42,7 +38,7 @@ def solve(
     seconds: float = np.inf,
     verbose: bool = False,
     progress: Callable[[Level | SearchStep | str], object] | None = None,
-) -> Solution | RelaxedSolution:
+) -> Solution:
     """The most efficient gait of a problem, certified: what ``colloc solve`` finds.
 
     Parameters
@@ -50,7 +46,7 @@ def solve(
     problem : Problem or path-like
         A problem, or a problem file.
     starts : int, optional
-        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 16 (relaxed gaits: 8).
+        Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 32 (relaxed gaits: 8).
     seconds : float
         Wall time after which no other start is begun.
     verbose : bool
@@ -61,7 +57,7 @@ def solve(
 
     Returns
     -------
-    Solution, or of a class of relaxed gaits RelaxedSolution
+    Solution
         Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that does not converge.
 
     Raises
@@ -82,12 +78,8 @@ def solve(
         raise ProblemError(f"starts must be at least 1, not {starts}.")
     if not seconds > 0:
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
-    told, count = _told(verbose, progress), starts or stated.starts
-    solution: Solution | RelaxedSolution
-    if isinstance(stated.problem.gait, Relaxed):
-        solution = best_relaxed_gait(stated.problem, count or RELAXED_STARTS, seconds=seconds, report=told)
-    else:
-        solution = best_gait(stated.problem, count or STARTS, told, seconds, watch=told)
+    told = _told(verbose, progress)
+    solution = best_gait(stated.problem, starts or stated.starts, told, seconds, watch=told)
     solution.source = stated.source
     return solution
 
@@ -159,7 +151,7 @@ class Starts:
 
 def reopened(problem: Problem, outcome: Outcome) -> Solution:
     """The solution that a start led to: solved at the final delta from its gait, or again from its guess if it failed."""
-    if outcome.status != SOLVED:
+    if outcome.status != SOLVED or problem.gait.mixes:  # no finite gait says what it comes near
         return maximise_efficiency(problem.with_(guess=outcome.guess))
     return maximise_efficiency(problem.with_(guess=outcome.gait, delta_start=problem.delta))
 

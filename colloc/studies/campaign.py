@@ -15,6 +15,7 @@ from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, 
 from colloc.results.level import Level
 from colloc.results.solution import Solution
 from colloc.search.optimise import is_trivial, maximise_efficiency
+from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
 
 
@@ -112,7 +113,14 @@ def run_starts(
         starts under way are tried again one by one, and one that kills its worker again is recorded as crashed.
     known : mapping of int to a gait, optional
         Gaits from which starts of these numbers begin instead of a sample: results of an earlier run to go on from.
+
+    Raises
+    ------
+    ProblemError
+        If nothing is free: a prescribed motion is the same from every start.
     """
+    if not problem.gait.free:
+        raise ProblemError("a prescribed motion is the same from every start; colloc solve measures it.")
     starts = list(starts)
     waiting = iter(starts)
 

@@ -118,7 +118,7 @@ def failed_visit(work: Work, status: str, message: str) -> Visit:
 def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
     """The member of the problem's class next to a gait of any class; None if there is none that is admissible and moves."""
     body, kind = problem.body, problem.gait
-    if gait.n_joint != body.n_joint:
+    if gait.n_joint != body.n_joint or not kind.free:
         return None
     try:
         near = laid_into(kind, gait, body, problem.joint_limit, problem.smallest_shape_speed)
@@ -141,7 +141,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
         found = replay(
             problem.body,
             problem.friction,
-            lambda t: (gait.angles(t), gait.rates(t)),
+            gait,
             problem.delta * gait.delta_unit,
             instants=instants,
             most_instants=most_instants,
@@ -179,7 +179,7 @@ def visit(work: Work, found: dict[Index, AnyGait]) -> Visit:
 
     if work.first:
         solve(GUESS, problem.guess, problem.delta_start)
-        for number in work.cold:
+        for number in work.cold if problem.gait.free else ():
             solve(COLD, start_gait(problem, LATIN_HYPERCUBE, work.seed, number), problem.delta_start)
     warm = _distinct_untried(work, members, scores)
     for rank, key in enumerate(warm):

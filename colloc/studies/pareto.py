@@ -104,6 +104,8 @@ def pareto_front(
     >>> colloc.pareto_front(problem, "speed", "efficiency", 3, starts=1)
     <ParetoFront of quick: speed against efficiency, 3 points, all certified>
     """
+    if not problem.gait.free:
+        raise ProblemError("nothing is free in a prescribed motion: it is one point, and no front.")
     aims = objective_from(first), objective_from(second)
     if aims[0].expression == aims[1].expression:
         raise ProblemError(f"a front needs two objectives, not {aims[0].name} twice.")

@@ -156,14 +156,6 @@ def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     return row
 
 
-def best_over(table_values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Largest value along an axis, NaN where there is none, and where it is (0 there)."""
-    filled = np.where(np.isnan(table_values), -np.inf, table_values)
-    where = filled.argmax(axis=axis)
-    best = filled.max(axis=axis)
-    return np.where(np.isfinite(best), best, np.nan), where
-
-
 def cell_text(study: Study, cell: Index) -> str:
     """Coordinates of a cell for people."""
     return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in study.coordinates(cell).items())

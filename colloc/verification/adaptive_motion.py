@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
+from colloc.mechanics.actuators import driven_power_in_balance
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.driven_power import driven_power_in_balance
 from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.replay import Path

@@ -81,7 +81,7 @@ def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray
     def shares(part: Mapping[str, float]) -> dict[str, float]:
         return _shares(problem, part, length)
 
-    of = (problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)))
+    of = (problem.body, problem.friction, gait)
     return fine_motion(*of, delta, edges, tolerance, shares, problem.uses("driven_work"))
 
 
@@ -176,7 +176,7 @@ def _collocated_intervals(
 ) -> _Own:
     nodes = left[:, None] + (right - left)[:, None] * rule.c
     rates = rates_at(
-        problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, nodes, fine.velocity(nodes),
+        problem.body, problem.friction, gait, delta, nodes, fine.velocity(nodes),
         problem.uses("driven_work"),
     )  # fmt: skip
     turned, moved, spent, delivered = increments(rule, right - left, rates)

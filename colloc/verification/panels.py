@@ -26,7 +26,8 @@ _MARGIN = 3.0
 class Panels(NamedTuple):
     """Panels in order of time: left end and width ``(n,)``, and at five instants of each: tail velocity ``(n, 5, 3)``, velocity
     of the centre of mass in the body frame (complex), power, power of the joints, shape speed, driven power, residual and lever
-    ``(n, 5)``; and how far all balanced motions lie apart ``(n, 5, 3)`` (`colloc.verification.followed_motion.FollowedMotion`).
+    ``(n, 5)``; shares of the actuators' limits ``(n, 5, n_share)``; and how far all balanced motions lie apart ``(n, 5, 3)``
+    (`colloc.verification.followed_motion.FollowedMotion`).
     At last the differences of both rules on the panel twice as wide that each is half of ``(n, 5)`` (see `differences`)."""
 
     left: np.ndarray
@@ -39,6 +40,7 @@ class Panels(NamedTuple):
     driven: np.ndarray
     residual: np.ndarray
     lever: np.ndarray
+    shares: np.ndarray
     apart: np.ndarray
     wider: np.ndarray
 
@@ -57,7 +59,7 @@ def halves(panels: Panels, new: tuple[np.ndarray, ...]) -> Panels:
     for old, between in zip(panels[2:-1], new, strict=True):
         merged = np.empty((old.shape[0], 9, *old.shape[2:]), dtype=old.dtype)
         merged[:, ::2], merged[:, 1::2] = old, between
-        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(-1, *old.shape[1:]))
+        fields.append(np.stack([merged[:, :5], merged[:, 4:]], axis=1).reshape(2 * old.shape[0], *old.shape[1:]))
     left, width = np.repeat(panels.left, 2), 0.5 * np.repeat(panels.width, 2)
     left[1::2] += width[1::2]
     return Panels(left, width, *[*fields, np.repeat(differences(panels), 2, axis=0)])

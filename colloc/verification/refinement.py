@@ -72,7 +72,7 @@ class MeshPlan:
 
 def kink_knots(problem: Problem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
     """Phases of the kinks of a gait's velocities, one for each group of very close ones."""
-    kinks = kink_phases(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), delta, fine)
+    kinks = kink_phases(problem.body, problem.friction, gait, delta, fine)
     apart = _ONE_KINK * problem.gait.fraction
     knots: list[float] = []
     for kink in kinks:

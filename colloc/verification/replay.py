@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
+from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits, driven_power_in_balance
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.driven_power import driven_power_in_balance
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
@@ -64,6 +65,8 @@ class Replay:
         Part of the period at which several motions are balanced; 0 for equal coefficients, where there is one.
     other_distance, other_work, other_rotation : float
         How much these could change if the body took any others of them, at most.
+    shares : (n_share,)
+        Largest shares of the actuators' limits; none unless limits were given.
     instants : int
     tail : ((n,), (3, n))
         Phases and tail velocities there.
@@ -89,6 +92,7 @@ class Replay:
     other_distance: float
     other_work: float
     other_rotation: float
+    shares: np.ndarray = field(compare=False)
     instants: int
     tail: tuple[np.ndarray, np.ndarray] = field(repr=False, compare=False)
     objective: Objective = EFFICIENCY
@@ -142,10 +146,11 @@ def _evaluated(
     delta: float,
     t: np.ndarray,
     near: np.ndarray | None,
-    sense: int,
     *,
+    sense: int,
     whole: bool,
     driven: bool,
+    limits: ActuatorLimits,
 ) -> tuple[np.ndarray, ...]:
     """`Panels` from z to apart at instants t ``(n, k)``; solves start from the tail velocities `near`, ``(3, n k)``.
 
@@ -157,7 +162,7 @@ def _evaluated(
         near = None  # which is a mean, and of no one direction
     shares = mixed[0] if mixed else np.ones((1, t.size))
     motions, residual, apart = [], np.zeros(t.size), np.zeros((3, t.size))
-    delivered = np.zeros(t.size)
+    delivered, used = np.zeros(t.size), np.full((len(limits.names), t.size), -np.inf)
     for share, some in zip(shares, rates if mixed else rates[None], strict=True):
         start = near
         if not friction.associated:
@@ -168,6 +173,9 @@ def _evaluated(
         motions.append(motion)
         if driven:
             delivered += share * driven_power_in_balance(body, friction, angles, some, motion.z, delta)
+        if limits.names:
+            done = limits.shares_in_balance(body, friction, angles, some, motion.z, delta)
+            used = np.maximum(used, np.where(np.isfinite(limits.least)[:, None], np.abs(done), done))
         residual = np.maximum(residual, left)
 
     def mean(name: str) -> np.ndarray:
@@ -181,7 +189,7 @@ def _evaluated(
     )
     values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), pace, delivered, residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
-    return z, *(value.reshape(t.shape) for value in values), apart
+    return z, *(value.reshape(t.shape) for value in values), used.T.reshape(*t.shape, -1), apart
 
 
 def replay(
@@ -198,6 +206,7 @@ def replay(
     sense: int = FORWARDS,
     objective: Objective = EFFICIENCY,
     driven: bool = False,
+    limits: ActuatorLimits = UNLIMITED,
 ) -> Replay:
     """Distance, work, rotation and length of a path over one period, to a relative error in the efficiency, or an objective.
 
@@ -225,6 +234,8 @@ def replay(
     objective : Objective
     driven : bool
         Whether the driven work is asked for, whatever the objective is.
+    limits : ActuatorLimits
+        Of which the largest shares are asked for; with limits of 1 these are the largest torques and powers themselves.
 
     Raises
     ------
@@ -253,7 +264,8 @@ def replay(
     t[np.isin(edges[1:], ends[1:-1]), 4] -= _ONE_SIDED
     start = None if near is None else near.tail_velocity(t.ravel())
     driven = driven or "driven_work" in objective.uses
-    panels = begun(left, width, _evaluated(body, friction, path, delta, t, start, sense, whole=True, driven=driven))
+    at = partial(_evaluated, body, friction, path, delta, sense=sense, driven=driven, limits=limits)
+    panels = begun(left, width, at(t, start, whole=True))
     while True:
         turn, move, spent, passed, delivered = increments(WHOLE, panels, 1)
         heading = np.concatenate([[0.0], np.cumsum(turn)])
@@ -281,7 +293,7 @@ def replay(
         old = panels.take(chosen)
         between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
-        new = _evaluated(body, friction, path, delta, between, start, sense, whole=False, driven=driven)
+        new = at(between, start, whole=False)
         panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new))
     several, other_distance, other_work, other_rotation = _others(panels, reach)
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
@@ -304,6 +316,7 @@ def replay(
         other_distance,
         other_work,
         other_rotation,
+        panels.shares.max(axis=(0, 1)),
         4 * panels.left.size,
         (known, panels.z[:, :4].reshape(-1, 3).T),
         objective,

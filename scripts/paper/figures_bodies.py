@@ -11,6 +11,7 @@ from colloc.mechanics.balance import instant
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures import style
+from scripts import panel_marks
 from scripts.paper.study import Arrays
 
 _ARROWS = 9
@@ -49,7 +50,7 @@ def draw_link_fields(
     shown = {"v": (velocity, lengths[0], style.VELOCITY), "f": (force, lengths[1], style.FORCE)}
     for key in fields:
         field, length, colour = shown[key]
-        style.arrows(axes, place.real, place.imag, field.real, field.imag, length, colour)
+        panel_marks.arrows(axes, place.real, place.imag, field.real, field.imag, length, colour)
         tips = place + length * field
         axes.plot(tips.real.ravel(), tips.imag.ravel(), alpha=0)  # so that the limits include the arrows
 
@@ -61,10 +62,10 @@ def _plate(axes: Any, friction: Friction, title: str) -> None:
     axes.plot(ends.real, ends.imag, color=style.BLACK, lw=2)
     local = np.exp(-0.25j * np.pi)
     force = -(friction.mu_f * local.real + 1j * friction.mu_t * local.imag) * direction
-    style.arrows(axes, np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([0.0]), 0.7, style.VELOCITY)
-    style.arrows(axes, np.array([0.0]), np.array([0.0]), np.array([force.real]), np.array([force.imag]), 0.5, style.FORCE)
+    panel_marks.arrows(axes, np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([0.0]), 0.7, style.VELOCITY)
+    panel_marks.arrows(axes, np.array([0.0]), np.array([0.0]), np.array([force.real]), np.array([force.imag]), 0.5, style.FORCE)
     axes.set(xlim=(-1.2, 0.9), ylim=(-0.55, 0.55), title=title)
-    style.bare(axes)
+    panel_marks.bare(axes)
 
 
 def figure_3(made: Arrays, folder: Path) -> list[Path]:
@@ -73,7 +74,7 @@ def figure_3(made: Arrays, folder: Path) -> list[Path]:
     figure, axes = style.subplots(2, 3, figsize=(7.2, 3.6), height_ratios=(1, 1.2))
     for a, (mu_f, mu_t) in zip(axes[0], ((1, 1), (1, 2), (2, 1)), strict=True):
         _plate(a, Friction(mu_t=mu_t, mu_f=mu_f, mu_b=mu_f), rf"$\mu_f = {mu_f},\ \mu_t = {mu_t}$")
-    style.letter(axes[0, 0], "A")
+    panel_marks.letter(axes[0, 0], "A")
     axes[0, 0].text(0.75, 0.05, "v", color=style.VELOCITY)
     axes[0, 0].text(-0.65, 0.05, "F", color=style.FORCE)
     z = made["z"][0]
@@ -83,9 +84,9 @@ def figure_3(made: Arrays, folder: Path) -> list[Path]:
         (axes[1, 2], z, "f", "D", "in balance: friction"),
     ):
         draw_link_fields(a, body, friction, made["angles"], made["rates"], velocity, 1e-4, fields, (0.35, 0.12))
-        style.bare(a)
+        panel_marks.bare(a)
         a.set_title(title)
-        style.letter(a, text)
+        panel_marks.letter(a, text)
     return style.save(figure, folder / "figure-03-velocity-and-force")
 
 
@@ -101,8 +102,8 @@ def figure_4(made: Arrays, folder: Path) -> list[Path]:
         scene.annotate("", (arc[-1].real, arc[-1].imag), (arc[-4].real, arc[-4].imag), arrowprops={"arrowstyle": "->"})
         scene.plot(arc.real, arc.imag, color=style.BLACK, lw=0.7)
     scene.set(xlim=(-0.05, body[0] + 0.05), ylim=(-3 * half, 3 * half), title="two flaps open")
-    style.bare(scene)
-    style.letter(scene, "A")
+    panel_marks.bare(scene)
+    panel_marks.letter(scene, "A")
     smooth, kinetic = made["example_force"]
     V = made["example_V"] * 1e3
     for side in (V < 0, V > 0):
@@ -112,7 +113,7 @@ def figure_4(made: Arrays, folder: Path) -> list[Path]:
     force.plot(0, made["example_force"][1][V.size // 2], "o", ms=4, color=style.VERMILION)
     force.set(xlabel=r"body velocity $V\ [10^{-3}]$", ylabel="net force", title="no velocity balances it")
     force.legend()
-    style.letter(force, "B")
+    panel_marks.letter(force, "B")
     degrees = np.rad2deg(made["openings"])
     keep = [i for i, d in enumerate(made["deltas"]) if d in (1e-2, 1e-4)]
     speed.plot(degrees, made["limit"], color=style.BLACK, label=r"$f/\sqrt{\ell^2 - f^2}$")
@@ -121,7 +122,7 @@ def figure_4(made: Arrays, folder: Path) -> list[Path]:
         speed.plot(degrees, made["V_over_delta"][i], line, lw=2, color=colour, label=rf"$\delta = 10^{{{power}}}$")
     speed.set(xlabel="opening [degrees]", ylabel=r"$V/\delta$", title="what the regularisation gives")
     speed.legend()
-    style.letter(speed, "C")
+    panel_marks.letter(speed, "C")
     return style.save(figure, folder / "figure-04-flap-body")
 
 
@@ -146,7 +147,7 @@ def figure_5(made: Arrays, folder: Path) -> list[Path]:
     figure, axes = style.subplots(2, 1, figsize=(6.5, 4.6))
     for a, name, what in zip(axes, ("5A", "5B"), (r"$\mu_f = \mu_b = 100\,\mu_t$", r"$\mu_t = 100\,\mu_f$"), strict=True):
         _wave(a, made, name, f"{what}: {_wave_title(made, name)}")
-        style.letter(a, name[1])
+        panel_marks.letter(a, name[1])
     return style.save(figure, folder / "figure-05-waves-anisotropic")
 
 
@@ -155,7 +156,7 @@ def figure_6(made: Arrays, folder: Path) -> list[Path]:
     figure, axes = style.subplots(1, 3, figsize=(9, 5.2), width_ratios=(0.8, 1.2, 1.2))
     for a, name, drop in zip(axes, ("6A", "6B", "6C"), (0.07, 0.12, 0.12), strict=True):
         _wave(a, made, name, _wave_title(made, name).replace(", d/W", "\nd/W"), drop)
-        style.letter(a, name[1])
+        panel_marks.letter(a, name[1])
     return style.save(figure, folder / "figure-06-waves-isotropic")
 
 
@@ -166,7 +167,7 @@ def draw_cases(figure_axes: Any, made: Arrays, group: str, names: str) -> None:
         draw_link_fields(
             axes, Chain(), Friction(), made[f"{key}/angles"], made[f"{key}/rates"], made[f"{key}/z"], float(made["delta"])
         )
-        style.bare(axes)
+        panel_marks.bare(axes)
         degrees = ", ".join(f"{a:.0f}" for a in np.rad2deg(made[f"{key}/angles"]))
         rates = ", ".join(f"{r:g}" for r in made[f"{key}/rates"])
         axes.set_title(f"{name}: angles {degrees} deg, rates {rates}", fontsize=8)
@@ -206,7 +207,7 @@ def draw_motion(axes: Any, made: Arrays, name: str, phases: np.ndarray, rows: in
         for end, colour in enumerate((style.BLACK, style.BLUE, style.VERMILION, style.GREEN)):
             axes.plot(x[end, i] - cx + ox, y[end, i] - cy + oy, "o", ms=2.5, color=colour)
         axes.text(ox, oy - 0.5, f"{phase:.2f}", fontsize=6, ha="center")
-    style.bare(axes)
+    panel_marks.bare(axes)
 
 
 def draw_lab(axes: Any, made: Arrays, name: str, phases: np.ndarray) -> None:
@@ -240,7 +241,7 @@ def figure_12_motion(made: Arrays, folder: Path) -> list[Path]:
         draw_speeds(axes[row, 0], made, name, until)
         draw_motion(axes[row, 1], made, name, phases, 3)
         draw_lab(axes[row, 2], made, name, lab_phases)
-        style.letter(axes[row, 0], name)
-        style.letter(axes[row, 2], "E" if name == "D" else "G")
+        panel_marks.letter(axes[row, 0], name)
+        panel_marks.letter(axes[row, 2], "E" if name == "D" else "G")
         axes[row, 1].set_title("snapshots (time below)")
     return style.save(figure, folder / "figure-12-best-motions")

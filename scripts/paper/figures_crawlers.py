@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from colloc.pictures import style
+from scripts import panel_marks
 from scripts.paper.study import Arrays
 
 
@@ -23,7 +24,7 @@ def _stages(axes: Any, made: Arrays, name: str, chosen: list[int], title: str, d
             z.real.min() + shift.real - 0.02, z.imag.mean() + shift.imag, f"{made[f'{name}/t'][k]:.2f}", fontsize=7, ha="right"
         )
     axes.set_title(title)
-    style.bare(axes)
+    panel_marks.bare(axes)
 
 
 def _at(made: Arrays, name: str, times: tuple[float, ...]) -> list[int]:
@@ -40,7 +41,7 @@ def figure_13(made: Arrays, folder: Path) -> list[Path]:
     for row, (chosen, text, title) in enumerate(((first, "A", "first half-period"), (second, "B", "second half-period"))):
         axes = figure.add_subplot(grid[row, 0])
         _stages(axes, made, one, chosen, title, -0.09j)
-        style.letter(axes, text)
+        panel_marks.letter(axes, text)
     epsilon = made["epsilon"]
     work = figure.add_subplot(grid[0, 1])
     for key, label, colour, marker in (
@@ -55,7 +56,7 @@ def figure_13(made: Arrays, folder: Path) -> list[Path]:
     work.loglog(epsilon, epsilon**2, "--", color="0.5", lw=0.8, label=r"$\epsilon^2$")
     work.set(xlabel=r"$\epsilon$")
     work.legend()
-    style.letter(work, "C")
+    panel_marks.letter(work, "C")
     efficiency = figure.add_subplot(grid[1, 1])
     for (name, label), colour, marker in zip(
         ((one, "isotropic"), ("forward easiest", r"$\mu_f$ smallest"), (two, r"$\mu_t$ smallest, two bumps")),
@@ -66,9 +67,9 @@ def figure_13(made: Arrays, folder: Path) -> list[Path]:
     efficiency.axhline(1, color="0.6", lw=0.7)
     efficiency.set(xlabel=r"$\epsilon$", ylabel=r"efficiency $\times \min(\mu)$", xscale="log")
     efficiency.legend()
-    style.letter(efficiency, "D")
+    panel_marks.letter(efficiency, "D")
     axes = figure.add_subplot(grid[:, 2])
     # this crawler lies across its path, which goes along x
     _stages(axes, made, two, _at(made, two, (0, 0.25, 0.5, 0.75, 1)), "two bumps, moving sideways", 0.25 + 0j)
-    style.letter(axes, "E")
+    panel_marks.letter(axes, "E")
     return style.save(figure, folder / "figure-13-crawlers")

@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import SMOOTHING, crossing_bounds
 from colloc.pictures import style
+from scripts import panel_marks
 from scripts.models.ellipses import ellipse_angles
 from scripts.paper.figures_bodies import draw_cases
 from scripts.paper.study import Arrays
@@ -116,7 +117,7 @@ def figure_9(made: Arrays, folder: Path) -> list[Path]:
             axes.set_aspect("equal")
             axes.set_title(rf"$\dot{{\Delta\theta}}_{2 - face} = {ratios[k]:g}$", fontsize=8)
             if column == 0:
-                style.letter(axes, "AB"[face])
+                panel_marks.letter(axes, "AB"[face])
     for index, colour in enumerate(colours):
         figure.text(0.3 + 0.16 * index, 0.385, f"link {index + 1} slow", color=colour, fontsize=9, fontweight="bold")
     below = grid[3, :].subgridspec(1, 4)
@@ -137,7 +138,7 @@ def figure_11(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
         a.set(xlabel=r"$A_1$", ylabel=r"$B_1$", title=f"{key}, {name}", xlim=(0, np.pi), ylim=(0, 2.3))
         a.plot([0, 2.2], [0, 2.2], ":", color="white", lw=0.8)
         a.set_aspect("equal")
-        style.letter(a, text)
+        panel_marks.letter(a, text)
     for gait, label in zip(found["gaits"], ("D", "", "", ""), strict=False):
         if abs(gait[0]) < 0.05:
             axes[2].plot(gait[1], gait[2], "*", color=style.VERMILION, ms=8, clip_on=False)
@@ -166,6 +167,6 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
                 near = np.abs(np.abs(found["gaits"][:, 0]) - made["A0"][k]) < 0.06
                 a.plot(*found["gaits"][near, 1:].T, "*", color=style.VERMILION, ms=8, clip_on=False)
         axes[row, 0].set_ylabel(r"$B_1$")
-        style.letter(axes[row, 0], text)
+        panel_marks.letter(axes[row, 0], text)
         figure.colorbar(drawn, ax=axes[row], label=name, fraction=0.02, pad=0.01, ticks=MaxNLocator(4))
     return style.save(figure, folder / "figure-12-maps-with-offset")

@@ -290,10 +290,11 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
         (BODY, Friction(2.0, 1.0, 1.0), (1,)),
         (Chain((0.3, 0.3, 0.4)), Friction(), (1,)),
         (Chain((0.25,) * 4), Friction(), (1,)),
+        (Chain(weights=(0.25, 0.5, 0.25)), Friction(), (1,)),
         (BODY, Friction(), (0, 1)),
         (BODY, Friction(), (3,)),
     ],
-    ids=["no convex potential", "ends unlike", "four links", "even harmonics", "no displacement"],
+    ids=["no convex potential", "ends unlike", "four links", "weights", "even harmonics", "no displacement"],
 )
 def test_what_the_proof_does_not_cover_is_refused(body, friction, harmonics):
     spline = TensorSpline(body.n_joint, np.pi, 3)

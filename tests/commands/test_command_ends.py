@@ -17,7 +17,7 @@ from colloc.bounds.sampled import QUICK as BUDGET
 from colloc.bounds.sampled import Domain, bound_key
 from colloc.commands.ending import exit_code
 from colloc.commands.main import main as colloc
-from colloc.commands.solve import summary_lines
+from colloc.commands.summary import summary_lines
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.store import load, save
 from colloc.system.row_file import CACHE, put_rows

@@ -25,8 +25,9 @@ def test_solve_reports_the_best_finite_gait_and_what_it_tends_to(folder, capsys)
     code = main(["solve", str(folder / "loops.py"), "--starts", "1", "--json", "--output", f"{folder}/"])
     told = json.loads(capsys.readouterr().out)
     assert code == 0
-    assert told["efficiency"] < told["relaxed"]["efficiency"]
-    assert told["efficiency"] == max(each["efficiency"] for each in told["realised"])
+    found = told["certificate"]["efficiency"]
+    assert found < told["relaxed"]["efficiency"]
+    assert found == max(each["efficiency"] for each in told["relaxed"]["realised"])
     assert (folder / "loops.png").exists()
 
 
@@ -42,6 +43,19 @@ def test_verify_replays_the_relaxed_gait_and_all_finite_ones(folder, capsys):
     result = next(folder.glob("loops*.h5"))
     code = main(["verify", str(result), "--json"])
     told = json.loads(capsys.readouterr().out)
+    assert told["value"] == pytest.approx(max(gait["efficiency"] for gait in told["gaits"][1:]), rel=1e-6)
     assert len(told["gaits"]) == 4
     assert not any(gait["complaint"] for gait in told["gaits"])
     assert told["certified"] == (code == 0)
+
+
+def test_report_export_and_compare_take_the_finite_gait(folder, capsys):
+    result = next(folder.glob("loops*.h5"))
+    assert main(["report", str(result), "--output", f"{folder}/"]) == 0
+    page = result.with_suffix(".html").read_text()
+    assert "finite gaits tend to" in page
+    assert main(["export", str(result), "--period", "10", "--format", "json", "--output", f"{folder}/"]) == 0
+    told = json.loads((folder / "loops.json").read_text())
+    assert len(told["angles_rad"]) == 2
+    assert main(["compare", str(result), str(result)]) == 0
+    assert "the same optimum" in capsys.readouterr().out

@@ -1,10 +1,12 @@
 """A law stated as formulas: read, differentiated, checked for what the solvers rely on, and refused where that fails."""
 
+import pickle
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from shared.instants import random_instants
 
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
@@ -12,7 +14,9 @@ from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.body import Chain
+from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import ProblemError
 
@@ -88,3 +92,42 @@ def test_a_stated_law_has_the_optimum_of_the_built_in_one():
         assert solution.status == "solved"
         values.append(solution.efficiency)
     assert values[0] == pytest.approx(values[1], rel=1e-6)
+
+
+def test_a_law_of_ones_own_goes_to_other_processes():
+    """As many starts on several processes need it, also once it has been used."""
+    law = OwnLaw("-vs/speed * (1 + exp(-speed))", "-2*vn/speed")
+    one, delta = np.array([[0.3]]), np.array([[1e-3]])
+    again = pickle.loads(pickle.dumps(law))
+    assert again.density(one, one, delta) == law.density(one, one, delta)
+
+
+COMPILED = {
+    "weakening": OwnLaw("-where(vs > 0, 1, 1.5) * vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))"),
+    "every function": OwnLaw(
+        "-where(vs <= 0, 1.5, 1) * vs/speed * (1 + tanh(speed)**2/3) - 0.1*vs*exp(-abs(vs))",
+        "-2*vn/speed * log(2 + sqrt(speed)) - vn*delta",
+        unit=3.0,
+        speed_unit=0.5,
+    ),
+    "power": PowerLaw(0.4, 2.0, 1.0, 1.5),
+    "power with a potential": PowerLaw(1.6, 2.0, 2.0, 2.0),
+}
+
+
+@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
+@pytest.mark.parametrize("case", COMPILED)
+def test_a_law_compiled_from_its_formulas_is_the_law(case):
+    law, body, (angles, rates) = COMPILED[case], Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)), random_instants(60)
+    assert native_kernel(body, law) is not None
+    rates[:, ::2] *= 1e-3  # links of some instants hardly turn
+    solved = body.solve(law, angles, rates, 1e-3)
+    motion, slopes = chain_slopes(body, law, angles, rates, 1e-3, solved)
+    with numpy_instead():
+        known = body.solve(law, angles, rates, 1e-3, start=solved.z)
+        same, reference = chain_slopes(body, law, angles, rates, 1e-3, solved)
+    np.testing.assert_allclose(solved.z, known.z, atol=1e-8)
+    np.testing.assert_allclose(motion.power, same.power, rtol=1e-9)
+    np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-7)
+    scale = np.abs(reference).max(axis=(0, 1))
+    np.testing.assert_allclose(slopes / scale, reference / scale, atol=1e-8)

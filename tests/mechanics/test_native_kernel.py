@@ -122,7 +122,7 @@ def test_solving_a_balance_loads_neither_casadi_nor_matplotlib():
 
 WITHIN_ITS_ARRAYS = """
 import numpy as np
-from colloc import Chain, Friction, solve_balance
+from colloc import Chain, Friction, OwnLaw, solve_balance
 from colloc.bounds.enclosure import CORNERS, Cells, ReferencePoint, by_convexity, corner_motions
 from colloc.bounds.loaded_balance import loaded_balance
 from colloc.mechanics import native_kernel
@@ -134,7 +134,8 @@ rng = np.random.default_rng(0)
 for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
     body, n = Chain(lengths), len(lengths) - 1
     at = rng.uniform(-3, 3, (n, 20)), rng.normal(size=(n, 20))
-    for law in (Friction(), Friction(10, 1, 3)):
+    for law in (Friction(), Friction(10, 1, 3), OwnLaw("-where(vs > 0, 1, 2) * vs/speed", "-vn/speed * tanh(2 + speed)")):
+        assert native_kernel.native_kernel(body, law) is not None
         chain_slopes(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
         for method in ("newton", "fixed_point"):
             solve_balance(body, law, *at, 1e-2, method=method, max_iterations=20, start=np.zeros((3, 20)))

@@ -14,8 +14,9 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import draw_filmstrip, forbidden, solution_figure, strips
+from colloc.pictures.figure import draw_filmstrip, forbidden, strips
 from colloc.pictures.publication import panels
+from colloc.pictures.solution_figure import solution_figure
 from colloc.pictures.style import save
 from scripts.gallery import picture
 

@@ -9,8 +9,8 @@ from colloc import Problem, Relaxed
 from colloc.bounds.coulomb_motion import balanced_motion
 from colloc.bounds.measure import Measure
 from colloc.gaits.mixture import Mixture
-from colloc.pictures.measure_figure import measure_figure
 from colloc.pictures.relaxed_figure import draw_mixture, draw_shares
+from scripts.figures_measure import measure_figure
 
 THIRDS = [[1.0, 0.0], [-0.5, np.sqrt(0.75)], [-0.5, -np.sqrt(0.75)]]
 GAIT = Mixture([[0.5, 0.0, 0.0], [0.2, 0.1, 0.1]], [THIRDS, THIRDS], [0.5, -0.5], "bilateral")

@@ -45,7 +45,7 @@ class Quadratic:
     def row_names(self):
         return [("plane", k) for k in range(len(self.normal))]
 
-    def move_checks(self, v):
+    def move_checks(self, v, later=0.0):
         pass
 
 
@@ -66,8 +66,9 @@ class Touching(Quadratic):
     def gradient(self, v):
         return super().gradient(v) - np.array([self.pull, 0.0])
 
-    def move_checks(self, v):
-        self.normal = v[None] / np.linalg.norm(v)
+    def move_checks(self, v, later=0.0):
+        t = np.arctan2(v[1], v[0]) + later
+        self.normal = np.array([[np.cos(t), np.sin(t)]])
 
 
 def test_curvature_is_that_on_the_free_directions_alone():

@@ -12,8 +12,8 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.balance import instant
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import solution_figure
 from colloc.pictures.publication import panels
+from colloc.pictures.solution_figure import solution_figure
 from colloc.results.certificate import certify
 from colloc.results.solution import Solution
 from colloc.results.store import load, save

@@ -97,7 +97,7 @@ def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell()
     parameters = solver.oracles.parameter_vector(0.01, transcription.block_parameters(x[own]))
     value = np.array(solver.oracles.options["jac_g"](x, parameters)[0]).ravel()
     fine = np.linspace(transcription.mesh.edges[:-1], transcription.mesh.edges[1:], 2001)
-    angles = transcription.gait(x).angles(fine.T.ravel())
+    angles = transcription.member(x[transcription.layout.parameters[:, 0]]).angles(fine.T.ravel())
     for i, j in far:
         rows = transcription.groups[f"links {i + 1} and {j + 1}"]
         nearest = clearance(problem.body, angles, i, j).reshape(transcription.mesh.n, -1).min(axis=1)

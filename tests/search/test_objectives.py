@@ -22,7 +22,7 @@ from colloc import (
 from colloc.collocation.warm_start import feasible_point
 from colloc.commands import verify
 from colloc.gaits.objective import EFFICIENCY, SPEED
-from colloc.mechanics.driven_power import actuator_powers, driven_power
+from colloc.mechanics.actuators import actuator_powers, driven_power
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
@@ -39,6 +39,9 @@ CASES = {
     "driven path": {"gait": FreePath(4.0, "bilateral"), "objective": "distance / (driven_work + length)"},
     "driven polygon": {"gait": Polygon(4, "none"), "objective": "driven efficiency", "at_least": {"distance / work": 0.0}},
     "polygon": {"gait": Polygon(4, "none"), "objective": TURNED, **FREE},
+    "actuators": {"gait": Harmonic(2, "none"), "torque_limit": 0.05, "power_limit": (0.4, 0.9)},
+    "actuated path": {"gait": FreePath(4.0, "bilateral"), "torque_limit": 0.06, "at_least": {"efficiency": 0.0}},
+    "actuated polygon": {"gait": Polygon(4, "none"), "objective": TURNED, "torque_limit": (0.05, 0.06), **FREE},
     "bilateral path": {"gait": FreePath(4.0, "bilateral"), "objective": "speed", "at_least": {THRIFT: 0.1}},
 }
 SKEW = Fourier([0.5, 0.5], [[1.0], [0.2]], [[0.0], [1.0]])
@@ -55,8 +58,8 @@ def test_gradients_of_the_reduced_program_are_those_of_differences(case):
     problem, h = stated(case), 1e-6
     space, v = space_near(problem, problem.guess)
     v = v + 1e-2 * np.random.default_rng(0).normal(size=v.size)
-    space.move_checks(v)
     program = ReducedProgram(space, DELTA)
+    program.place_rows(v)
     steps = h * np.eye(space.n)
     slopes = [(program.objective(v + e) - program.objective(v - e)) / (2 * h) for e in steps]
     # balances are solved to 1e-12, so that differences over 2 h know the slope of a value of order 1 to 1e-6
@@ -80,6 +83,12 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
         first = 1 if problem.gait.symmetry == "none" and problem.rotation is not None else 0
         own = reduced.rows(v)[first : first + len(problem.at_least)]
         np.testing.assert_allclose(g[full.groups["at least"]], own, atol=1e-11)
+    if problem.actuator_limits.names:
+        reduced.place_rows(v)
+        share, point = reduced.actuators.placed
+        shares = g[full.groups["actuators"]].reshape(-1, len(problem.actuator_limits.names))
+        assert share.size > 10
+        np.testing.assert_allclose(shares[point, share], reduced.actuators.values(v, delta), atol=1e-9)
     assert_derivatives_are_differences(found, x, p, 3e-5)
 
 

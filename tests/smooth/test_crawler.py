@@ -1,18 +1,22 @@
 """Crawlers with one travelling bump: the paper's is one of them, balance and slopes hold, and optimising helps."""
 
 import runpy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from colloc.commands.main import main as colloc_main
 from colloc.gaits.path_classes import Polygon
 from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
+from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
+from colloc.search.prescribed import realised
 from colloc.search.reduced_search import ROUGH, settled
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
@@ -108,3 +112,26 @@ def test_the_problem_file_is_certified_beats_the_paper_s_crawler_and_is_kept(tmp
 def test_unusable_bodies_are_refused(changes):
     with pytest.raises(ProblemError, match="must lie between"):
         CrawlerBody(**({"epsilon": 0.1} | changes))
+
+
+def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
+    """The paper's crawler as it is, collocated but not searched nor certified."""
+    body = CrawlerBody(epsilon=0.2, modes=2, panels=4)
+    guess = Corners(body.concertina(1.2), "antipodal")
+    problem = Problem(
+        "paper", guess, body=body, friction=Friction(), gait=Polygon(8, "antipodal"), delta=1e-3, delta_start=1e-3
+    )
+    solution = Solution(problem, [replace(realised(problem, guess), program="", knots=None)])
+    file = str(save(solution, tmp_path / "paper.h5"))
+    for command, more in (
+        ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps", "5", "--periods", "1")),
+        ("compare", (file,)),
+    ):  # fmt: skip
+        assert colloc_main([command, file, *more]) == 0
+    assert "bump coordinate" in (tmp_path / "paper.html").read_text()
+    assert (tmp_path / "paper.csv").read_text().count("coordinate_3_rad") == 2
+    assert "the same optimum" in capsys.readouterr().out
+    dataset = solution.to_xarray()
+    assert dict(dataset.sizes) == {"t": 401, "joint": 3, "velocity": 3, "axis": 2}
+    ahead = dataset.centre.isel(t=-1) - dataset.centre.isel(t=0)
+    assert float(ahead.sel(axis="x")) == pytest.approx(solution.distance, rel=1e-9)

@@ -11,9 +11,9 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.figure import solution_figure
 from colloc.pictures.motion_frames import frames
 from colloc.pictures.report_page import report_page
+from colloc.pictures.solution_figure import solution_figure
 from colloc.results.solution import SOLVED
 from colloc.results.store import load, save
 from colloc.search.optimise import best_gait, measured

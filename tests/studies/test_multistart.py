@@ -21,8 +21,8 @@ from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
+from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
-from colloc.results.delta_limit import mesh_errors, resolution_warning, value_at_zero_delta
 from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
@@ -30,6 +30,7 @@ from colloc.search.optimise import is_trivial, maximise_efficiency, optimum
 from colloc.studies import campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
+from scripts.continue_delta import resolution_warning, value_at_zero_delta
 
 REVERSIBLE, IRREVERSIBLE = Friction(3, 1, 1), Friction(0.5, 1, 5)
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])

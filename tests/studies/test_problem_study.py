@@ -26,9 +26,10 @@ from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
 from colloc.studies.store import load_study, save_study
 from colloc.studies.study import Axis, Study, read_study_file
-from colloc.studies.table import NO_PROBLEM, best_over, study_table
+from colloc.studies.table import NO_PROBLEM, study_table
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
+from scripts.friction_plane import best_over
 
 FILE = """
 from colloc import *
@@ -427,7 +428,7 @@ def test_bad_options_get_one_clear_sentence(tmp_path, capsys):
 def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     path = tmp_path / "many.py"
     path.write_text(FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))"), encoding="utf-8")
-    command = [sys.executable, "-m", "colloc.commands.sweep", str(path), "--output", str(tmp_path)]
+    command = [sys.executable, "-m", "colloc", "sweep", str(path), "--output", str(tmp_path)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     lines = [process.stdout.readline() for _ in range(3)]
     process.send_signal(signal.SIGINT)

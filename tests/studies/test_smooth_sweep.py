@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from colloc.commands.main import main as colloc_main
 from colloc.commands.sweep import main
 from colloc.studies.store import load_study
 
@@ -25,3 +26,54 @@ def test_gaits_of_modes_travel_between_neighbours_and_are_kept(tmp_path, capsys)
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
     best = load_study(tmp_path / "modes.nc").variables["efficiency"]
     assert float(best[0]) > float(best[1]) > 0.3  # more friction sideways helps
+
+
+PRESCRIBED = """
+from colloc import Axis, Friction, Problem, Study, Wave
+
+def problem(mu_t):
+    return Problem("waves", body=Wave("sine"), friction=Friction(mu_t, 1, 1), delta=1e-2, mesh_tolerance=1e-3)
+
+PROBLEM = problem(100.0)
+STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
+"""
+
+
+def test_a_sweep_of_prescribed_motions_measures_each_once(tmp_path, capsys):
+    """Nothing travels between neighbours and nothing is sampled where nothing is free."""
+    (tmp_path / "study.py").write_text(PRESCRIBED)
+    assert main([str(tmp_path / "study.py"), "--output", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
+    study = load_study(tmp_path / "waves.nc").variables
+    assert study["efficiency"][0] > study["efficiency"][1] > 0.5
+    assert study["starts"].tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("command", ["multistart", "pareto"])
+def test_what_needs_free_gaits_refuses_a_prescribed_motion_in_words(tmp_path, capsys, command):
+    (tmp_path / "wave.py").write_text(PRESCRIBED)
+    assert colloc_main([command, str(tmp_path / "wave.py"), "--output", f"{tmp_path}/"]) == 2
+    assert "prescribed motion" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "stated",
+    [
+        'Problem("p", friction=Friction(1, 1, 1), gait=Relaxed(2, "both"), delta=2e-4, joint_limit=2.5, intervals=8)',
+        'Problem("p", Corners(BODY.concertina(1.2), "antipodal"), BODY, gait=Polygon(8, "antipodal"), delta=1e-4, '
+        "delta_start=1e-4, mesh_tolerance=1e-3)",
+    ],
+)
+def test_relaxed_gaits_and_crawlers_are_swept_and_started_many_times(tmp_path, capsys, stated):
+    (tmp_path / "p.py").write_text(f"""
+from colloc import *
+BODY = CrawlerBody(0.2, modes=2)
+PROBLEM = {stated}
+STUDY = Study("p", (Axis("mu_t", (1.0, 1.1)),), lambda mu_t: PROBLEM.with_(friction=Friction(mu_t, 1, 1)), cold_starts=0)
+""")
+    for command, more in (("multistart", ("--starts", "1")), ("sweep", ())):
+        assert colloc_main([command, str(tmp_path / "p.py"), *more, "--output", f"{tmp_path}/"]) == 0
+    told = capsys.readouterr().out
+    assert "1 distinct optima" in told
+    assert "2 cells: 2 solved" in told

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "link_friction.h"
+#include "chain.h"
 
 enum { CORNERS = 8, PIECES = 16 };
 /* How a piece of a link is treated: its forces interpolated; those of the trial motion; interpolated, within a cone. */

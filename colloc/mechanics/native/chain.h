@@ -6,10 +6,14 @@
 
 #include <stddef.h>
 
+#ifdef OWN_LAW
+#include "link_quadrature.h"
+#else
 #include "link_friction.h"
+#endif
 
 typedef struct {
-    double length, cos, sin; /* direction in the body frame */
+    double length, pressure, cos, sin; /* pressure: weight per length over the body's; direction in the body frame */
     double x, y;             /* midpoint, seen from that of the reference */
     double rate;             /* of the joint behind the link (0 at the tail) */
 } Link;
@@ -21,13 +25,15 @@ typedef struct {
 
 /* Directions of the links, from joint angles that lie `stride` apart; and rates in units of `speed`. */
 static inline void find_directions(
-    const int n, Link *link, const double *length, const double *angle, const double *rate, double speed, ptrdiff_t stride)
+    const int n, Link *link, const double *length, const double *pressure, const double *angle, const double *rate, double speed,
+    ptrdiff_t stride)
 {
     double phi = 0.0;
     for (int i = 0; i < n; ++i) {
         if (i > 0)
             phi += angle[(i - 1) * stride];
         link[i].length = length[i];
+        link[i].pressure = pressure[i];
         link[i].cos = i > 0 ? cos(phi) : 1.0;
         link[i].sin = i > 0 ? sin(phi) : 0.0;
         link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
@@ -111,18 +117,16 @@ static inline Total evaluate(
     find_velocities(n, link, k, reference, z);
     for (int i = 0; i < n; ++i) {
         find_roots(&k[i], law, link[i].length, delta);
-        find_force(&k[i], law, link[i].length);
+        find_force(&k[i], law, link[i].length, link[i].pressure);
         const double fx = k[i].fs * link[i].cos - k[i].fn * link[i].sin;
         const double fy = k[i].fs * link[i].sin + k[i].fn * link[i].cos;
         total.force[0] += fx;
         total.force[1] += fy;
         total.force[2] += link[i].x * fy - link[i].y * fx + k[i].couple;
         if (law->associated)
-            total.merit += dissipation(&k[i], link[i].length);
+            total.merit += link[i].pressure * dissipation(&k[i], law, link[i].length);
     }
-    if (law->associated)
-        total.merit *= law->mu_t;
-    else
+    if (!law->associated)
         total.merit = 0.5 * (total.force[0] * total.force[0] + total.force[1] * total.force[1] + total.force[2] * total.force[2]);
     return total;
 }
@@ -138,9 +142,9 @@ static inline void pull_back(
         const double arm_s = link[i].x * s - link[i].y * c, arm_n = link[i].x * c + link[i].y * s;
         Matrix3 K;
         if (newton)
-            find_slopes(&k[i], law, link[i].length, delta, K);
+            find_slopes(&k[i], law, link[i].length, link[i].pressure, delta, K);
         else
-            find_secants(&k[i], law, link[i].length, delta, K);
+            find_secants(&k[i], law, link[i].length, link[i].pressure, delta, K);
         for (int j = 0; j < 3; ++j) {
             double column[3];
             for (int row = 0; row < 3; ++row)

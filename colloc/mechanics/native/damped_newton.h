@@ -28,6 +28,7 @@ typedef struct {
     Sliding *now, *trial;
     int anchor;
     double velocity[3];
+    double largest_rate;
     double residual;
     long long iterations;
 } State;
@@ -70,19 +71,13 @@ static inline void solve3(Matrix3 A, const double b[3], double shift, double x[3
         x[0] = x0 / d[0], x[1] = x1 / d[1], x[2] = x2 / d[2];
 }
 
-/* Friction on a body that moves at unit speed, see colloc/mechanics/damped_newton.py. */
-static inline double force_unit(const Law *law, double delta)
-{
-    return law->largest / hypot(1.0, delta);
-}
-
 /* Up to `most` steps with the present anchor. */
 static inline void iterate(const int n, State *s, double delta, double tolerance, long long most, int method)
 {
     const Law *law = &s->law;
     const double *shrink = law->associated ? BACKTRACKING : SHORT_BACKTRACKING;
     const size_t tries = law->associated ? sizeof BACKTRACKING / sizeof *shrink : sizeof SHORT_BACKTRACKING / sizeof *shrink;
-    const double unit = force_unit(law, delta);
+    const double unit = unit_of_force(law, delta, s->largest_rate);
     long long iterations = 0, fixed_point_due = method == FIXED_POINT ? -1 : 0;
     double *z = s->velocity;
     find_midpoints(n, s->link, s->anchor);

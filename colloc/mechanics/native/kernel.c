@@ -10,8 +10,7 @@
 #include "loaded.h"
 #include "motion.h"
 
-/* The largest rate: the law is homogeneous once delta scales along. */
-static inline double speed_of(const int n, const double *rate, ptrdiff_t stride)
+static inline double largest_rate_of(const int n, const double *rate, ptrdiff_t stride)
 {
     double speed = 0.0;
     for (int j = 0; j < n - 1; ++j)
@@ -25,14 +24,15 @@ static inline double scaled_delta_of(double delta, double speed)
 }
 
 static inline void balance_instants(
-    const int n, State *s, const double *length, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
+    const int n, State *s, const double *length, const double *pressure, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
     const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
     double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     for (ptrdiff_t t = first; t < last; ++t) {
-        const double speed = speed_of(n, rates + t, n_time);
+        const double largest = largest_rate_of(n, rates + t, n_time), speed = speed_unit_of(largest);
         double tail[3];
-        find_directions(n, s->link, length, angles + t, rates + t, speed, n_time);
+        s->largest_rate = largest;
+        find_directions(n, s->link, length, pressure, angles + t, rates + t, speed, n_time);
         s->anchor = n / 2;
         s->iterations = 0;
         if (start) {
@@ -57,8 +57,8 @@ static inline void balance_instants(
 
 /* Returns 0, or 1 without memory. */
 int colloc_balance(
-    int n, const double *length, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
-    const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
+    int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
+    const double *angles, const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
     double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     Link *link = malloc((size_t)n * sizeof *link);
@@ -66,7 +66,7 @@ int colloc_balance(
     if (link && sliding) {
         State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n};
         balance_instants(
-            n, &s, length, n_time, first, last, angles, rates, delta, start, tolerance, budget, method, z, residual, iterations,
+            n, &s, length, pressure, n_time, first, last, angles, rates, delta, start, tolerance, budget, method, z, residual, iterations,
             anchor, anchor_velocity);
     }
     free(link);
@@ -77,8 +77,8 @@ int colloc_balance(
 /* Rows of `find_values`, (ROWS, n_time), for chains whose anchors move as given; and, unless `slopes` is NULL, the
    derivatives of the first of them with respect to joint angles and rates, (DIFFERENTIATED_ROWS, 2 (n - 1), n_time). */
 int colloc_motion(
-    int n, const double *length, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
-    const double *rates, double delta, const long long *anchor, const double *anchor_velocity, double *values, double *slopes)
+    int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
+    const double *angles, const double *rates, double delta, const long long *anchor, const double *anchor_velocity, double *values, double *slopes)
 {
     const Law law = law_of(law_numbers);
     const int n_joint = n - 1;
@@ -87,12 +87,12 @@ int colloc_motion(
     Matrix3 *K = malloc((size_t)n * sizeof *K);
     Change *d = malloc((size_t)n * sizeof *d);
     for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
-        const double speed = speed_of(n, rates + t, n_time), own_delta = scaled_delta_of(delta, speed);
+        const double speed = speed_unit_of(largest_rate_of(n, rates + t, n_time)), own_delta = scaled_delta_of(delta, speed);
         const int a = (int)anchor[t];
         double z[3], value[ROWS], net[3], dz[3], change[DIFFERENTIATED_ROWS];
         for (int i = 0; i < 3; ++i)
             z[i] = anchor_velocity[i * n_time + t] / speed;
-        find_directions(n, link, length, angles + t, rates + t, speed, n_time);
+        find_directions(n, link, length, pressure, angles + t, rates + t, speed, n_time);
         find_midpoints(n, link, a);
         evaluate(n, link, k, a, z, &law, own_delta);
         find_values(n, link, k, value);
@@ -103,7 +103,7 @@ int colloc_motion(
         Matrix3 left;
         pull_back(n, link, k, &law, own_delta, true, left);
         for (int i = 0; i < n; ++i)
-            find_slopes(&k[i], &law, link[i].length, own_delta, K[i]);
+            find_slopes(&k[i], &law, link[i].length, link[i].pressure, own_delta, K[i]);
         for (int column = 0; column < 2 * n_joint; ++column) {
             const bool of_rate = column >= n_joint;
             find_changes(n, link, k, a, of_rate ? column - n_joint : column, of_rate, d);
@@ -127,8 +127,8 @@ int colloc_motion(
    velocities and loads in the middle link's axes. Then potential and power (n_time), minus the friction on each link in its own
    axes (n, 3, n_time), force and torque left over (2, n_time), and what power these have (n_time). */
 int colloc_loaded(
-    int n, const double *length, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
-    const double *rates, const double *load, const double *start, double delta, int steps, double *velocity, double *potential,
+    int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
+    const double *angles, const double *rates, const double *load, const double *start, double delta, int steps, double *velocity, double *potential,
     double *power, double *forces, double *residual, double *leftover_power)
 {
     Link *link = malloc((size_t)n * sizeof *link);
@@ -138,7 +138,7 @@ int colloc_loaded(
         State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
         for (ptrdiff_t t = first; t < last; ++t) {
             double own[3] = {load[t], load[n_time + t], load[2 * n_time + t]};
-            find_directions(n, link, length, angles + t, rates + t, 1.0, n_time);
+            find_directions(n, link, length, pressure, angles + t, rates + t, 1.0, n_time);
             find_midpoints(n, link, middle);
             const double c = link[middle].cos, q = link[middle].sin;
             const double body_load[3] = {c * own[0] - q * own[1], q * own[0] + c * own[1], own[2]};

@@ -77,26 +77,39 @@ static inline void find_roots(Sliding *k, const Law *law, double length, double 
     k->g = 1.0 + q * k->h;
 }
 
-/* Friction on the link from a2 to h. */
-static inline void find_force(Sliding *k, const Law *law, double length)
+/* Friction on the link from a2 to h; `pressure` multiplies it, here and below. */
+static inline void find_force(Sliding *k, const Law *law, double length, double pressure)
 {
-    const double per_S = 1.0 / k->S, l3 = length * length * length;
-    k->fs = -tangential(law, k->vs) * k->stretched * 2.0 * length * k->g * per_S;
-    k->fn = -law->mu_t * 2.0 * k->vn * length * per_S;
-    k->couple = -law->mu_t * k->w * l3 * per_S * (0.5 * k->Q - k->a2 * k->h * per_S * per_S);
+    const double per_S = 1.0 / k->S, l3 = length * length * length, mu_t = pressure * law->mu_t;
+    k->fs = -pressure * tangential(law, k->vs) * k->stretched * 2.0 * length * k->g * per_S;
+    k->fn = -mu_t * 2.0 * k->vn * length * per_S;
+    k->couple = -mu_t * k->w * l3 * per_S * (0.5 * k->Q - k->a2 * k->h * per_S * per_S);
 }
 
-/* Dissipation potential of the link at mu = 1: the integral of r. */
-static inline double dissipation(const Sliding *k, double length)
+/* The speed in whose units balances are solved: the law is homogeneous once delta scales along. */
+static inline double speed_unit_of(double largest_rate)
 {
-    return length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g);
+    return largest_rate;
+}
+
+/* Friction on a body that moves at unit speed, see `force_unit` in colloc/mechanics/damped_newton.py. */
+static inline double unit_of_force(const Law *law, double delta, double largest_rate)
+{
+    (void)largest_rate;
+    return law->largest / hypot(1.0, delta);
+}
+
+/* Dissipation potential of the link: mu times the integral of r. */
+static inline double dissipation(const Sliding *k, const Law *law, double length)
+{
+    return law->mu_t * length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g);
 }
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w). */
-static inline void find_slopes(const Sliding *k, const Law *law, double length, double delta, Matrix3 slopes)
+static inline void find_slopes(const Sliding *k, const Law *law, double length, double pressure, double delta, Matrix3 slopes)
 {
     const double vs = k->stretched, vn = k->vn, w = k->w;
-    const double mu_s = tangential(law, k->vs), mu_t = law->mu_t, more = stretch(law, k->vs);
+    const double mu_s = pressure * tangential(law, k->vs), mu_t = pressure * law->mu_t, more = stretch(law, k->vs);
     const double l3 = length * length * length, per_S = 1.0 / k->S, per_r = 1.0 / k->r0r1;
     const double a2J0 = length * k->S * k->Q * per_r;
     const double a2J1 = -vn * w * l3 * k->Q * per_r * per_S;
@@ -111,9 +124,9 @@ static inline void find_slopes(const Sliding *k, const Law *law, double length, 
 }
 
 /* Minus force over velocity with r frozen: the law of the paper's fixed point. */
-static inline void find_secants(const Sliding *k, const Law *law, double length, double delta, Matrix3 secants)
+static inline void find_secants(const Sliding *k, const Law *law, double length, double pressure, double delta, Matrix3 secants)
 {
-    const double mu_s = tangential(law, k->vs), mu_t = law->mu_t, S = k->S, l3 = length * length * length;
+    const double mu_s = pressure * tangential(law, k->vs), mu_t = pressure * law->mu_t, S = k->S, l3 = length * length * length;
     const double I0 = 2.0 * length * k->g / S, I1 = -2.0 * k->vn * k->w * l3 * k->h / (S * S * S);
     const double I2 = l3 / S * (0.5 * k->Q + (2.0 * k->vn * k->vn - k->a2) * k->h / (S * S));
     (void)delta;

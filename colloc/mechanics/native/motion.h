@@ -34,8 +34,8 @@ static inline void find_values(const int n, const Link *link, const Sliding *k, 
     value[CENTRE_ROW] = value[CENTRE_ROW + 1] = value[POWER_ROW] = 0.0;
     for (int i = 0; i < n; ++i) {
         link_velocity(&link[i], &k[i], v);
-        value[CENTRE_ROW] += link[i].length * v[0];
-        value[CENTRE_ROW + 1] += link[i].length * v[1];
+        value[CENTRE_ROW] += link[i].pressure * link[i].length * v[0];
+        value[CENTRE_ROW + 1] += link[i].pressure * link[i].length * v[1];
         value[POWER_ROW] -= k[i].fs * k[i].vs + k[i].fn * k[i].vn + k[i].couple * k[i].w;
     }
     value[ACTUATOR_ROW] = actuator_power(n, link, k);
@@ -120,8 +120,8 @@ static inline void value_changes(
     for (int i = 0; i < n; ++i) {
         double df[3];
         force_change(K[i], &d[i], df);
-        change[3] += link[i].length * d[i].vx;
-        change[4] += link[i].length * d[i].vy;
+        change[3] += link[i].pressure * link[i].length * d[i].vx;
+        change[4] += link[i].pressure * link[i].length * d[i].vy;
         change[5] -= df[0] * k[i].vs + df[1] * k[i].vn + df[2] * k[i].w;
         change[5] -= k[i].fs * d[i].vs + k[i].fn * d[i].vn + k[i].couple * d[i].w;
     }

@@ -1,7 +1,7 @@
-"""Formulas written as text: evaluated with NumPy or CasADi, and differentiated, from the one statement.
+"""Formulas written as text: evaluated with floats, NumPy or CasADi, and differentiated, from the one statement.
 
-Text rather than functions, so that files can hold them. Derivatives are carried along with the values (forward mode), so they
-need no second statement and no CasADi.
+Text rather than functions, so that files can hold them; nothing but arithmetic of known variables is ever evaluated.
+Derivatives are carried along with the values (forward mode), so they need no second statement and no CasADi.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.system.errors import ProblemError
 
 FUNCTIONS = ("sqrt", "exp", "log", "tanh", "abs", "where")
+_LONGEST = 500
+"""Characters of a formula."""
 _NODES = (
     ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.Compare,
     ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd, ast.Gt, ast.GtE, ast.Lt, ast.LtE,
@@ -111,9 +113,46 @@ def _dual_functions(xp: SimpleNamespace, count: int) -> dict[str, Callable[..., 
     }
 
 
+class _Floats(ast.NodeTransformer):
+    """Whole numbers as floats: powers of those may fill the memory, these overflow."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
+        return ast.copy_location(ast.Constant(float(node.value)), node)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False)
+class Formula:
+    """A formula that was read.
+
+    Attributes
+    ----------
+    text : str
+        As Python writes it.
+    names : frozenset of str
+        Variables and functions that it speaks of.
+    code : CodeType
+    """
+
+    text: str
+    names: frozenset[str]
+    code: CodeType
+
+    def __call__(self, at: Mapping[str, Array]) -> Array:
+        """Its value, for floats, arrays or CasADi's symbols."""
+        xp = namespace(*at.values())
+        return eval(self.code, {"__builtins__": {}}, {**{name: getattr(xp, name) for name in FUNCTIONS}, **at})
+
+    def differentiated(self, at: Mapping[str, Dual]) -> Dual:
+        """Its value with its derivatives."""
+        count = len(next(iter(at.values())).slopes)
+        functions = _dual_functions(namespace(*(a.value for a in at.values())), count)
+        found = eval(self.code, {"__builtins__": {}}, {**functions, **at})
+        return found if isinstance(found, Dual) else Dual(found, (0.0,) * count)
+
+
 @lru_cache(maxsize=64)
-def parsed(text: str, variables: tuple[str, ...]) -> CodeType:
-    """A formula of some variables, ready to be evaluated.
+def formula(text: str, variables: tuple[str, ...]) -> Formula:
+    """A formula of some variables, ready to be evaluated. Objects that hold one keep its text: code cannot be pickled.
 
     Raises
     ------
@@ -122,10 +161,12 @@ def parsed(text: str, variables: tuple[str, ...]) -> CodeType:
     """
     if not isinstance(text, str):
         raise ProblemError(f"a formula must be text, not {text!r}.")
+    if len(text) > _LONGEST:
+        raise ProblemError(f"a formula may have {_LONGEST} characters, not {len(text)}.")
     try:
-        tree = ast.parse(text, mode="eval")
-    except SyntaxError as error:
-        raise ProblemError(f"'{text}' is no formula: {error.msg}.") from None
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError) as error:
+        raise ProblemError(f"'{text}' is no formula: {getattr(error, 'msg', error)}.") from None
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     for node in ast.walk(tree):
         exponent = node.right if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) else ast.Constant(1)
@@ -140,18 +181,8 @@ def parsed(text: str, variables: tuple[str, ...]) -> CodeType:
         if not (isinstance(node, _NODES) and number and plain and single):
             allowed = f"numbers, + - * / **, comparisons within where(condition, a, b), and {', '.join(FUNCTIONS)}"
             raise ProblemError(f"'{text}' is no formula that can be differentiated; it may use {allowed}.")
-    return compile(tree, "<formula>", "eval")
-
-
-def evaluated(code: CodeType, at: Mapping[str, Array]) -> Array:
-    """The value of a formula."""
-    xp = namespace(*at.values())
-    return eval(code, {"__builtins__": {}}, {**{name: getattr(xp, name) for name in FUNCTIONS}, **at})
-
-
-def differentiated(code: CodeType, at: Mapping[str, Dual]) -> Dual:
-    """The value of a formula with its derivatives."""
-    count = len(next(iter(at.values())).slopes)
-    functions = _dual_functions(namespace(*(a.value for a in at.values())), count)
-    found = eval(code, {"__builtins__": {}}, {**functions, **at})
-    return found if isinstance(found, Dual) else Dual(found, (0.0,) * count)
+    names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
+    try:
+        return Formula(ast.unparse(tree), names, compile(_Floats().visit(tree), "<formula>", "eval"))
+    except RecursionError:
+        raise ProblemError(f"'{text}' is nested too deeply.") from None

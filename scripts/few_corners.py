@@ -20,7 +20,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.results.relaxed_solution import RelaxedSolution
+from colloc.results.solution import Solution
 from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, Found, settled_apart
 from colloc.search.relaxed_search import certified
 
@@ -43,9 +43,7 @@ class _Step(NamedTuple):
     replaced: np.ndarray
 
 
-def polygon_near(
-    problem: Problem, gait: Mixture, corners: int, report: Callable[[str], None] = lambda _: None
-) -> RelaxedSolution:
+def polygon_near(problem: Problem, gait: Mixture, corners: int, report: Callable[[str], object] = lambda _: None) -> Solution:
     """The polygon of `few_corners`, certified: a relaxed gait of one direction, which is realised as it is."""
     begin = time.perf_counter()
     solution = certified(few_corners(problem, gait, corners, report), report=report)
@@ -53,7 +51,7 @@ def polygon_near(
     return solution
 
 
-def few_corners(problem: Problem, gait: Mixture, corners: int, report: Callable[[str], None] = lambda _: None) -> Found:
+def few_corners(problem: Problem, gait: Mixture, corners: int, report: Callable[[str], object] = lambda _: None) -> Found:
     """A polygon with at most so many corners over the period near a relaxed gait, a local optimum among these.
 
     Parameters

@@ -1,0 +1,125 @@
+"""What a gait is, and a class of gaits: the bases of all kinds.
+
+A gait is a function of the phase, with words for its reader. A class says which gaits are allowed. Its members are known by a
+vector of parameters on a mesh. How a class is collocated and searched, where its angles are not linear in its parameters, is
+registered in `colloc.reduced.spaces`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.symmetry import SYMMETRIES, fraction
+from colloc.system.errors import ProblemError
+
+
+class GaitFunction:
+    """Base of the kinds of gaits: ``gait(t)`` gives joint angles and rates, so a gait can stand where a path is asked for.
+
+    Examples
+    --------
+    >>> from colloc import ellipse
+    >>> gait = ellipse(A0=0, A1=2, B1=1)
+    >>> angles, rates = gait([0, 0.25])
+    >>> angles
+    array([[ 2.,  1.],
+           [-2.,  1.]])
+    >>> print(gait)
+    joint 1: +0.0000 +2.0000 cos 2πt +1.0000 sin 2πt
+    joint 2: +0.0000 -2.0000 cos 2πt +1.0000 sin 2πt
+    """
+
+    is_series = False
+    """Whether it is a Fourier series of the phase."""
+
+    @property
+    def n_joint(self) -> int:
+        raise NotImplementedError
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
+        raise NotImplementedError
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """Joint rates ``(n_joint, n_time)`` per period at phases t."""
+        raise NotImplementedError
+
+    def lines(self, coordinate: str = "joint") -> list[str]:
+        """The gait in words or as a formula; `coordinate` is what the body calls its shape coordinates."""
+        raise NotImplementedError
+
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.angles(t), self.rates(t)
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.n_joint} joint{'s' if self.n_joint > 1 else ''}>"
+
+
+class ClassOfGaits:
+    """Base of the classes of gaits; besides what stands here a class has ``symmetry``, and ``series(harmonics)``."""
+
+    symmetry: str
+    symmetries: tuple[str, ...] = SYMMETRIES
+    """Those that it may have."""
+    free = True
+    """Whether it has more than one member."""
+    unit_speed = False
+    """Whether delta and rates are those at unit shape speed, so that the pace does not matter."""
+    mixes = False
+    """Whether members mix directions of rates at an instant."""
+    delta_start: float | None = None
+    """Where a search begins in delta; None: where the body's usual one does."""
+    moves_knots = False
+    """Whether a planned mesh may move its knots a little, to be even."""
+    of_arcs = False
+    """Whether it has curvature, and arcs that meet."""
+
+    def _check_symmetry(self) -> None:
+        if self.symmetry not in self.symmetries:
+            raise ProblemError(f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}.")
+
+    @property
+    def fraction(self) -> float:
+        """The part of the period that has to be solved; symmetry gives the rest."""
+        return fraction(self.symmetry)
+
+    def describe(self) -> str:
+        """The class in words, for reports."""
+        raise NotImplementedError
+
+    def intervals(self, n_joint: int) -> int:
+        """Intervals that a first mesh wants."""
+        raise NotImplementedError
+
+    def coarse_intervals(self, n_joint: int) -> int:
+        """Intervals on which starts are told apart."""
+        return self.intervals(n_joint) // 2
+
+    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        """Intervals that a mesh with so many points on each needs at least, and for what."""
+        return 4, "a path"
+
+    def first_edges(self, edges: np.ndarray) -> np.ndarray:
+        """The mesh from which a finer one is grown: by default its own, whose edges mean something."""
+        return edges
+
+    def laid_on(self, gait: Any, edges: np.ndarray) -> Any:
+        """A member whose pieces are those of a mesh, where that matters."""
+        return gait
+
+    def size(self, n_joint: int, n_interval: int) -> int:
+        """Number of parameters."""
+        raise NotImplementedError
+
+    def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> Any:
+        """The gait of a parameter vector, on a mesh where that matters."""
+        raise NotImplementedError
+
+    def own_checks(self, gait: Any) -> list[tuple[str, float, float, str]]:
+        """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""
+        return []

@@ -1,0 +1,75 @@
+"""The figure of a solution: filmstrip and paths in the lab, then what tells most about its kind of gait."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_power, draw_shape_path, draw_speeds
+from colloc.pictures.relaxed_figure import draw_mixture, draw_realised, draw_shares
+from colloc.pictures.style import INK, VERMILION, Picture, styled
+from colloc.results.solution import SOLVED, Solution
+
+_Panels = dict[str, Callable[[Axes], None]]
+"""Title to what draws it."""
+
+
+def solution_figure(solution: Solution) -> Figure:
+    """Filmstrip and lab paths of a solution; shape space, speeds and power, or of a relaxed gait the mixture it comes near."""
+    panels = _of_motion(solution) if solution.relaxed is None else _of_mixture(solution)
+    with styled():
+        figure = Picture(figsize=(11, 8.2))
+        figure.set_layout_engine("none")  # the places are known
+        colour = INK if solution.status == SOLVED else VERMILION
+        figure.text(0.015, 0.985, _headline(solution), fontsize=11, va="top", color=colour)
+        draw_filmstrip(figure.add_axes((0.015, 0.76, 0.97, 0.135)), solution)
+        figure.text(0.015, 0.905, "one period, frame by frame: phase, and below it how far the centre has come (disc: head)")
+        grid = figure.add_gridspec(
+            2, 2, left=0.075, right=0.985, bottom=0.06, top=0.685, wspace=0.2, hspace=0.33, width_ratios=(2, 1),
+            height_ratios=(1.35, 1),
+        )  # fmt: skip
+        for k, (title, draw) in enumerate(panels.items()):
+            axes = figure.add_subplot(grid[k])
+            draw(axes)
+            axes.set_title(title)
+    return figure
+
+
+def _headline(solution: Solution) -> str:
+    problem, relaxed = solution.problem, solution.relaxed
+    verdict = "" if solution.status == SOLVED else f"   —   {solution.status.upper()}"
+    near = ""
+    if relaxed is not None:
+        near = f" with {relaxed.best.corners} corners, relaxed {relaxed.certificate.efficiency:.5f}"
+    return (
+        f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}{near}   "
+        f"{problem.friction.label},  δ = {solution.last.delta:.0e}{verdict}\n"
+        f"class: {problem.gait.describe()}"
+    )
+
+
+def _of_motion(solution: Solution) -> _Panels:
+    t = np.linspace(0.0, 1.0, 1201)
+    angles, problem = solution.gait.angles(t), solution.problem
+    found: _Panels = {"in the lab (black: at the end)": lambda axes: draw_lab(axes, solution)}
+    if len(angles) == 2 and problem.gait.free:
+        found["shape space (disc: t = 0)"] = lambda axes: draw_shape_path(axes, problem, angles)
+    else:  # no one plane shows them all
+        found["shape"] = lambda axes: draw_angles(axes, t, angles, problem.body)
+    found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(axes, solution, t)
+    found[f"W = {solution.measured.work:.4f} a period (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
+    return found
+
+
+def _of_mixture(solution: Solution) -> _Panels:
+    relaxed = solution.relaxed
+    assert relaxed is not None
+    return {
+        "in the lab (black: at the end)": lambda axes: draw_lab(axes, solution),
+        "shape space": lambda axes: draw_mixture(axes, solution.problem, relaxed.gait),
+        "the mixture": lambda axes: draw_shares(axes, relaxed.gait),
+        "finite gaits": lambda axes: draw_realised(axes, relaxed),
+    }

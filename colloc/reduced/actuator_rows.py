@@ -1,0 +1,124 @@
+"""Rows that keep the actuators of a collocated gait within their limits.
+
+They are laid on the points of the mesh, where the full program has the forces. What happens between the points is watched:
+by how much the largest value in a mesh interval exceeds that at its points, by so much less is allowed there. Measured again
+whenever the checks are moved, this leaves nothing over once the gait rests.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.collocation.point_equations import ACTUATORS
+from colloc.collocation.program import GaitProgram
+from colloc.gaits.gait_fields import AnyGait
+from colloc.mechanics.actuators import ActuatorLimits
+from colloc.numerics.mesh import Mesh
+from colloc.reduced.actuator_slopes import share_slopes
+from colloc.reduced.motion import ReducedMotion
+
+_SAMPLES = np.linspace(1e-9, 1 - 1e-9, 17)
+"""Of an interval; rates may jump at its ends."""
+_NEAR = 0.3
+"""A value that is nearer to its bound than this, over the limit, is among the rows."""
+_ZOOMS, _CLOSE = 2, 0.02
+"""Samples are laid again, 8 times as densely, round the highest of an interval that is nearer than this to its limit."""
+_EXACT = 3e-5
+"""Excess over a limit that counts as none, relative: less than a certificate allows."""
+
+
+class ActuatorRows:
+    """Shares of the limits at the points of a mesh, as functions of a gait's parameters.
+
+    Attributes
+    ----------
+    lower, upper : (n_share, n_point)
+        What is allowed at each point.
+    placed : (2, n_row)
+        Share and point of each row.
+    """
+
+    def __init__(self, motion: ReducedMotion, limits: ActuatorLimits) -> None:
+        self._motion, self._limits = motion, limits
+        self.placed = np.empty((2, 0), dtype=int)
+        shape = len(limits.names), motion.mesh.n_point
+        self.lower, self.upper = np.tile(limits.least[:, None], shape[1]), np.ones(shape)
+
+    def place(self, v: np.ndarray, delta: float, gait: AnyGait, phases: Mesh) -> float:
+        """Choose the rows near the gait v, whose mesh in its phases is given; by how much it exceeds any limit, relative."""
+        mesh = self._motion.mesh
+        here = self._magnitudes(self._all(v, delta))
+        largest = self._largest(gait, delta * gait.delta_unit, phases)
+        between = np.maximum(largest - here[:, mesh.points].max(axis=2), 0.0)
+        lowered = np.zeros_like(here)
+        for points in mesh.points.T:  # neighbours may share a point
+            lowered[:, points] = np.maximum(lowered[:, points], between)
+        self.upper = 1.0 - lowered
+        self.lower = np.where(np.isfinite(self.lower), -self.upper, self.lower)
+        self.placed = np.stack(np.nonzero(here > self.upper - _NEAR))
+        excess = float(largest.max()) - 1.0
+        return excess if excess > _EXACT or np.isnan(excess) else 0.0
+
+    def _largest(self, gait: AnyGait, delta: float, phases: Mesh) -> np.ndarray:
+        """In every interval, ``(n_share, n)``; delta is per period."""
+        t = phases.edges[:-1, None] + phases.h[:, None] * _SAMPLES
+        found = self._shares_at(gait, delta, t.ravel()).reshape(-1, *t.shape)
+        largest, t = found.max(axis=2), np.tile(t, (len(found), 1, 1))
+        for _ in range(_ZOOMS):
+            share, interval = np.nonzero(largest > 1.0 - _CLOSE)
+            if not share.size:
+                break
+            each, near = np.arange(share.size), found[share, interval].argmax(axis=1)
+            near, around = np.clip(near, 1, _SAMPLES.size - 2), t[share, interval]
+            left, right = around[each, near - 1], around[each, near + 1]
+            t[share, interval] = finer = left[:, None] + (right - left)[:, None] * _SAMPLES
+            every = self._shares_at(gait, delta, finer.ravel()).reshape(-1, *finer.shape)
+            found[share, interval] = every[share, each]
+            largest[share, interval] = np.maximum(largest[share, interval], every[share, each].max(axis=1))
+        return largest
+
+    def _shares_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
+        """Magnitudes at phases, ``(n_share, n_time)``."""
+        body, at = self._motion.body, (self._motion.friction, gait.angles(t), gait.rates(t))
+        z = body.solve(*at, delta).z
+        return self._magnitudes(self._limits.shares_in_balance(body, *at, z, delta))
+
+    def _magnitudes(self, shares: np.ndarray) -> np.ndarray:
+        """What a bound from above is laid on: moments are bounded both ways."""
+        return np.where(np.isfinite(self._limits.least)[:, None], np.abs(shares), shares)
+
+    def _all(self, v: np.ndarray, delta: float) -> np.ndarray:
+        s, motion = self._motion.at(v, delta), self._motion
+        return self._limits.shares_in_balance(motion.body, motion.friction, s.angles, s.rates, s.solved.z, delta)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the rows, ``(n_row,)`` each."""
+        return self.lower[tuple(self.placed)], self.upper[tuple(self.placed)]
+
+    def values(self, v: np.ndarray, delta: float) -> np.ndarray:
+        """Of the rows, ``(n_row,)``."""
+        return self._all(v, delta)[tuple(self.placed)]
+
+    def slopes(self, v: np.ndarray, delta: float) -> np.ndarray:
+        """Derivatives of the rows, ``(n_row, n)``."""
+        s, motion = self._motion.at(v, delta), self._motion
+        (share, point), each = self.placed, np.arange(self.placed.shape[1])
+        if not each.size:
+            return np.empty((0, v.size))
+        at = s.angles[:, point], s.rates[:, point], s.solved.z[:, point]
+        slopes = share_slopes(motion.body, motion.friction, self._limits, *at, delta)
+        on_shape = np.zeros((each.size, motion.mesh.n_point, slopes.shape[1]))
+        on_shape[each, point] = slopes[share, :, each]
+        return motion.shapes.pulled_back(v, on_shape, np.zeros(on_shape.shape[:2]))
+
+    def laid_on(self, program: GaitProgram) -> GaitProgram:
+        """The full program on the same mesh with the same bounds."""
+        lower, upper, rows = program.constraint_lower.copy(), program.constraint_upper.copy(), program.groups[ACTUATORS]
+        lower[rows], upper[rows] = self.lower.T.ravel(), self.upper.T.ravel()
+        return program.with_rows(lower, upper)
+
+    def multipliers(self, on_rows: np.ndarray) -> np.ndarray:
+        """Of the full program's rows, from those of these."""
+        found = np.zeros(self.upper.shape)
+        found[tuple(self.placed)] = on_rows
+        return found.T.ravel()

@@ -1,0 +1,110 @@
+"""The motion of a collocated gait at any instant, by the scheme's own interpolant: the error between nodes is visible."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from colloc.collocation.layout import Layout
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, reduced
+from colloc.mechanics.bodies import Sliding
+from colloc.numerics.mesh import Mesh
+from colloc.results.motion import SampledMotion, turned
+
+
+@dataclass(frozen=True, eq=False)
+class CollocatedMotion:
+    """A gait with everything that its variables say of the motion.
+
+    Attributes
+    ----------
+    problem : Problem
+        As the program stated it.
+    mesh : Mesh
+    layout : Layout
+    x : (n,)
+        The variables.
+    gait : AnyGait
+    delta : float
+        Regularisation speed per period.
+    """
+
+    problem: Problem
+    mesh: Mesh
+    layout: Layout
+    x: np.ndarray
+    gait: AnyGait
+    delta: float
+
+    def sliding(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> Sliding:
+        """The body with given tail velocities."""
+        delta = np.full((1, z.shape[1]), self.delta)
+        return self.problem.body.sliding(self.problem.friction, angles, rates, z, delta)
+
+    @cached_property
+    def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles, rates and tail velocities per period at the collocation points."""
+        x, layout, problem = self.x, self.layout, self.problem
+        if layout.z.size:
+            unit = self.gait.speed_unit
+            return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
+        angles, rates = self.gait(self.mesh.times)
+        return angles, rates, problem.body.solve(problem.friction, angles, rates, self.delta).z
+
+    @cached_property
+    def at_points(self) -> Sliding:
+        """The body at the collocation points."""
+        return self.sliding(*self._points)
+
+    def sample(self, t: np.ndarray | float) -> SampledMotion:
+        """The motion at phases t, any real numbers; whole periods add up.
+
+        Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's. The lab frame has the centre
+        of mass at the origin and the motion along +x at t = 0.
+        """
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        if t.ndim != 1 or not np.isfinite(t).all():
+            raise ValueError("t must be finite phases, a number or a one-dimensional array.")
+        period, phase = np.divmod(t, 1.0)
+        symmetry, body = self.problem.gait.symmetry, self.problem.body
+        solved, second = reduced(symmetry, phase)
+        z, theta, centre, end = self._interpolated(solved)
+        angles, rates = self.gait(phase)
+        if symmetry == BILATERAL:
+            # seen from the head the body repeats itself with reversed rates
+            head, heading = body.seen_from_head(self.gait.angles(solved), self.gait.rates(solved), z)
+            z = np.where(second, head, z)
+            theta = np.where(second, theta + heading, theta)
+            centre = np.where(second, 2 * end[:, None] - centre, centre)
+            end = 2 * end
+        elif symmetry == ANTIPODAL:
+            mirror, x_theta = np.array([[1.0], [-1.0], [-1.0]]), self.x[self.layout.theta[0]]
+            z = np.where(second, mirror * z, z)
+            turns = 2 * np.pi * np.round((x_theta[0] + x_theta[-1]) / (2 * np.pi))
+            theta = np.where(second, turns - theta, theta)
+            centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
+            end = np.array([2 * end[0], 0.0])
+        centre = centre + period * end[:, None]
+        return SampledMotion(t, angles, rates, z, theta, centre, centre - turned(body.centre(angles), theta))
+
+    def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """z, theta and centre of mass at phases t of the solved part, and the centre's displacement at its end."""
+        mesh, layout, x, scheme = self.mesh, self.layout, self.x, self.mesh.scheme
+        k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
+        tau = (t - mesh.edges[k]) / mesh.h[k]
+        value, integral = scheme.lagrange(tau), scheme.integrals(tau)
+        z_points = self._points[2]
+        site_theta = np.empty(mesh.n_point)
+        site_theta[mesh.points] = x[layout.theta[0]][mesh.sites]
+        lab = turned(self.at_points.centre, site_theta)
+        steps = np.einsum("ks,cks,k->ck", np.broadcast_to(scheme.b, (mesh.n, scheme.s)), lab[:, mesh.points], mesh.h)
+        edges = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
+        points = mesh.points[k]
+        z = np.einsum("ts,cts->ct", value, z_points[:, points])
+        theta = x[layout.theta[0, mesh.edge_sites[k]]] + mesh.h[k] * np.einsum("ts,ts->t", integral, z_points[2, points])
+        centre = edges[:, k] + mesh.h[k] * np.einsum("ts,cts->ct", integral, lab[:, points])
+        return z, theta, centre, edges[:, -1]

@@ -1,0 +1,121 @@
+"""Links of different weights: friction follows the weight, and so does the centre of mass."""
+
+import numpy as np
+import pytest
+from shared.instants import random_instants
+
+from benchmarks.independent_replay import Crawler, played
+from colloc import Chain, Elliptic, Friction, OwnLaw, PowerLaw, Problem, ProblemError, load, replay, save, solve_balance
+from colloc.bounds.guaranteed import certify
+from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.mechanics.balance import instant, net_force
+from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.search.optimise import maximise_efficiency
+
+LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
+LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5)]
+
+
+def test_weights_in_proportion_to_the_lengths_are_no_weights_to_the_last_bit():
+    angles, rates = random_instants(50)
+    said, unsaid = (
+        solve_balance(body, Friction(2, 1, 3), angles, rates, 1e-4) for body in (Chain(weights=(1 / 3,) * 3), Chain())
+    )
+    np.testing.assert_array_equal(said.z, unsaid.z)
+
+
+def test_friction_on_a_link_is_in_proportion_to_its_weight():
+    angles, rates = random_instants(20)
+    z = np.random.default_rng(1).normal(size=(3, 20))
+    for law in (*LAWS, PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")):
+        plain, heavy = (instant(Chain(LENGTHS, weights=w), law, angles, rates, z, 1e-3).force for w in ((), WEIGHTS))
+        for own, more in zip(plain, heavy, strict=True):
+            np.testing.assert_allclose(more, own * np.divide(WEIGHTS, LENGTHS)[:, None], rtol=1e-14)
+
+
+def test_a_nearly_weightless_head_neither_holds_nor_moves_the_body():
+    angles, rates = random_instants(30)
+    rates[0] = 0.0  # tail and middle are one stiff piece, which stays where it is
+    light = Chain((0.3, 0.3, 0.4), weights=(0.5, 0.5 - 1e-9, 1e-9))
+    solved = solve_balance(light, Friction(), angles, rates, 1e-6)
+    np.testing.assert_allclose(solved.z, 0.0, atol=1e-6)
+
+
+def test_a_body_named_from_its_other_end_moves_the_same_way():
+    # shape coordinates from the head: the chain turned round, its weights with it
+    angles, rates = random_instants(30)
+    body, turned = Chain(LENGTHS, weights=WEIGHTS), Chain(LENGTHS[::-1], weights=WEIGHTS[::-1])
+    law = Friction(2.0, 1.0, 1.0)
+    power = [
+        chain_motion(b, law, q, r, 1e-4, solve_balance(b, law, q, r, 1e-4)).power
+        for b, q, r in ((body, angles, rates), (turned, -angles[::-1], -rates[::-1]))
+    ]
+    np.testing.assert_allclose(*power, rtol=1e-8)
+    assert Chain(weights=(0.4, 0.2, 0.4)).symmetric
+    assert not Chain(weights=(0.4, 0.4, 0.2)).symmetric
+
+
+@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_compiled_balances_and_slopes_are_those_of_numpy(law):
+    body, (angles, rates) = Chain(LENGTHS, weights=WEIGHTS), random_instants(100)
+    solved = solve_balance(body, law, angles, rates, 1e-4)
+    motion, slopes = chain_slopes(body, law, angles, rates, 1e-4, solved)
+    with numpy_instead():
+        same = solve_balance(body, law, angles, rates, 1e-4, start=solved.z)
+        known, reference = chain_slopes(body, law, angles, rates, 1e-4, solved)
+    np.testing.assert_allclose(same.z, solved.z, atol=1e-9)
+    np.testing.assert_allclose(motion.centre, known.centre, atol=1e-12)
+    np.testing.assert_allclose(motion.actuator_power, motion.power, atol=1e-9)
+    scale = np.abs(reference).max(axis=(0, 1))
+    np.testing.assert_allclose(slopes / scale, reference / scale, atol=1e-9)
+
+
+def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced():
+    body, law, (angles, rates) = Chain(LENGTHS, weights=WEIGHTS), Friction(1.7, 1, 1.3), random_instants(40)
+    solved = solve_balance(body, law, angles, rates, 1e-3)
+    forces = body.forces(law, angles, rates, solved.z, 1e-3)
+    lifted = body.with_forces(law, angles, rates, solved.z, forces, 1e-3)
+    np.testing.assert_allclose(lifted.laws, 0.0, atol=1e-10)
+    np.testing.assert_allclose(lifted.balance, 0.0, atol=1e-10)
+    assert (np.abs(forces) <= body.largest_forces(law)).all()
+    now = instant(body, law, angles, rates, solved.z, 1e-3)
+    np.testing.assert_allclose(net_force(now.posture, now.force), 0.0, atol=1e-10)
+
+
+def test_the_replay_is_that_of_a_program_of_its_own():
+    gait = Fourier([0.2, -0.1], [[1.2], [0.3]], [[0.2], [1.0]])
+    theirs = played(Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS), lambda t: (gait.angles(t), gait.rates(t)), 1e-2, 1e-5)
+    ours = replay(Chain(LENGTHS, weights=WEIGHTS), Friction(1.7, 1, 1.3), gait, 1e-2)
+    assert ours.work == pytest.approx(theirs.work, rel=1e-4)
+    assert ours.distance == pytest.approx(theirs.distance, rel=1e-4)
+    assert ours.rotation == pytest.approx(theirs.rotation, rel=1e-4)
+
+
+def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
+    problem = Problem("heavy_ends", body=Chain(weights=(0.4, 0.2, 0.4)), gait=Harmonic(1, "bilateral"))
+    found = maximise_efficiency(problem)
+    assert found.status == "solved"
+    assert found.last.program == "full"
+    again = load(save(found, tmp_path / "heavy.h5"))
+    assert again.problem.body == problem.body
+    assert again.problem.hash == problem.hash
+    assert "weights" not in Problem("plain").to_dict()["body"]
+    # the bound 1/min(mu) holds for the centre of mass that the weights have
+    assert found.efficiency < 1.0
+
+
+def test_a_bound_knows_the_weights_or_refuses():
+    heavy, budget = Chain(weights=(0.4, 0.2, 0.4)), Budget(intervals=4, shapes=6, directions=12, rounds=2)
+    plain, other = (efficiency_bound(body, Friction(), budget=budget) for body in (Chain(), heavy))
+    assert abs(plain.sampled - other.sampled) > 1e-3
+    with pytest.raises(ProblemError, match="weights"):
+        certify(heavy, Friction(), plain, 0.6)
+
+
+@pytest.mark.parametrize("weights", [(1.0,), (0.5, 0.5, 0.5), (0.5, 0.5, 0.0), (0.5, 0.5, "x"), (np.nan, 0.5, 0.5), 3.0])
+def test_unusable_weights_are_named(weights):
+    with pytest.raises(ProblemError, match=r"body\.weights"):
+        Chain(weights=weights)

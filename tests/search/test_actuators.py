@@ -1,0 +1,188 @@
+"""What joints have to do, and gaits of joints that cannot do everything."""
+
+import numpy as np
+import pytest
+from shared.instants import random_instants
+
+from colloc import (
+    Chain,
+    FreePath,
+    Friction,
+    Harmonic,
+    ModalBody,
+    Problem,
+    ProblemError,
+    Relaxed,
+    Viscous,
+    ellipse,
+    load,
+    replay,
+    save,
+)
+from colloc.commands import verify
+from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, joint_moments
+from colloc.mechanics.balance import instant
+from colloc.search.optimise import maximise_efficiency
+
+ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
+BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
+USUAL = Problem("limited", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"))
+
+
+def moments(body, law, angles, rates, delta):
+    z = body.solve(law, angles, rates, delta).require().z
+    return joint_moments(body, law, angles, body.forces(law, angles, rates, z, delta), delta), z
+
+
+def test_a_joint_balances_the_friction_on_all_that_lies_ahead_of_it():
+    angles, rates = random_instants(6)
+    found, z = moments(BODY, LAW, angles, rates, 1e-2)
+    for k in range(6):
+        # a plain sum over many pieces of every link, in the body's axes
+        now = instant(BODY, LAW, angles[:, [k]], rates[:, [k]], z[:, [k]], 1e-2)
+        joints = np.stack(BODY.joints(angles[:, [k]]))[:, :, 0]
+        for joint in (0, 1):
+            total = 0.0
+            for link in range(joint + 1, 3):
+                length, weight = BODY.lengths[link], BODY.weights[link]
+                along = length * ((np.arange(20000) + 0.5) / 20000 - 0.5)
+                vs, vn = (float(now.velocity[i][link, 0]) for i in (0, 1))
+                vn = vn + float(now.velocity.w[link, 0]) * along
+                speed = np.sqrt(vs**2 + vn**2 + 1e-4)
+                fs, fn = -(LAW.mu_f if vs > 0 else LAW.mu_b) * vs / speed, -LAW.mu_t * vn / speed
+                c, s = float(now.posture.cos[link, 0]), float(now.posture.sin[link, 0])
+                x = float(now.posture.x[link, 0]) + along * c - joints[0, joint + 1]
+                y = float(now.posture.y[link, 0]) + along * s - joints[1, joint + 1]
+                total += weight * np.mean(x * (fs * s + fn * c) - y * (fs * c - fn * s))
+            assert found[joint, k] == pytest.approx(-total, abs=1e-7)
+
+
+def test_an_end_joint_never_needs_more_than_to_swing_the_end_link_broadside():
+    angles, rates = random_instants(500)
+    most = LAW.mu_t * BODY.weights[2] * BODY.lengths[2] / 2
+    assert np.abs(moments(BODY, LAW, angles, rates, 1e-6)[0][1]).max() <= most * (1 + 1e-9)
+    # a light end is swung about its joint while the rest stays
+    light = Chain((0.4, 0.4, 0.2))
+    swung = moments(light, Friction(), np.zeros((2, 1)), np.array([[0.0], [1.0]]), 1e-8)[0]
+    assert swung[1, 0] == pytest.approx(0.2**2 / 2, rel=1e-6)
+
+
+def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it():
+    angles, rates = random_instants(50)
+    slow, fast = (moments(BODY, LAW, angles, pace * rates, pace * 1e-3)[0] for pace in (1.0, 2.0))
+    np.testing.assert_allclose(fast, slow, rtol=1e-7, atol=1e-9)
+    drag = [moments(Chain(), Viscous(2, 1), angles, pace * rates, 1e-3)[0] for pace in (1.0, 2.0)]
+    np.testing.assert_allclose(drag[1], 2 * drag[0], rtol=1e-9)
+    z = BODY.solve(LAW, angles, rates, 1e-3).z
+    powers = actuator_powers(BODY, LAW, angles, rates, BODY.forces(LAW, angles, rates, z, 1e-3), 1e-3)
+    np.testing.assert_allclose(powers, slow * rates, rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def free():
+    return maximise_efficiency(USUAL)
+
+
+@pytest.fixture(scope="module")
+def weak():
+    return maximise_efficiency(USUAL.with_(power_limit=0.6))
+
+
+def test_the_replay_tells_the_largest_torques_and_powers(free):
+    # the best ellipse of three equal links swings an end link broadside, and so does every other of its class
+    torques, powers = np.split(replay(Chain(), Friction(), free.gait, 1e-4, limits=ONE).shares, 2)
+    np.testing.assert_allclose(torques, 1 / 18, rtol=1e-4)
+    assert powers[0] == pytest.approx(powers[1], rel=1e-4)
+    assert replay(Chain(), Friction(), free.gait, 1e-4).shares.size == 0
+
+
+def test_limits_that_nothing_reaches_change_nothing(free):
+    same = maximise_efficiency(USUAL.with_(torque_limit=0.06, power_limit=(0.9, 0.9)))
+    assert same.status == "solved"
+    assert same.efficiency == pytest.approx(free.efficiency, rel=1e-8)
+
+
+def test_weak_motors_cost_efficiency_and_keep_their_limit_between_the_nodes(free, weak):
+    assert weak.status == "solved"
+    assert weak.last.program == "full"
+    assert weak.efficiency < 0.95 * free.efficiency
+    shares = replay(Chain(), Friction(), weak.gait, 1e-4, instants=6400, limits=ONE).shares
+    assert shares[2:].max() == pytest.approx(0.6, rel=1e-4)
+    check = next(c for c in weak.certificate.checks if c.name == "actuators")
+    assert check.passed
+
+
+def test_a_certificate_fails_a_gait_whose_joints_do_more_than_they_can(weak):
+    from colloc.results.certificate import gait_certificate
+
+    weaker = weak.problem.with_(power_limit=0.55)
+    checks = gait_certificate(weaker, weak.gait, 1e-4, np.empty(0)).failures
+    assert [c.name for c in checks] == ["actuators"]
+    assert checks[0].value == pytest.approx(0.6 / 0.55 - 1, rel=1e-3)
+
+
+def test_limits_are_kept_in_files_and_verified(weak, tmp_path, capsys):
+    path = save(weak, tmp_path / "weak.h5")
+    again = load(path)
+    assert again.problem.power_limit == 0.6
+    assert again.problem.hash == weak.problem.hash
+    assert "torque_limit" not in again.problem.to_dict()
+    assert Problem.from_dict(again.problem.to_dict()).actuator_limits == ActuatorLimits((), (0.6, 0.6))
+    assert verify.main([str(path)]) == 0
+    assert "actuators" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_weaker_friction_and_motors_as_much_weaker_have_the_same_gait(weak):
+    scaled = maximise_efficiency(USUAL.with_(friction=Friction(1e-3, 1e-3, 1e-3), power_limit=6e-4))
+    assert scaled.status == "solved"
+    assert scaled.efficiency == pytest.approx(1e3 * weak.efficiency, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_price_it():
+    problem = Problem("four", body=Chain((0.25,) * 4), gait=Harmonic(1, "bilateral"), torque_limit=(0.1, 0.047, 0.1))
+    found = maximise_efficiency(problem.with_(guess=maximise_efficiency(problem.with_(torque_limit=None)).gait))
+    assert found.status == "solved"
+    # the price of a limit is the sum of the multipliers of its rows: shares are moments over it
+    price = np.abs(found.last.lam_g[-3 * found.mesh.n_point :]).sum() / 0.047
+    less, more = (found.problem.with_(torque_limit=(0.1, limit, 0.1), guess=found.gait) for limit in (0.0465, 0.0475))
+    gained = maximise_efficiency(more).efficiency - maximise_efficiency(less).efficiency
+    assert gained / 1e-3 == pytest.approx(price, rel=0.05)
+
+
+@pytest.mark.slow
+def test_joints_too_weak_for_any_gait_are_named():
+    found = maximise_efficiency(USUAL.with_(torque_limit=0.05))
+    assert found.status == "not converged"
+    assert "the limit on the torque of joint" in found.message
+    assert "allow the joints more" in found.message
+
+
+SIZED = ("guess", "joint_limit", "delta", "delta_start", "intervals", "formulation")
+"""What has another usual value for another body."""
+REFUSED = {
+    "pace open": (
+        {"power_limit": 1.0, "gait": FreePath(2.0, "none")},
+        "leaves the pace open, but the joints' power is limited",
+    ),
+    "mixed": ({"torque_limit": 1.0, "gait": Relaxed(3)}, "several directions at once"),
+    "smooth": ({"torque_limit": 1.0, "body": ModalBody(2), **dict.fromkeys(SIZED)}, "needs the forces"),
+    "sign": ({"torque_limit": -1.0}, "torque_limit must be positive"),
+    "text": ({"power_limit": "much"}, "power_limit must be positive"),
+    "number": ({"power_limit": (1.0, 2.0, 3.0)}, "power_limit has 3 values"),
+    "mirrored": ({"torque_limit": (1.0, 2.0)}, "give them the same torque_limit"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_limits_that_have_no_meaning_are_refused(case):
+    changes, words = REFUSED[case]
+    with pytest.raises(ProblemError, match=words):
+        USUAL.with_(**changes)
+
+
+def test_a_problem_says_why_its_pace_matters():
+    assert USUAL.with_(torque_limit=1.0).paced_by == ""
+    assert USUAL.with_(power_limit=1.0).paced_by == "the joints' power is limited"
+    assert "drag" in USUAL.with_(friction=Viscous(2, 1)).paced_by
