@@ -7,7 +7,8 @@ Faults are drawn from the packages that results rest on: an operator, a comparis
 functions (`benchmarks.reach`). For a fault those that call its function run, of the folder that mirrors its package first,
 until one fails; as many as fit in 40 s of processor time. What takes far longer than without a fault counts as caught (it
 hangs). Those that survive are printed with their line: they are a gap of the tests, or a change without consequences.
-What the record has is not done again, so that the same command goes on with a run that was ended. Which tests call what is kept
+What the record has of the same sources is not done again, so that the same command goes on with a run that was ended; a sample
+of other sources has other mutants. Which tests call what is kept
 beside it; remove that when tests change.
 """
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import hashlib
 import json
 import os
 import random
@@ -115,14 +117,18 @@ def tests_of(mutant: Mutant, known: dict[str, list[Test]]) -> list[str]:
     return chosen
 
 
-def mutants() -> Iterator[Mutant]:
+def sources() -> dict[str, str]:
+    """Texts of the files that faults are put in."""
+    files = [path for package in TESTS for path in sorted((ROOT / "colloc" / package).rglob("*"))]
+    mutated = (path for path in files if path.suffix in (".py", ".c", ".h") and path.stem not in _NOT_MUTATED)
+    return {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in mutated}
+
+
+def mutants(texts: dict[str, str]) -> Iterator[Mutant]:
     """Every fault that can be put in."""
-    for package in TESTS:
-        for path in sorted((ROOT / "colloc" / package).rglob("*")):
-            if path.suffix in (".py", ".c", ".h") and path.stem not in _NOT_MUTATED:
-                file, text = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
-                for start, end, new in faults_of(text, python=path.suffix == ".py"):
-                    yield Mutant(file, start, end, new)
+    for file, text in texts.items():
+        for start, end, new in faults_of(text, python=file.endswith(".py")):
+            yield Mutant(file, start, end, new)
 
 
 def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str]) -> str:
@@ -206,12 +212,13 @@ def main() -> None:
     parser.add_argument("--again", action="store_true", help="those that survived meet the tests of all folders")
     parser.add_argument("--only", default="", metavar="TEXT", help="of the sample those in files whose path holds this")
     options = parser.parse_args()
-    found = list(mutants())
+    texts = sources()
+    found, edition = list(mutants(texts)), hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:12]
     chosen = random.Random(options.seed).sample(found, min(options.mutants, len(found)))
     done, again = dict[int, str](), set[int]()
     if options.record.exists():
         rows = map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
-        done = {row["index"]: row["outcome"] for row in rows if row["seed"] == options.seed}
+        done = {row["index"]: row["outcome"] for row in rows if (row["seed"], row.get("sources")) == (options.seed, edition)}
         again = {index for index, what in done.items() if options.again and what in ("survived", "not reached")}
     options.record.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
@@ -237,8 +244,8 @@ def main() -> None:
             what, described = outcome(mutant, copy, cache, tests), mutant.described(copy)
             done[index] = what
             with options.record.open("a", encoding="utf-8") as record:
-                line = {"seed": options.seed, "index": index, "outcome": what, "tests": len(tests), "mutant": described}
-                record.write(json.dumps(line) + "\n")
+                line = {"sources": edition, "seed": options.seed, "index": index, "outcome": what, "tests": len(tests)}
+                record.write(json.dumps(line | {"mutant": described}) + "\n")
             print(f"{index:4d} {what:11s} {_processor_seconds() - before:6.1f} s  {described}", flush=True)
     print(f"{len(done)} of {len(chosen)} mutants: {dict(Counter(done.values()))}")
 

@@ -29,6 +29,7 @@ from colloc.gaits.paths import Corners
 from colloc.gaits.problem import Problem, statement_hash
 from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
+from colloc.results.former_format import converted, is_former
 from colloc.results.level import Level
 from colloc.results.motion import SAMPLES, motion_columns
 from colloc.results.relaxation import Optimality, Realised, Relaxation
@@ -103,6 +104,7 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
 def load(path: str | os.PathLike[str]) -> Solution:
     """The solution in a file that `save` wrote.
 
+    A file of the former format is converted first (`colloc.results.former_format`).
     A file that another program has opened to write since then is read with a `ChangedFileWarning`, and the solution is marked
     as ``changed``: `colloc verify` decides what it is worth.
 
@@ -118,6 +120,9 @@ def load(path: str | os.PathLike[str]) -> Solution:
     Traceback (most recent call last):
     colloc.system.errors.StoreError: there is no file nothing.h5.
     """
+    if is_former(path):
+        with converted(path, FORMAT, FORMAT_VERSION) as present:
+            return load(present)
     changed = was_changed(Path(path), FORMAT)
     try:
         with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:

@@ -15,7 +15,7 @@ import numpy as np
 from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
 from colloc.smooth.batch import PanelBatch, PanelFields
-from colloc.smooth.curve import Curve, Panels, bending_power, mean_velocity, node_velocity
+from colloc.smooth.curve import Curve, PanelGrid, bending_power, mean_velocity, node_velocity
 from colloc.smooth.motion import Motion
 from colloc.system.errors import NotConvergedError, ProblemError
 
@@ -72,7 +72,7 @@ class SmoothSolution:
 
 
 def _motion_fields(
-    motion: Motion, t: np.ndarray, panels: Panels, speed: np.ndarray | None = None
+    motion: Motion, t: np.ndarray, panels: PanelGrid, speed: np.ndarray | None = None
 ) -> tuple[PanelFields, np.ndarray]:
     """Theta and its rate on the panels of some instants, rates in units of the returned `speed` ``(n_time,)``."""
     nodes = panels.nodes
@@ -93,7 +93,9 @@ def _split(edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     return fine[:keep]
 
 
-def _panel_integrals(body: Curve, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray, panels: Panels) -> np.ndarray:
+def _panel_integrals(
+    body: Curve, vs: np.ndarray, vn: np.ndarray, fs: np.ndarray, fn: np.ndarray, panels: PanelGrid
+) -> np.ndarray:
     """Force, torque about the reference and power of every panel, ``(4, n_panel, n_time)``, from its nodes' velocities and
     forces per length."""
     densities = (
@@ -165,7 +167,7 @@ def solve_smooth(
         anchor, velocity = np.zeros(n, dtype=int), slide.copy()
         velocity[2] += motion.rate(np.zeros((1, n)), t)[0]
     for level in range(refinements + 1):
-        grid = Panels(edges, order)
+        grid = PanelGrid(edges, order)
         # work in units of the largest rate: the law is homogeneous once delta scales along
         unit = np.ones(active.size) if friction.degree is None else None
         fields, speed = _motion_fields(motion, t[active], grid, unit)
@@ -194,7 +196,7 @@ def solve_smooth(
         split = np.zeros((grid.n, active.size), dtype=bool)
         for members, batch in _groups(state.anchor, make):
             chosen, z = active[members], state.velocity[:, members]
-            own, body = Panels(edges[:, members], order), Curve(*batch.curve)
+            own, body = PanelGrid(edges[:, members], order), Curve(*batch.curve)
             vs, vn = node_velocity(body, z)
             fs, fn = friction.density(vs, vn, d[:, members])
             whole = _panel_integrals(body, vs, vn, fs, fn, own)
@@ -250,7 +252,7 @@ def _panel_error(
     start = batch.edge_velocity(z)[:, :-1].reshape(3, -1)
     results = []
     for cuts in ([left, right], [left, 0.5 * (left + right), right]):
-        fields, _ = _motion_fields(motion, t_many, Panels(np.stack(cuts), batch.fields.panels.order), speed_many)
+        fields, _ = _motion_fields(motion, t_many, PanelGrid(np.stack(cuts), batch.fields.panels.order), speed_many)
         one = PanelBatch(fields, friction, np.arange(t_many.size), 0)
         velocity = node_velocity(Curve(*one.curve), start)
         force = friction.density(*velocity, delta_many)

@@ -6,13 +6,13 @@ import numpy as np
 
 from colloc.mechanics.damped_newton import solve3
 from colloc.mechanics.law import Law
-from colloc.smooth.curve import Curve, Panels, curve, node_velocity, pulled_back, resultant
+from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity, pulled_back, resultant
 
 
 class PanelFields:
     """Tangent angle and its rate at the nodes ``(n_node, n_time)``, and the rate at the edges ``(n_panel + 1, n_time)``."""
 
-    def __init__(self, panels: Panels, angle: np.ndarray, rate: np.ndarray, edge_rate: np.ndarray) -> None:
+    def __init__(self, panels: PanelGrid, angle: np.ndarray, rate: np.ndarray, edge_rate: np.ndarray) -> None:
         self.panels, self.angle, self.rate, self.edge_rate = panels, angle, rate, edge_rate
 
 
@@ -21,7 +21,7 @@ class PanelBatch:
 
     def __init__(self, fields: PanelFields, friction: Law, members: np.ndarray, reference: int) -> None:
         self.fields, self.friction, self.members, self.reference = fields, friction, members, reference
-        self.panels = Panels(fields.panels.edges[:, members], fields.panels.order)
+        self.panels = PanelGrid(fields.panels.edges[:, members], fields.panels.order)
         self.edge_rate = fields.edge_rate[:, members]
         anchor_rate = self.edge_rate[reference : reference + 1]
         self.curve = np.stack(curve(self.panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))

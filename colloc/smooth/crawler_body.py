@@ -20,7 +20,7 @@ import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.concertina import ODD_SCALE
-from colloc.smooth.curve import Panels
+from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
 from colloc.system.errors import ProblemError
 
@@ -89,11 +89,11 @@ class CrawlerBody(PanelBody):
         raise NotImplementedError("a bump's profile is named from the tail.")
 
     @property
-    def grid(self) -> Panels:
+    def grid(self) -> PanelGrid:
         low, high, straight = 0.5 - self.epsilon, 0.5 + self.epsilon, max(2, self.panels // 4)
         parts = ((0.0, low, straight), (low, high, self.panels), (high, 1.0, straight))
         edges = [np.linspace(a, b, n + 1)[:-1] for a, b, n in parts]
-        return Panels(np.append(np.concatenate(edges), 1.0)[:, None], self.order)
+        return PanelGrid(np.append(np.concatenate(edges), 1.0)[:, None], self.order)
 
     def describe(self) -> str:
         return f"smooth, one bump of width {self.width:g} and {self.modes} modes in a region of {2 * self.epsilon:g}"

@@ -37,7 +37,7 @@ def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, sparse.csc_m
 
 
 @dataclass(frozen=True, eq=False)
-class Panels:
+class PanelGrid:
     """Gauss panels on the arc length, one column per instant (or a single column for all).
 
     Parameters
@@ -110,12 +110,12 @@ class Curve(NamedTuple):
     weight: Array
 
 
-def curve(panels: Panels, angle: Array, rate: Array, reference: int, reference_rate: Array) -> Curve:
+def curve(panels: PanelGrid, angle: Array, rate: Array, reference: int, reference_rate: Array) -> Curve:
     """The curve of tangent angles and rates at the nodes, ``(n_node, n_time)`` (paper, eqs. x0, y0 and dtz0).
 
     Parameters
     ----------
-    panels : Panels
+    panels : PanelGrid
     angle, rate : (n_node, n_time)
         Theta [rad] and its rate [rad/time].
     reference : int
@@ -176,7 +176,7 @@ def mean_velocity(body: Curve, vs: Array, vn: Array) -> Array:
     )
 
 
-def bending_power(panels: Panels, body: Curve, tangential: np.ndarray, normal: np.ndarray, rate: np.ndarray) -> np.ndarray:
+def bending_power(panels: PanelGrid, body: Curve, tangential: np.ndarray, normal: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Power of what bends the body against a force per length, ``(n_time,)``; `rate` is that of Theta at the nodes.
 
     The moment of all force ahead of s has the derivative ``-t x F(s)``, with F the force ahead; its work on the curvature is,

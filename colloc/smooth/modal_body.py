@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
-from colloc.smooth.curve import Panels
+from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
 from colloc.system.errors import ProblemError
 
@@ -63,9 +63,9 @@ class ModalBody(PanelBody):
             raise ProblemError(f"fourier modes come in pairs (sine and cosine); {self.modes} is odd.")
 
     @property
-    def grid(self) -> Panels:
+    def grid(self) -> PanelGrid:
         """The panels, the same at all times."""
-        return Panels(np.linspace(0.0, 1.0, self.panels + 1)[:, None], self.order)
+        return PanelGrid(np.linspace(0.0, 1.0, self.panels + 1)[:, None], self.order)
 
     def modes_at(self, s: np.ndarray) -> np.ndarray:
         """Modes at arc lengths s, ``(*s.shape, modes)``."""
@@ -153,7 +153,7 @@ class ModalBody(PanelBody):
         return -project @ np.sin(phase), project @ np.cos(phase)
 
 
-_FINE = Panels(np.linspace(0.0, 1.0, 41)[:, None], 8)
+_FINE = PanelGrid(np.linspace(0.0, 1.0, 41)[:, None], 8)
 
 
 @cache

@@ -16,7 +16,7 @@ from colloc.mechanics.implicit_slopes import implicit_changes
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.batch import PanelBatch, PanelFields
-from colloc.smooth.curve import Curve, Panels, bending_power, curve, mean_velocity, node_velocity, pulled_back, resultant
+from colloc.smooth.curve import Curve, PanelGrid, bending_power, curve, mean_velocity, node_velocity, pulled_back, resultant
 
 TAIL = 0
 _ANCHOR_MOVES = 5
@@ -27,7 +27,7 @@ class PanelShapes(Protocol):
     """Tangent angles on fixed panels, as functions of a few shape coordinates."""
 
     @property
-    def grid(self) -> Panels:
+    def grid(self) -> PanelGrid:
         """The panels, the same at all times."""
 
     def angle(self, s: np.ndarray, q: Array) -> Array:
@@ -54,7 +54,7 @@ def panel_sliding(body: PanelShapes, friction: Law, q: Array, rates: Array, z: A
 def _fields(body: PanelShapes, q: np.ndarray, rates: np.ndarray) -> PanelFields:
     own = body.grid
     s, ends = own.nodes[:, 0], own.edges[:, 0]
-    grid = Panels(np.broadcast_to(own.edges, (ends.size, q.shape[1])), own.order)
+    grid = PanelGrid(np.broadcast_to(own.edges, (ends.size, q.shape[1])), own.order)
     return PanelFields(grid, body.angle(s, q), body.angle_rate(s, q, rates), body.angle_rate(ends, q, rates))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
-from colloc.smooth.curve import Panels
+from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_balance import panel_motion, panel_sliding, panel_slopes, solved_on_panels
 from colloc.smooth.smooth_body import SmoothBody
 
@@ -31,7 +31,7 @@ class PanelBody(SmoothBody):
         return dataclasses.replace(self, panels=panels)  # type: ignore[type-var]
 
     @property
-    def grid(self) -> Panels:
+    def grid(self) -> PanelGrid:
         """The panels, the same at all times."""
         raise NotImplementedError
 

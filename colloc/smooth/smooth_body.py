@@ -11,7 +11,7 @@ from colloc.mechanics.bodies import ARROWS, IMPLICIT, BalancedMotion, Contact, L
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.balance import SmoothSolution, solve_smooth
-from colloc.smooth.curve import Curve, Panels, curve, node_velocity
+from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity
 from colloc.smooth.motion import Motion
 
 TAIL = 0
@@ -110,9 +110,9 @@ class SmoothBody:
     def passing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
         return 0.0
 
-    def _curve(self, n: int, order: int, angles: np.ndarray, rates: np.ndarray) -> tuple[Panels, Curve]:
+    def _curve(self, n: int, order: int, angles: np.ndarray, rates: np.ndarray) -> tuple[PanelGrid, Curve]:
         """The body on n equal panels."""
-        panels = Panels(np.linspace(0.0, 1.0, n + 1)[:, None] * np.ones((1, angles.shape[1])), order)
+        panels = PanelGrid(np.linspace(0.0, 1.0, n + 1)[:, None] * np.ones((1, angles.shape[1])), order)
         s = panels.nodes
         return panels, curve(panels, self.tangent(s, angles), self.turning(s, angles, rates), TAIL, np.zeros((1, 1)))
 

@@ -183,8 +183,8 @@ def _collocated_intervals(
     (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
     rotation, energy = turned - (theta_right - theta), spent - (work_right - work)
     displacement = moved * np.exp(1j * theta) - (path_right - path)
-    # an error of rotation turns everything after it
-    pull = displacement + 1j * rotation * (fine.path[-1] - path_right)
+    # an error of rotation turns everything after it, and by half of it the direction that counts
+    pull = displacement + 1j * rotation * (0.5 * fine.path[-1] - path_right)
     direction, length = _direction(problem, fine.path[-1], fine.theta[-1]), np.zeros(left.size)
     if problem.uses("length") and not problem.gait.unit_speed:  # else arc length is the clock, and exact
         pace = np.linalg.norm(gait.rates(nodes.ravel()), axis=0).reshape(nodes.shape)

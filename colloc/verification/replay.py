@@ -2,9 +2,9 @@
 
 It shares nothing with collocation but the friction law: no scheme, no mesh, no symmetry, no interpolant. Velocities are
 solved for at five instants of every panel of the period and integrated by Simpson's rule, once over the panel and once over
-its halves; panels are halved where the two differ. What that leaves of the difference follows from how much smaller it is
-than on the panel twice as wide: little where the motion is smooth, all of it at a kink. These errors add up as magnitudes:
-kinks of stick and slip lie anywhere between the instants, so those of different panels may well cancel by accident.
+its halves; panels are halved where the two differ. `colloc.verification.panels` judges what that leaves of the difference.
+These errors add up as magnitudes: kinks of stick and slip lie anywhere between the instants, so those of different panels may
+well cancel by accident.
 
 With unequal coefficients several velocities may balance an instant. The replay then follows one branch in time, and says how
 far the others would lead (`colloc.verification.followed_motion`).
@@ -25,7 +25,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.followed_motion import FORWARDS, followed_motion
-from colloc.verification.panels import WHOLE, Panels, begun, differences, halves, increments, left_over
+from colloc.verification.panels import WHOLE, Panels, begun, changes, halves, increments, left_over, travelled
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
@@ -268,15 +268,12 @@ def replay(
     panels = begun(left, width, at(t, start, whole=True))
     while True:
         turn, move, spent, passed, delivered = increments(WHOLE, panels, 1)
-        heading = np.concatenate([[0.0], np.cumsum(turn)])
-        travelled = np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
-        distance, work = float(abs(travelled[-1])), float(spent.sum())
+        heading, place = travelled(turn, move)
+        distance, work = float(abs(place[-1])), float(spent.sum())
         if not work > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
-        turn_error, move_error, work_error, length_error, driven_error = left_over(differences(panels), panels.wider).T
-        # an error of rotation turns all that comes after it
-        reach = np.abs(travelled - travelled[-1]).max()
-        astray = move_error + reach * turn_error
+        changed, near_by, far = changes(panels)
+        turn_error, astray, work_error, length_error, driven_error = left_over(near_by, far, panels.wider).T
         period = {"distance": max(distance, 1e-300), "work": work, "rotation": heading[-1], "length": float(passed.sum())}
         period["driven_work"] = float(delivered.sum())
         errors = {"distance": astray, "work": work_error, "rotation": turn_error, "length": length_error}
@@ -286,7 +283,7 @@ def replay(
         order = np.argsort(gap)
         # finer panels do not make up for what the balance leaves over
         excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
-        chosen = order[excess & (panels.width[order] > _NARROWEST)]
+        chosen = _with_wider_neighbours(order[excess & (panels.width[order] > _NARROWEST)], panels.width)
         n = 4 * (panels.left.size + chosen.size)
         if chosen.size == 0 or n > most_instants:
             break
@@ -294,8 +291,8 @@ def replay(
         between = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
         new = at(between, start, whole=False)
-        panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new))
-    several, other_distance, other_work, other_rotation = _others(panels, reach)
+        panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new, changed[chosen]))
+    several, other_distance, other_work, other_rotation = _others(panels, np.abs(place - place[-1]).max())
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
     return Replay(
         distance,
@@ -321,6 +318,14 @@ def replay(
         (known, panels.z[:, :4].reshape(-1, 3).T),
         objective,
     )
+
+
+def _with_wider_neighbours(chosen: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Panels to be halved, and those beside them that are not narrower: the halves are judged with instants beside them."""
+    narrow = np.full(width.size, np.inf)
+    narrow[chosen] = width[chosen]
+    beside = np.minimum(np.roll(narrow, 1), np.roll(narrow, -1))
+    return np.flatnonzero((width >= beside) | np.isfinite(narrow))
 
 
 def _starts(z: np.ndarray, friction: Law, sense: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_simpson
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.balance import solve_smooth
-from colloc.smooth.curve import Panels
+from colloc.smooth.curve import PanelGrid
 from colloc.smooth.motion import Motion
 from colloc.system.errors import ProblemError
 
@@ -52,7 +52,7 @@ def snapshots(motion: Motion, friction: Friction, delta: float, count: int = 10,
     tail = cumulative_simpson(rate.real, x=t, initial=0.0) + 1j * cumulative_simpson(rate.imag, x=t, initial=0.0)
 
     keep = slice(None, None, _STEPS_BETWEEN)
-    grid = Panels(np.linspace(0.0, 1.0, panels + 1)[:, None] * np.ones((1, count + 1)))
+    grid = PanelGrid(np.linspace(0.0, 1.0, panels + 1)[:, None] * np.ones((1, count + 1)))
     angle = motion.angle(grid.nodes, t[keep])
     x, y = (grid.integrate(grid.widths * part, 0) for part in (np.cos(angle), np.sin(angle)))
     lab = tail[keep] + (x + 1j * y) * np.exp(1j * theta[keep])

@@ -31,6 +31,18 @@ def test_the_printed_instant_has_three_motions_and_the_middle_one_is_unstable():
     assert found.complete.all()
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_motions_scale_with_the_unit_of_time(unit):
+    """Friction knows no speed but delta: the same motions, as many and in the same order."""
+    angles, rates = random_instants(4, 60)
+    at = (np.concatenate([angles, PRINTED[0]], axis=1), np.concatenate([rates, PRINTED[1]], axis=1))
+    law = Friction(1, 0.01, 100)
+    slow = all_balanced_velocities(Chain(), law, *at, 1e-4)
+    fast = all_balanced_velocities(Chain(), law, at[0], unit * at[1], unit * 1e-4)
+    np.testing.assert_array_equal(fast.sign, slow.sign)
+    np.testing.assert_allclose(fast.z, unit * slow.z, rtol=1e-6, atol=1e-8 * unit)
+
+
 def test_each_of_them_is_a_root_of_the_reference_in_forty_digits():
     body, coefficients = Chain(), (1, 0.01, 100)
     found = all_balanced_velocities(body, Friction(*coefficients), *PRINTED, 1e-4)

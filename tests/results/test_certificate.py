@@ -16,6 +16,7 @@ from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
 from colloc.results.certificate import certify
 from colloc.results.checks import Check
+from colloc.results.delta_limit import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.verification.replay import replay
@@ -221,6 +222,16 @@ def test_errors_of_a_certificate_hold(solved, name):
     )
     assert abs(known.efficiency - here) <= known.efficiency_error < 2e-6 * here
     assert abs(known.efficiency_at_zero_delta - limit) <= known.error_at_zero_delta < 1e-4 * limit
+
+
+def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_by_no_more_than_its_values():
+    linear = [0.25 + 3.0 * delta for delta in (1e-2, 1e-3, 1e-4)]
+    found = extrapolated_limit(linear, [0.0, 0.0, 0.0])
+    assert found.value == pytest.approx(0.25, abs=1e-15)
+    assert found.error == pytest.approx(3e-4, rel=1e-9)
+    # the last value is moved by a ninth of the last change: so is what it may be wrong by
+    errors = [7e-3, 9e-4, 2e-4]
+    assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12)
 
 
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):

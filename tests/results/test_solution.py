@@ -59,6 +59,10 @@ def test_sampled_motion_is_consistent(symmetry, solved):
     c, s = np.cos(motion.theta), np.sin(motion.theta)
     speed = np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
     assert np.median(np.abs(np.gradient(motion.centre, dt, axis=1) - speed)) < 1e-3
+    # the tail moves with its own velocity, which is measured along and across the first link
+    along, across = motion.z[:2]
+    velocity = np.stack([c * along - s * across, s * along + c * across])
+    assert np.median(np.abs(np.gradient(motion.tail, dt, axis=1) - velocity)) < 2e-3
     # tail velocities are those of the balance
     exact = solve_balance(body, solution.problem.friction, motion.angles, motion.rates, solution.last.delta).z
     assert np.median(np.abs(motion.z - exact)) < 2e-3

@@ -105,3 +105,48 @@ def test_a_file_of_an_earlier_colloc_is_read_and_verified(tmp_path, capsys):
     assert np.isnan(solution.certificate.distance_error)
     assert colloc(["verify", str(path)]) == 0
     assert "certified" in capsys.readouterr().out
+
+
+@pytest.fixture
+def former(tmp_path):
+    """Written by the colloc of 21 November 2026, 15:00, on the quick problem: the last of format 2."""
+    path = tmp_path / "former.h5"
+    path.write_bytes(gzip.decompress(Path(__file__).with_name("solution_of_format_2.h5.gz").read_bytes()))
+    return path
+
+
+def test_a_file_of_the_former_format_is_read_verified_and_saved_as_the_present_one(former, tmp_path, capsys):
+    from colloc.commands.main import main as colloc
+
+    solution = load(former)
+    assert (solution.status, solution.problem.name, solution.last.delta) == ("solved", "quick", 1e-2)
+    with h5py.File(former) as file:
+        np.testing.assert_array_equal(solution.last.x, file[f"levels/{len(solution.levels) - 1:03d}/x"])
+        np.testing.assert_array_equal(solution.gait.cos, file["gait/cos"])
+        assert solution.source == file["source"].asstr()[()]
+        assert [check.meaning for check in solution.certificate.checks] == file["certificate/meaning"].asstr()[()].tolist()
+    again = load(save(solution, tmp_path / "present.h5"))
+    assert again.certificate.checks == solution.certificate.checks
+    assert colloc(["verify", str(former)]) == 0
+    assert "certified" in capsys.readouterr().out
+
+
+def test_nothing_of_a_former_file_is_read_whose_seal_does_not_fit_or_that_is_older_still(former):
+    data = former.read_bytes()
+    former.write_bytes(data[:5000] + bytes([data[5000] ^ 1]) + data[5001:])
+    with pytest.raises(StoreError, match="checksum does not fit"):
+        load(former)
+    former.write_bytes(data)
+    with h5py.File(former, "a") as file:
+        file.attrs["format_version"] = 1
+    with pytest.raises(StoreError, match="carries no checksum"):
+        load(former)
+    write_sealed(former, former.read_bytes())
+    with pytest.raises(StoreError, match="not a colloc solution of format 2 or 3"):
+        load(former)
+
+
+def test_a_former_file_that_keeps_hdf5_busy_is_given_up(former, monkeypatch):
+    monkeypatch.setattr("colloc.results.former_format._SECONDS", 1e-3)
+    with pytest.raises(StoreError, match="came to no end"):
+        load(former)

@@ -9,7 +9,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.link_friction import link_force
 from colloc.smooth.balance import solve_smooth
-from colloc.smooth.curve import Panels, curve, node_velocity, resultant
+from colloc.smooth.curve import PanelGrid, curve, node_velocity, resultant
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.system.errors import NotConvergedError, ProblemError
 
@@ -24,7 +24,7 @@ def straight(rate: float) -> Motion:
 @pytest.mark.parametrize("reference", [0, 3, 5])
 def test_path_integrals_are_exact_for_polynomials(reference):
     edges = np.array([0.0, 0.1, 0.35, 0.4, 0.8, 1.0])[:, None]
-    panels = Panels(edges, order=5)
+    panels = PanelGrid(edges, order=5)
     s, origin = panels.nodes, edges[reference, 0]
     got = panels.integrate(panels.widths * 5 * s**4, reference)
     np.testing.assert_allclose(got, s**5 - origin**5, atol=2e-15)
@@ -36,7 +36,7 @@ def test_path_integrals_are_exact_for_polynomials(reference):
 def test_a_stretch_that_rests_is_exactly_at_rest(reference):
     """Rates vanish on [0, 1/2]; with the reference held there, so does its velocity, to the last bit."""
     edges = np.linspace(0, 1, 9)[:, None]
-    panels = Panels(edges)
+    panels = PanelGrid(edges)
     s = panels.nodes
     rate = np.where(s > 0.5, (s - 0.5) ** 3, 0.0)
     body = curve(panels, np.sin(7 * s), rate, reference, np.zeros((1, 1)))
@@ -58,7 +58,7 @@ def test_density_jacobian_is_the_derivative():
 
 
 def test_straight_rotating_body_agrees_with_the_closed_form_of_a_link():
-    panels = Panels(np.linspace(0, 1, 41)[:, None], order=10)
+    panels = PanelGrid(np.linspace(0, 1, 41)[:, None], order=10)
     zero = np.zeros_like(panels.nodes)
     body = curve(panels, zero, zero, 20, np.zeros((1, 1)))
     z = np.array([[0.3], [0.2], [-1.1]])
@@ -180,7 +180,7 @@ def test_the_law_is_the_gradient_of_the_potential_when_isotropic():
     """Perturbing the solution raises the dissipation potential: it is the minimum."""
     motion, t, delta = sine_wave(), np.array([0.2]), 1e-2
     solution = solve_smooth(motion, Friction(), t, delta).require()
-    panels = Panels(np.linspace(0, 1, 41)[:, None])
+    panels = PanelGrid(np.linspace(0, 1, 41)[:, None])
 
     def potential(z):
         body = curve(panels, motion.angle(panels.nodes, t), motion.rate(panels.nodes, t), 0, np.zeros((1, 1)))

@@ -77,6 +77,25 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
     assert error.value.sum() == pytest.approx(true, rel=0.1, abs=1e-6)
 
 
+@pytest.mark.parametrize("objective", ["distance / driven_work", "distance / length", "distance / (work + driven_work)"])
+def test_shares_of_intervals_add_up_to_the_error_of_other_objectives(objective):
+    """The total is known from the scheme's own increments and the fine motion alone."""
+    stated = problem("trapezoid", objective=objective)
+    error = mesh_error(stated, problem_mesh(stated), GAIT, DELTA, 1e-6)
+    assert abs(error.total) > 1e-4
+    assert error.value.sum() == pytest.approx(error.total, rel=0.1)
+
+
+def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
+    """Antipodal gaits turn back in the other half: what counts is the displacement half way between both headings."""
+    gait = Fourier(np.zeros(2), np.array([[1.5], [-1.0]]), np.array([[0.3], [1.0]]))
+    stated = problem("trapezoid", gait=Harmonic(1, "antipodal"), intervals=40)
+    fine = gait_motion(stated, gait, DELTA, problem_mesh(stated).edges, 1e-6)
+    assert abs(fine.theta[-1]) > 0.1
+    error = mesh_error(stated, problem_mesh(stated), gait, DELTA, 1e-6)
+    assert error.value.sum() == pytest.approx(error.total, rel=0.02)
+
+
 def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
     # at delta = 10, faster than all links, friction is viscous and the motion smooth
     stated = problem(delta=10.0, delta_start=10.0)
