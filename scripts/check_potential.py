@@ -46,6 +46,20 @@ def potentials(path: Path = KEPT) -> list[Kept]:
     return found
 
 
+def keep(found: Kept, path: Path = KEPT) -> None:
+    """Add one to a file."""
+    mu, spline = found.domain.friction, found.space.spline
+    row = {
+        "mu": [mu.mu_t, mu.mu_f, mu.mu_b],
+        "joint_limit": found.domain.joint_limit,
+        "harmonics": list(found.space.harmonics),
+        "graded": spline.knots[1:-1].tolist(),
+        "program": found.program,
+        "coefficients": found.free.tolist(),
+    }
+    path.write_text(json.dumps([*json.loads(path.read_text()), row]))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", nargs="?", type=Path, default=KEPT)

@@ -1,9 +1,10 @@
 """From the bound to the gait: the multipliers of the bound's program as a measure, drawn, and a start for a relaxed gait.
 
 python -m scripts.measure_to_gait [--out results] [--friction 1 1 1] [--limit 2.5] [--intervals 8] [--first 8] [--no-gait]
+    [--keep]
 
 Writes measure.png, and prints what the program says and what the search makes of it, with no other start. With `--no-gait` it
-prints only what the program says, its unknowns and its knots.
+prints only what the program says, its unknowns and its knots; with `--keep` the potential joins those kept.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 from colloc.pictures.style import save
 from colloc.search.relaxed_search import best_relaxed_gait
+from scripts.check_potential import Kept, keep
 from scripts.figures_measure import measure_figure
 
 
@@ -34,6 +36,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=8, help="even ones to begin with; the rest goes where it is wanted")
     parser.add_argument("--tolerance", type=float, default=2e-3, help="of the climbs above the program")
     parser.add_argument("--no-gait", action="store_true", help="the bound only")
+    parser.add_argument("--keep", action="store_true", help="add the potential to results/curated/potentials.json")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     body, friction = Chain(), Friction(*options.friction)
@@ -50,6 +53,8 @@ def main() -> None:
         f"{measure.efficiency():.4f} per work; {seconds:.0f} s of processor time"
     )
     print("knots", *(f"{knot:.3f}" for knot in bound.space.spline.knots if knot > -1e-9))
+    if options.keep:
+        keep(Kept(domain, bound.space, bound.free, bound.floor))
     if options.no_gait:
         return
     problem = Problem("measure", friction=friction, gait=Relaxed(3, "both"), delta=1e-5, joint_limit=options.limit)

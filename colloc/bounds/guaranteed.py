@@ -1,38 +1,36 @@
 r"""A guaranteed upper bound for a three-link body with isotropic friction: certificates for whole cells (docs/bound.md).
 
-Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest. In link-fixed axes the
-dissipation J of a motion does not depend on the shape, and a balanced motion minimises it. For a multiplier M, at every
-corner k of a cell let P_k be the minimal dissipation, and phi_k the friction forces in balance under the load ``l_e/M``,
-where ``e.V_c = l_e.z + alpha_e.r`` is the speed of the reference point along e, D_k their power, z_k the motion, rho_k what
-they leave unbalanced. Interpolated over the cell the P_k stay above and the phi_k below the dissipation, up to terms of second
-order in the cell size, so
-
-    e.V_c / P  <=  M (1 + t) - min_k (M D_k + M rho_k.z_k - e.V_c(z_k) - a) / (P_k + b)   for every balanced motion in the cell,
-
-with explicit t, a, b = O(size^2). Both components of V_c are bounded so. Cells that fail are split.
+Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest. Over a cell, gain and power
+of the balanced motion differ from what interpolates their values at the corners by at most what `bounds.enclosure` and
+`bounds.potential_range` say, so their ratio is largest at a corner. Cells that fail are split in eight.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.bounds.loaded_balance import Loaded, loaded_balance
+from colloc.bounds.enclosure import CORNERS, DELTA, Allowance, Cells, by_convexity, by_loads, corner_motions
+from colloc.bounds.potential import PotentialSpace
+from colloc.bounds.potential_range import PotentialRange
 from colloc.bounds.sampled import Bound
+from colloc.bounds.sampling import Domain
 from colloc.mechanics.body import Chain
-from colloc.mechanics.friction import Friction
-from colloc.numerics.spline import DEGREE
 from colloc.system.errors import ProblemError
+from colloc.system.processors import available_threads
 
-_KAPPA = np.sqrt(2.0) - 1.0
-"""The integral of |V| over a link is at least kappa times its length times |V| at either end, as V is affine along it."""
-_ROUNDING = 1e-9
-_CHUNK = 20000
-_CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-_LOADS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+_CHUNK = 8000
+_FIRST = 0.07
+"""Largest side of the first cells: larger ones are never closed."""
+_LAYERS = (1e-9, 1e-6, 1e-4, 1e-3, 4e-3, 8.75e-3, 0.0175, 0.035)
+"""Rates of angle 2 between 0 and the first cells' size. Where one joint turns alone two links rest, and slide with the other
+joint however slowly it turns. The motion there is homogeneous: what a cell may not know of it is in proportion to its speed."""
+_LOAD = 4.0
+"""Times the root of the cell's size: 1/multiplier of the loads. It balances what they move with what interpolation loses."""
 
 
 @dataclass(frozen=True)
@@ -47,241 +45,164 @@ class Guarantee:
         The value that was aimed at; ``guaranteed == target`` if all cells were closed.
     open_cells, cells : int
         Cells left when the time ran out, and cells examined.
-    largest_multiplier : float
-        The largest M(1 + t) / mu of a closed cell (see `distance_allowance`).
+    levels : int
+        How often cells were halved.
     seconds : float
+        Processor time, of all threads.
     """
 
     guaranteed: float
     target: float
     open_cells: int
     cells: int
-    largest_multiplier: float
+    levels: int
     seconds: float
 
-    def distance_allowance(self, mu: float, delta: float, period: float = 1.0) -> float:
-        """Finite delta: a gait with delta-regularised friction has ``d <= guaranteed W + allowance``.
 
-        Its motions are within delta of minimal dissipation, and its power is at most delta below it (docs/bound.md).
-        Valid if no cell is left open.
-        """
-        return mu * (self.guaranteed + np.sqrt(2.0) * self.largest_multiplier) * delta * period
+@dataclass(frozen=True)
+class _Lattice:
+    """Points between given edges, each interval halved so many times; cells are named by integers."""
 
+    edges: tuple[np.ndarray, ...]
+    level: int
 
-class _Reference:
-    """The reference point c(q), its slopes and bounds of its higher derivatives."""
+    def coordinate(self, axis: int, index: np.ndarray) -> np.ndarray:
+        edges, parts = self.edges[axis], 1 << self.level
+        interval = np.minimum(index // parts, edges.size - 2)
+        return edges[interval] + (edges[interval + 1] - edges[interval]) * ((index - interval * parts) / parts)
 
-    def __init__(self, bound: Bound, body: Chain) -> None:
-        space = bound.potential_space(body)
-        self.spline = space.spline
-        c = space.coefficients(np.array(bound.coefficients))[1]
-        self.c = np.stack([c.real, c.imag])
-
-    def value(self, angles: np.ndarray) -> np.ndarray:
-        return np.asarray((self.spline.matrix(angles) @ self.c.T).T)
-
-    def slopes(self, angles: np.ndarray) -> np.ndarray:
-        """``(2, 2, n)``: derivative of component i with respect to angle j."""
-        return np.stack([(self.spline.matrix(angles, o) @ self.c.T).T for o in ((1, 0), (0, 1))], axis=1)
-
-    def largest(self, angles: np.ndarray, order: tuple[int, int]) -> np.ndarray:
-        """Bound on a partial derivative over the knot cell that contains `angles`, for each component, ``(2, n)``.
-
-        The derivative is a spline of lower degree: inside a knot cell it lies in the hull of its coefficients there.
-        """
-        n, knots = self.spline.per_joint, self.spline.extended
-        table = self.c.reshape(2, n, n)
-        for axis, times in enumerate(order):
-            for k in range(times):
-                degree = DEGREE - k
-                width = knots[DEGREE + 1 : -1 - k] - knots[1 + k : -DEGREE - 1]
-                table = degree * np.diff(table, axis=axis + 1) / width.reshape((-1, 1) if axis == 0 else (1, -1))
-        cell = self.spline.cell(angles)
-        best = np.zeros((2, angles.shape[1]))
-        for i in range(4 - order[0]):
-            for j in range(4 - order[1]):
-                best = np.maximum(best, np.abs(table[:, cell[0] + i, cell[1] + j]))
-        return best
+    def cells(self, index: np.ndarray) -> Cells:
+        """The cells with low corners ``(3, n)``."""
+        low = np.stack([self.coordinate(axis, index[axis]) for axis in range(3)])
+        size = np.stack([self.coordinate(axis, index[axis] + 1) for axis in range(3)]) - low
+        corner = (index[:, :, None] + CORNERS.T[:, None, :]).reshape(3, -1)
+        extent = [(edges.size << self.level) + 1 for edges in self.edges]
+        code = (corner[0] * extent[1] + corner[1]) * extent[2] + corner[2]
+        _, first, back = np.unique(code, return_index=True, return_inverse=True)
+        points = np.stack([self.coordinate(axis, corner[axis, first]) for axis in range(3)])
+        return Cells(low, size, points, back.reshape(-1, 8))
 
 
-@dataclass
-class _Corners:
-    """Solutions at the corners of cells: minimal dissipation, and a loaded state for each of the four directions e."""
+def cell_bounds(body: Chain, potential: PotentialRange, cells: Cells, goal: float) -> np.ndarray:
+    """Upper bounds of gain over power in the cells, ``(n,)``, for unit friction; infinite if nothing is known.
 
-    free: Loaded
-    loaded: list[Loaded]
-    gain: np.ndarray
-    """``(4, n)``: e.V_c in the loaded states."""
+    Loads are tried where convexity alone does not bring the bound below `goal`.
+    """
+    motions = corner_motions(body, cells)
+    gain, power = potential.corner_gain(cells, motions)[cells.at], (motions.potential - DELTA)[cells.at]
+    beyond, reference = potential.trial_error(cells, motions), potential.reference(cells)
 
+    def largest(chosen: np.ndarray, allowed: Allowance) -> np.ndarray:
+        below = power[chosen] - allowed.power[:, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = ((gain[chosen] + (beyond[chosen] + allowed.gain)[:, None]) / below).max(axis=1)
+        return np.where((below.min(axis=1) > 0) & (value >= 0), value, np.inf)
 
-def _solve_corners(body: Chain, reference: _Reference, points: np.ndarray, multiplier: float, delta: float) -> _Corners:
-    angles, rates = points[:2], np.stack([np.ones(points.shape[1]), points[2]])
-    start = np.stack([np.zeros_like(points[2]), np.zeros_like(points[2]), (1.0 - points[2]) / 3.0])
-    free = loaded_balance(body, angles, rates, np.zeros_like(start), start, delta)
-    c, slopes = reference.value(angles), reference.slopes(angles)
-    along = np.einsum("ijn,jn->in", slopes, rates)
-    loaded, gain = [], np.empty((4, points.shape[1]))
-    for k, e in enumerate(_LOADS):
-        load = np.stack([np.full_like(points[2], e[0]), np.full_like(points[2], e[1]), e[1] * c[0] - e[0] * c[1]])
-        state = loaded_balance(body, angles, rates, load / multiplier, free.velocity, delta)
-        loaded.append(state)
-        gain[k] = (load * state.velocity).sum(axis=0) + e @ along
-    return _Corners(free, loaded, gain)
-
-
-def _spread(values: np.ndarray, axis: int) -> np.ndarray:
-    """Largest difference of ``(d, n_cell, 8)`` corner values along one axis of the cells, ``(n_cell,)``."""
-    low = _CORNERS[:, axis] == 0
-    return np.sqrt(((values[:, :, ~low] - values[:, :, low]) ** 2).sum(axis=0)).max(axis=1)
+    everything = np.arange(cells.low.shape[1])
+    value = largest(everything, by_convexity(body, cells, motions, reference))
+    still = np.flatnonzero(~(value <= goal))
+    if still.size:
+        few, used = cells.take(still)
+        some = type(motions)(*(field[..., used] for field in motions))
+        multiplier = _LOAD / np.sqrt(few.size[:2].max())
+        value[still] = np.fmin(value[still], largest(still, by_loads(body, few, some, potential.reference(few), multiplier)))
+    return value
 
 
-def _cell_bounds(
-    body: Chain, reference: _Reference, low: np.ndarray, size: np.ndarray, multiplier: float, delta: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Upper bounds of |V_c|/P over cells with low corners ``(3, n)`` and size ``(3,)``, infinite if unknown; M(1 + t)."""
-    n = low.shape[1]
-    corner = low[:, :, None] + size[:, None, None] * _CORNERS.T[:, None, :]
-    index = np.rint((corner - low.min(axis=1)[:, None, None]) / size[:, None, None]).astype(np.int64)
-    flat = index.reshape(3, -1)
-    extent = flat.max(axis=1) + 1
-    code = (flat[0] * extent[1] + flat[1]) * extent[2] + flat[2]
-    _, first, back = np.unique(code, return_index=True, return_inverse=True)
-    at = back.reshape(n, 8)
-    solved = _solve_corners(body, reference, corner.reshape(3, -1)[:, first], multiplier, delta)
-
-    l1, l2, l3 = body.lengths
-    h1, h2, hs = size
-    z = solved.free.velocity[:, at]
-    ends = [np.stack([z[0], z[1] - 0.5 * l2 * z[2]]), np.stack([z[0], z[1] + 0.5 * l2 * z[2]])]
-    rise = np.zeros(n)
-    for length, h, end, axis in ((l1, h1, ends[0], 0), (l3, h2, ends[1], 1)):
-        largest = np.sqrt((end**2).sum(axis=0)).max(axis=1)
-        rise += length * (h * h / 8 * largest + h / 4 * _spread(end, axis))
-    P = solved.free.potential[at] + rise[:, None] + _ROUNDING
-
-    centre = low + 0.5 * size[:, None]
-    squares = ((h1 * h1 / 8, (2, 0)), (h2 * h2 / 8, (0, 2)))
-    c_error = sum(f * reference.largest(centre[:2], o) for f, o in squares)
-    slope_error = sum(
-        f * reference.largest(centre[:2], (o[0] + d[0], o[1] + d[1])) for f, o in squares for d in ((1, 0), (0, 1))
-    )
-    spin = (4.0 * P.max(axis=1) + l1 * l1 + l3 * l3) / (l1 * l1 + l2 * l2 + l3 * l3)
-
-    sides, factors = np.empty((4, n, 8)), np.empty((4, n))
-    for k, e in enumerate(_LOADS):
-        state = solved.loaded[k]
-        forces = state.forces[:, :, at]
-        t = np.zeros(n)
-        for link, length, h, axis in ((0, l1, h1, 0), (2, l3, h2, 1)):
-            t += (h * h / 8 * length + h / 4 * _spread(forces[link, :2], axis)) / (_KAPPA * (length + l2))
-        left = state.residual[:, at].max(axis=2)
-        t += left[0] / l2 + 4.0 * left[1] / l2**2 + _ROUNDING
-        # the loaded forces' moment about the head joint does not commute with interpolation in s
-        moment = forces[2, 1] * (0.5 * l3) + forces[2, 2]
-        component = int(np.flatnonzero(e)[0])
-        error = multiplier * hs / 4 * _spread(moment[None], 2) + slope_error[component] + spin * c_error[1 - component]
-        lower = multiplier * (state.power + state.leftover_power)[at] - solved.gain[k][at] - error[:, None]
-        # the linear-fractional bound needs the sign of its numerator
-        sides[k] = multiplier * (1 + t)[:, None] - lower / P
-        sides[k][lower.min(axis=1) < 0] = np.inf
-        factors[k] = multiplier * (1 + t)
-    x, y = np.maximum(sides[:2], 0.0), np.maximum(sides[2:], 0.0)
-    value = np.zeros(n)
-    for a in x:
-        for b in y:
-            value = np.maximum(value, np.sqrt(a * a + b * b).max(axis=1))
-    # where a solve ended in NaN nothing is proved
-    return np.where(np.isnan(value), np.inf, value + _ROUNDING), factors.max(axis=0)
-
-
-def _touches(body: Chain, low: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Mask of cells that may hold an admissible shape of three equal links."""
-    high = low[:2] + size[:2, None]
+def _touches(body: Chain, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Mask of cells from `low` to `high` that may hold a shape where links 1 and 3 do not cross."""
+    if len(set(body.lengths)) > 1:
+        return np.ones(low.shape[1], dtype=bool)
     crossed = np.minimum(2 * low[0] + low[1], low[0] + 2 * low[1]) > 2 * np.pi + 1e-9
     mirrored = np.maximum(2 * high[0] + high[1], high[0] + 2 * high[1]) < -2 * np.pi - 1e-9
     return ~(crossed | mirrored)
 
 
+def _first_edges(knots: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Of angle 1, which is not negative, of angle 2 and of s: with all knots, and no interval longer than `_FIRST`."""
+    knots = np.unique(np.concatenate([knots, [0.0]]))
+    counts = np.ceil(np.diff(knots) / _FIRST).astype(int)
+    edges = np.concatenate([np.linspace(a, b, m, endpoint=False) for a, b, m in zip(knots, knots[1:], counts, strict=False)])
+    edges = np.append(edges, knots[-1])
+    thin = np.array(_LAYERS)
+    rates = np.concatenate([thin, np.linspace(_FIRST, 1.0, int(np.ceil(1.0 / _FIRST)))])
+    return edges[edges >= 0.0], edges, np.concatenate([-rates[::-1], [0.0], rates])
+
+
 def certify(
-    body: Chain,
-    friction: Friction,
-    bound: Bound,
+    domain: Domain,
+    space: PotentialSpace,
+    free: np.ndarray,
     target: float,
     *,
-    seconds: float = 300.0,
-    multiplier: float = 4.0,
-    deepest: int = 9,
-    delta: float = 1e-7,
+    seconds: float = 1200.0,
+    deepest: int = 12,
+    part: tuple[int, int] = (1, 1),
 ) -> Guarantee:
     """Prove that no gait of a three-link body exceeds `target`, or as low a value as the time allows.
 
     Parameters
     ----------
-    body : Chain
-        Three equal links.
-    friction : Friction
-        Isotropic.
-    bound : Bound
-        Provides the reference point (harmonic 1 only) and the joint limit.
+    domain : Domain
+        Three links, the outer ones of the same length; isotropic friction.
+    space, free
+        The potential, as `colloc.bounds.sampled.Bound` or a kept one has it.
     target : float
     seconds : float
         No new batch of cells is begun after this processor time.
-    multiplier : float
-        M of the first level; it doubles with every second level.
     deepest : int
         Number of times a cell may be halved.
-    delta : float
-        Regularisation of the certificates' forces; any value is valid, smaller ones are tighter.
+    part : (int, int)
+        (k, n): the k-th of n parts of the first cells, so that several processes, or several runs, may share them. What is
+        guaranteed is the largest value of all parts.
 
     Raises
     ------
     ProblemError
-        For a body or friction without a proof.
+        For a body or friction without a proof, or without a C compiler.
     """
-    equal = body.n_link == 3 and len(set(body.lengths)) == 1 and not body.weights
-    if not friction.isotropic or not equal or bound.harmonics != (1,):
+    body, friction = domain.body, domain.friction
+    odd = 1 in space.harmonics and all(k % 2 for k in space.harmonics)
+    if not friction.isotropic or body.n_link != 3 or body.weights or not space.end_swap or not odd:
         raise ProblemError(
-            "a bound is guaranteed only for three links of equal lengths and weights, isotropic friction and harmonic 1; "
+            "a bound is guaranteed only for three links, the outer ones alike, without weights of their own; isotropic "
+            "friction and odd harmonics from 1 on; "
             "otherwise the sampled value stands."
         )
-    if bound.graded:
-        raise ProblemError("cells have to keep to the knots of the reference point: give a bound whose knots are even.")
-    begin = time.process_time()
-    reference = _Reference(bound, body)
-    goal = target * friction.mu_t
-    count = bound.intervals
-    size = np.array([bound.joint_limit, bound.joint_limit, 2.0]) * np.array([2 / count, 2 / count, 1 / 4])
-    axes = [np.arange(count // 2, count), np.arange(count), np.arange(4)]
-    low = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")]) * size[:, None]
-    low -= np.array([bound.joint_limit, bound.joint_limit, 1.0])[:, None]
-    parents = np.full(low.shape[1], np.inf)
-    examined, largest = 0, 0.0
-    for level in range(deepest + 1):
-        kept = _touches(body, low, size)
-        low, parents = low[:, kept], parents[kept]
-        values = parents.copy()
-        out_of_time = False
-        for first in range(0, low.shape[1], _CHUNK):
-            if time.process_time() - begin > seconds:
-                out_of_time = True
+    begin, goal = time.process_time(), target * friction.mu_t
+    potential = PotentialRange(space, free)
+    edges = _first_edges(space.spline.knots)
+    index = np.stack([a.ravel() for a in np.meshgrid(*(np.arange(e.size - 1) for e in edges), indexing="ij")])
+    index = np.array_split(index, part[1], axis=1)[part[0] - 1]
+    parents, examined, level = np.full(index.shape[1], np.inf), 0, 0
+    with ThreadPoolExecutor(available_threads()) as pool:
+        while True:
+            lattice = _Lattice(edges, level)
+            low, high = (np.stack([lattice.coordinate(axis, index[axis] + up) for axis in (0, 1)]) for up in (0, 1))
+            kept = _touches(body, low, high)
+            index, values = index[:, kept], parents[kept]
+
+            def bounds(first: int, lattice: _Lattice = lattice, index: np.ndarray = index) -> np.ndarray | None:
+                if time.process_time() - begin > seconds:
+                    return None
+                return cell_bounds(body, potential, lattice.cells(index[:, first : first + _CHUNK]), goal)
+
+            starts = range(0, index.shape[1], _CHUNK)
+            out_of_time = False
+            for first, found in zip(starts, pool.map(bounds, starts), strict=True):
+                if found is None:
+                    out_of_time = True
+                else:
+                    values[first : first + _CHUNK] = np.fmin(values[first : first + _CHUNK], found)
+                    examined += found.size
+            still = ~(values <= goal)
+            index, parents = index[:, still], values[still]
+            if out_of_time or not still.any() or level == deepest:
                 break
-            chosen = slice(first, first + _CHUNK)
-            cell_values, factors = _cell_bounds(body, reference, low[:, chosen], size, multiplier * 2.0 ** (0.5 * level), delta)
-            values[chosen] = np.fmin(parents[chosen], cell_values)
-            closed = values[chosen] <= goal
-            largest = max(largest, float(factors[closed].max(initial=0.0)))
-            examined += cell_values.size
-        still = ~(values <= goal)
-        low, parents = low[:, still], values[still]
-        if out_of_time or not still.any() or level == deepest:
-            break
-        size = 0.5 * size
-        low = (low[:, :, None] + size[:, None, None] * _CORNERS.T[:, None, :]).reshape(3, -1)
-        parents = np.repeat(parents, 8)
+            index = (2 * index[:, :, None] + CORNERS.T[:, None, :]).reshape(3, -1)
+            parents, level = np.repeat(parents, 8), level + 1
     worst = float(parents.max(initial=0.0)) / friction.mu_t
-    return Guarantee(
-        max(target, worst), target, int(parents.size), examined, largest / friction.mu_t, time.process_time() - begin
-    )
+    return Guarantee(max(target, worst), target, int(parents.size), examined, level, time.process_time() - begin)
 
 
 def with_guarantee(bound: Bound, certificate: Guarantee) -> Bound:

@@ -6,6 +6,7 @@
 
 #include <stdlib.h>
 
+#include "enclosure.h"
 #include "loaded.h"
 #include "motion.h"
 
