@@ -8,6 +8,7 @@ from benchmarks.independent_replay import Crawler, played
 from colloc import Chain, Elliptic, Friction, OwnLaw, PowerLaw, Problem, ProblemError, load, replay, save, solve_balance
 from colloc.bounds.guaranteed import certify
 from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
@@ -112,7 +113,7 @@ def test_a_bound_knows_the_weights_or_refuses():
     plain, other = (efficiency_bound(body, Friction(), budget=budget) for body in (Chain(), heavy))
     assert abs(plain.sampled - other.sampled) > 1e-3
     with pytest.raises(ProblemError, match="weights"):
-        certify(heavy, Friction(), plain, 0.6)
+        certify(Domain(heavy, Friction(), np.pi), other.space, other.free, 0.6)
 
 
 @pytest.mark.parametrize("weights", [(1.0,), (0.5, 0.5, 0.5), (0.5, 0.5, 0.0), (0.5, 0.5, "x"), (np.nan, 0.5, 0.5), 3.0])
