@@ -113,7 +113,7 @@ def test_a_bound_knows_the_weights_or_refuses():
     plain, other = (efficiency_bound(body, Friction(), budget=budget) for body in (Chain(), heavy))
     assert abs(plain.sampled - other.sampled) > 1e-3
     with pytest.raises(ProblemError, match="weights"):
-        certify(Domain(heavy, Friction(), np.pi), other.space, other.free, 0.6)
+        certify(Domain(heavy, Friction(), np.pi), other.potential_space(heavy), np.array(other.coefficients), 0.6)
 
 
 @pytest.mark.parametrize("weights", [(1.0,), (0.5, 0.5, 0.5), (0.5, 0.5, 0.0), (0.5, 0.5, "x"), (np.nan, 0.5, 0.5), 3.0])
