@@ -1,11 +1,14 @@
 """How dependable the search is: random starts for six friction laws, with and without an imposed symmetry.
 
     python -m benchmarks.robustness --starts 100
+    python -m benchmarks.robustness --starts 4 --harmonics 3
+    python -m benchmarks.robustness --starts 12 --harmonics 3 --lengths 0.2 0.5 0.3 --symmetries none
 
 For every case: the share of starts that reach a certified optimum (first-order conditions and an independent fine
 replay) at delta = 1e-4 and, followed from there, at 1e-6; the median processor time of a start (certificate included);
 every failure and why; the best optimum and the share of starts that found it; and a second replay of every distinct
-optimum that shares neither grid nor start phase with the certificate's. One harmonic, Latin-hypercube starts, seed 0.
+optimum that shares neither grid nor start phase with the certificate's. Latin-hypercube starts, seed 0; one harmonic and three
+equal links unless asked otherwise.
 
 Both symmetries are valid for every friction law: a bilateral gait closes its rotation for any mu_b / mu_f
 (`colloc.gaits.equivalence`), and the second half of an antipodal one is the mirror image of its first half for any friction.
@@ -23,10 +26,11 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from colloc import Friction, Harmonic, Problem, ellipse
+from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.gait_fields import law_fields
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.sampling import LATIN_HYPERCUBE, on_speed_floor
@@ -47,17 +51,37 @@ REPLAY_INSTANTS, PHASE, CONTRADICTED = 7000, 0.2345, 3e-4
 this relative amount: three times the certificate's own tolerance, since this grid is a fixed one."""
 
 
-def case_problem(law: tuple[float, float, float], symmetry: str, delta: float, delta_start: float) -> Problem:
+class Table(NamedTuple):
+    """What all cases of a table have in common."""
+
+    body: Chain = Chain()
+    harmonics: int = 1
+
+    @property
+    def suffix(self) -> str:
+        """Of its files; none for the published one."""
+        parts = [] if self.harmonics == 1 else [f"{self.harmonics}-harmonics"]
+        parts += [] if self.body == Chain() else ["-".join(f"{length:g}" for length in self.body.lengths)]
+        return "".join(f"-{part}" for part in parts)
+
+
+PUBLISHED = Table()
+
+
+def case_problem(
+    law: tuple[float, float, float], symmetry: str, delta: float, delta_start: float, table: Table = PUBLISHED
+) -> Problem:
     """One cell of the table."""
-    return Problem(
-        name="robustness-" + "-".join(f"{mu:g}" for mu in law) + f"-{symmetry}-{delta:g}",
+    stated = Problem(
+        name="robustness-" + "-".join(f"{mu:g}" for mu in law) + f"-{symmetry}-{delta:g}{table.suffix}",
+        body=table.body,
         friction=Friction(*law),
-        gait=Harmonic(1, symmetry),
+        gait=Harmonic(table.harmonics, symmetry),
         guess=ellipse(0.0 if symmetry == "antipodal" else 0.3, 1.0, 0.5),
         delta=delta,
         delta_start=delta_start,
-        intervals=INTERVALS[symmetry],
     )
+    return stated.with_(intervals=INTERVALS[symmetry]) if table.harmonics == 1 else stated
 
 
 def stored(problem: Problem, folder: Path) -> Archive:
@@ -70,10 +94,10 @@ def pool(workers: int) -> Executor:
     return ThreadPoolExecutor(1) if workers == 1 else process_pool(workers)
 
 
-def advance(law: tuple[float, float, float], symmetry: str, most: int, workers: int, folder: Path) -> None:
+def advance(law: tuple[float, float, float], symmetry: str, most: int, workers: int, folder: Path, table: Table) -> None:
     """Bring a case to starts 0 to `most` - 1 at both deltas."""
-    first = stored(case_problem(law, symmetry, DELTA, 0.1), folder)
-    second = stored(case_problem(law, symmetry, SMALL_DELTA, NEXT_DELTA), folder)
+    first = stored(case_problem(law, symmetry, DELTA, 0.1, table), folder)
+    second = stored(case_problem(law, symmetry, SMALL_DELTA, NEXT_DELTA, table), folder)
     settings: dict = {"workers": workers, "time_limit": TIME_LIMIT, "executor": pool}
     _complete(first, most, lambda missing: run_starts(first.problem, missing, **settings))
     # what did not reach the larger delta counts as failed at the smaller one, for the same reason
@@ -120,12 +144,12 @@ def row(archive: Archive) -> dict:
     }
 
 
-def markdown(rows: list[dict], asked: int, command: str) -> str:
+def markdown(rows: list[dict], asked: int, command: str, table: Table = PUBLISHED) -> str:
     """The tables for people."""
     lines = [
         "# Robustness of the search over gaits",
         "",
-        f"One harmonic, Latin-hypercube starts (seed 0). Written by `{command}`.",
+        f"{table.body.describe()}; harmonics: {table.harmonics}; Latin-hypercube starts (seed 0). Written by `{command}`.",
         "Certified: first-order conditions and an independent fine replay agree. Time: processor time of one start,",
         "certificate included, on a core of a busy machine;",
         "at the smaller delta that of going on from the result at the larger one. Replay: largest relative difference of the",
@@ -165,16 +189,16 @@ def markdown(rows: list[dict], asked: int, command: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_tables(symmetries: list[str], asked: int, folder: Path, output: Path, command: str) -> None:
+def write_tables(symmetries: list[str], asked: int, folder: Path, output: Path, command: str, table: Table) -> None:
     """results/robustness.md and .json from the archives."""
     archives = [
-        stored(case_problem(law, symmetry, delta, 0.1 if delta == DELTA else NEXT_DELTA), folder)
+        stored(case_problem(law, symmetry, delta, 0.1 if delta == DELTA else NEXT_DELTA, table), folder)
         for delta, symmetry, law in product((DELTA, SMALL_DELTA), symmetries, LAWS)
     ]
     rows = [row(archive) for archive in archives if archive.outcomes]
-    (output / "robustness.md").write_text(markdown(rows, asked, command), encoding="utf-8")
+    (output / f"robustness{table.suffix}.md").write_text(markdown(rows, asked, command, table), encoding="utf-8")
     record = {"command": command, "versions": versions(), "rows": rows}
-    (output / "robustness.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    (output / f"robustness{table.suffix}.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
 def main() -> None:
@@ -182,19 +206,26 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=100)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--symmetries", nargs="+", choices=SYMMETRIES, default=SYMMETRIES)
+    parser.add_argument("--harmonics", type=int, default=1, metavar="N")
+    parser.add_argument("--lengths", type=float, nargs="+", metavar="L", help="of the links, by default three equal ones")
     parser.add_argument("--output", type=Path, default=Path("results"))
     parser.add_argument("--tables", action="store_true", help="write the tables of what is stored, and solve nothing")
     options = parser.parse_args()
     folder = options.output / "robustness"
+    table = Table(Chain(tuple(options.lengths)) if options.lengths else Chain(), options.harmonics)
     command = f"python -m benchmarks.robustness --starts {options.starts}"
+    if options.harmonics != 1:
+        command += f" --harmonics {options.harmonics}"
+    if options.lengths:
+        command += f" --lengths {' '.join(f'{length:g}' for length in options.lengths)}"
     if tuple(options.symmetries) != SYMMETRIES:
         command += f" --symmetries {' '.join(options.symmetries)}"
     turns = [] if options.tables else [*range(TURN, options.starts, TURN), options.starts]
     for most in turns:
         for symmetry, law in product(options.symmetries, LAWS):
-            advance(law, symmetry, most, options.workers, folder)
+            advance(law, symmetry, most, options.workers, folder, table)
             print(f"{most} starts of {law}, {symmetry}", flush=True)
-    write_tables(list(options.symmetries), options.starts, folder, options.output, command)
+    write_tables(list(options.symmetries), options.starts, folder, options.output, command, table)
 
 
 if __name__ == "__main__":
