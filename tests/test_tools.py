@@ -9,10 +9,12 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.__main__ import PARTS
 from scripts.curate import COMMANDS, KEPT
+from scripts.friction_plane import best_over
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("scripts", "scripts/paper", "scripts/models", "benchmarks")
@@ -117,3 +119,9 @@ def is_module(name):
 def test_the_commands_of_the_curated_results_exist():
     for command in (*COMMANDS.values(), *KEPT.values()):
         assert is_module(command.split()[2]), command
+
+
+def test_the_best_over_an_axis_leaves_out_what_was_not_solved():
+    best, where = best_over(np.array([[1.0, np.nan], [np.nan, np.nan]]), 1)
+    np.testing.assert_array_equal(best, [1.0, np.nan])
+    assert where[0] == 0

@@ -29,7 +29,6 @@ from colloc.studies.study import Axis, Study, read_study_file
 from colloc.studies.table import NO_PROBLEM, study_table
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
-from scripts.friction_plane import best_over
 
 FILE = """
 from colloc import *
@@ -304,9 +303,6 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
     np.testing.assert_array_equal(back.variables["efficiency"], table.variables["efficiency"])
     assert back.dimensions["mean"] == ("x", "kind", "joint")
     assert json.loads(back.attributes["versions"])["numpy"] == np.__version__
-    best, where = best_over(np.array([[1.0, np.nan], [np.nan, np.nan]]), 1)
-    np.testing.assert_array_equal(best, [1.0, np.nan])
-    assert where[0] == 0
 
 
 CLASSES = {"ellipse": Harmonic(1, "bilateral"), "triangle": Polygon(3, "bilateral"), "path": FreePath(4.0, "bilateral")}
