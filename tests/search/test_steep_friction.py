@@ -1,4 +1,4 @@
-"""Friction as steep as 1 / delta: what is stationary in the space of the gaits is an answer, however few digits multipliers have."""
+"""Friction as steep as 1 / delta: a gait that is stationary in the space of its class is an answer."""
 
 import pytest
 
