@@ -139,7 +139,7 @@ def maximise_efficiency(
         for _ in range(_DRIER if problem.gait.free and not literal else 0):
             if not _is_small_and_viscous(solution):
                 break
-            solution = _at_smaller_delta(solution, on_level)
+            solution = _at_smaller_delta(solution, problem.delta, on_level)
     solution.seconds = time.perf_counter() - begin
     return solution
 
@@ -151,9 +151,9 @@ def _is_small_and_viscous(solution: Solution) -> bool:
     return failed == ["delta influence"] and on_speed_floor(solution.problem, solution.gait)
 
 
-def _at_smaller_delta(solution: Solution, on_level: Report | None) -> Solution:
+def _at_smaller_delta(solution: Solution, asked: float, on_level: Report | None) -> Solution:
     """The solution gone on with at a smaller delta, certified: what is slow enough for a large gait is not for a small one."""
-    asked, delta = solution.problem.delta, FACTOR * solution.problem.delta
+    delta = FACTOR * solution.problem.delta
     drier = optimum(solution.problem.with_(delta=delta), on_level, solution.levels[:-1])
     _certified(drier)
     drier.message = f"{drier.message} The gait is so small that delta had to be lowered from {asked:.1g} to {delta:.1g}."

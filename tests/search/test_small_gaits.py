@@ -1,0 +1,29 @@
+"""Gaits that shrink to the bound on the shape speed are slow, and delta with them."""
+
+import pytest
+
+from colloc import Friction, Harmonic, Problem
+from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor
+from colloc.results.solution import SOLVED
+from colloc.search.optimise import maximise_efficiency
+
+ASKED = 0.02
+
+
+@pytest.fixture(scope="module")
+def shrunk():
+    """An optimum on the bound, of a problem whose delta is far too large for it."""
+    problem = Problem("tiny", friction=Friction(0.5, 1, 5), gait=Harmonic(1, "bilateral"), delta=ASKED)
+    return maximise_efficiency(problem.with_(guess=latin_hypercube_gait(problem, 0, 0)))
+
+
+def test_delta_is_lowered_until_it_matters_no_more(shrunk):
+    assert shrunk.status == SOLVED
+    assert on_speed_floor(shrunk.problem, shrunk.gait)
+    assert shrunk.last.delta == shrunk.problem.delta < ASKED
+    influence = next(check for check in shrunk.certificate.checks if check.name == "delta influence")
+    assert abs(influence.value) < 1e-2
+
+
+def test_the_message_says_what_was_asked_and_what_was_done(shrunk):
+    assert f"lowered from {ASKED:g} to {shrunk.problem.delta:.1g}" in shrunk.message
