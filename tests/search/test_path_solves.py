@@ -119,7 +119,7 @@ def test_a_free_path_far_beyond_the_paper(solved):
 
 @pytest.mark.slow
 def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
-    """The far pair binds at the first level. From this guess alone it ends at 0.463, with 16 starts at 0.521; the best of 32 has 0.600."""
+    """The far pair binds at the first level. This guess ends at 0.463, the best of 16 starts at 0.521, that of 32 at 0.600."""
     guess = Fourier(np.zeros(3), [[0.8], [0.0], [-0.8]], [[0.5], [0.7], [0.5]])
     problem = Problem(
         "four", guess, FOUR["body"], gait=FreePath(2.0, "bilateral"), intervals=50, delta=1e-3, mesh_tolerance=0.0
