@@ -62,7 +62,7 @@ def test_what_needs_free_gaits_refuses_a_prescribed_motion_in_words(tmp_path, ca
     [
         'Problem("p", friction=Friction(1, 1, 1), gait=Relaxed(2, "both"), delta=2e-4, joint_limit=2.5, intervals=8)',
         'Problem("p", Corners(BODY.concertina(1.2), "antipodal"), BODY, gait=Polygon(8, "antipodal"), delta=1e-4, '
-        "delta_start=1e-4, mesh_tolerance=3e-4)",
+        "delta_start=1e-4, mesh_tolerance=1e-4)",
     ],
 )
 def test_relaxed_gaits_and_crawlers_are_swept_and_started_many_times(tmp_path, capsys, stated):
