@@ -38,8 +38,6 @@ _ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
 """Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
 _ADMISSIBLE, _ALIKE = 1e-8, 1e-3
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
-_MOVES, _MOVED = 4, 0.1
-"""Times that knots are moved where the gait rests on a kink, and how far, as a share of a mesh interval."""
 _MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
 half, then a quarter of it."""
@@ -201,12 +199,11 @@ def refined(found: Found, report: Report) -> tuple[Found, str]:
     On the way it need not be optimised to the last digit: the next mesh moves it by more.
     """
     refines, kept = found.space.problem.mesh_tolerance > 0, np.empty(0)
-    count = moved = 0
+    count = 0
     while True:
         finer = finer_body(found) if refines else None
         plan = _plan(found, kept, count) if refines and finer is None else None
-        rests = finer is None and plan is None and found.accuracy == FINE
-        if rests and (found.optimal or not refines or moved == _MOVES):
+        if finer is None and plan is None and found.accuracy == FINE:
             return found, ""
         if count == _MESHES:
             return found, f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
@@ -217,25 +214,9 @@ def refined(found: Found, report: Report) -> tuple[Found, str]:
             count, kept, radius = count + 1, np.concatenate([kept, plan.kept]), REMESH_RADIUS
             space = space.remeshed(found.gait, plan.edges, plan.scheme)
             v, accuracy = space.parameters(found.gait), FINE if count > _SAME_AIM else ROUGH
-        if rests:
-            moved, (space, v) = moved + 1, _on_moved_knots(found, moved)
         known = found.curvature if found.v.size == v.size else None
         found = settled_apart(space, v, found.delta, radius, accuracy, known)
         report(found)
-
-
-def _on_moved_knots(found: Found, number: int) -> tuple[SearchSpace, np.ndarray]:
-    """The class on as fine a mesh with its knots elsewhere, and its parameters.
-
-    Where a link begins to stick at a mesh point, the collocated objective has a kink, and an optimum on a kink satisfies no
-    first-order condition.
-    """
-    space, mesh = found.space, found.space.phase_mesh(found.gait)
-    within = _MOVED * np.random.default_rng(number).uniform(-1, 1, mesh.n - 1)
-    edges = mesh.edges.copy()
-    edges[1:-1] += within * np.minimum(mesh.h[1:], mesh.h[:-1])
-    space = space.remeshed(found.gait, edges, mesh.scheme.name)
-    return space, space.parameters(found.gait)
 
 
 def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
