@@ -88,20 +88,20 @@ def test_the_worst_instant_moves_with_the_gait(b):
 
 
 class Kinked(Quadratic):
-    """x^2 with a gradient that falls by 1e-3 beside x = 0, as where a link begins to stick at a mesh point."""
+    """(x - 1)^2 with a gradient that falls by 1e-3 beside x = 1, as where a link begins to stick at a mesh point."""
 
     def __init__(self):
         super().__init__(np.diag([2.0]))
 
     def objective(self, v):
-        return super().objective(v) - 1e-3 * max(v[0] - 5e-8, 0.0)
+        return super().objective(v - 1) - 1e-3 * max(v[0] - 1 - 5e-8, 0.0)
 
     def gradient(self, v):
-        return super().gradient(v) - 1e-3 * (v > 5e-8)
+        return super().gradient(v - 1) - 1e-3 * (v > 1 + 5e-8)
 
 
 def test_a_way_down_that_ends_at_once_is_none():
-    assert curvature(Kinked(), np.array([1e-9])).smallest > 0
+    assert curvature(Kinked(), np.ones(1)).smallest > 0
 
 
 def test_rows_on_both_sides_of_one_instant_hold_one_direction():

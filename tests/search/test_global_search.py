@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem
 from colloc.gaits.sampling import on_speed_floor
 from colloc.results.store import load, save
+from colloc.search import global_search
+from colloc.search.global_search import candidates
 from colloc.search.optimise import best_gait
 
 UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(2, 1, 1.4), gait=Harmonic(2, "none"))
@@ -36,3 +40,19 @@ def test_the_answer_does_not_depend_on_what_the_search_is_given(changed):
     solution = best_gait(UNEQUAL.with_(**changed))
     assert solution.status == "solved"
     assert solution.efficiency == pytest.approx(0.64685, rel=2e-4)
+
+
+@pytest.mark.parametrize(("violation", "kept"), [(1e-3, True), (0.5, False)])
+def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch, violation, kept):
+    """What breaks the rows of its class may have any value."""
+    settled = global_search.settled_apart
+
+    def off(*arguments):
+        found = settled(*arguments)
+        return replace(found, conditions=replace(found.conditions, violation=violation))
+
+    monkeypatch.setattr(global_search, "settled_apart", off)
+    problem = Problem("one start", gait=Harmonic(1, "bilateral"))
+    known, tried = candidates(problem, 1, lambda: True, lambda step: None)
+    assert tried == 1
+    assert bool(known) == kept
