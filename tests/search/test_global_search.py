@@ -52,7 +52,7 @@ def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch
         return replace(found, conditions=replace(found.conditions, violation=violation))
 
     monkeypatch.setattr(global_search, "settled_apart", off)
-    problem = Problem("one start", gait=Harmonic(1, "bilateral"))
+    problem = Problem("one_start", gait=Harmonic(1, "bilateral"))
     known, tried = candidates(problem, 1, lambda: True, lambda step: None)
     assert tried == 1
     assert bool(known) == kept
