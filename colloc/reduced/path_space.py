@@ -18,7 +18,7 @@ from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import Pairs
-from colloc.numerics.blocks import as_sparse, oracles
+from colloc.numerics.columns import ChosenRows, ColumnFunction
 from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import minimised, remembered
@@ -57,9 +57,6 @@ class PathSpace:
         stated = problem.with_(scheme=scheme or problem.scheme)
         self._fit = fit = transcribe_fit(stated, near, edges, far)
         self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
-        self._oracles = oracles(fit.assembly)
-        nlp = self._oracles.nlp
-        self._row_values = ca.Function("rows", [nlp["x"], nlp["p"]], [nlp["g"]])
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
         gait, n_joint = problem.gait, problem.body.n_joint
@@ -72,13 +69,14 @@ class PathSpace:
             last = tangents[:, : -1 if self._closed else None]
             self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
             self.own = self.own[free[self.own]]
-            self._chord, self._on_arcs, self._arc_h = self._geometry.blocks["chord"]
+            chord, self._on_arcs, arc_h = self._geometry.blocks["chord"]
+            self._chord, self._chord_slope = ColumnFunction(chord.value), ColumnFunction(chord.jacobian)
+            self._chord_entries, self._along = (chord.jac_row, chord.jac_col), (arc_h, np.zeros_like(arc_h))
         self.n = self.own.size
         self.lower, self.upper = fit.lower[self.own], fit.upper[self.own]
         dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
         checked = [check.name for check in fit.checks]
         self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in fit.groups.items() if n not in (*dropped, *checked)}
-        self._kept = np.empty(0, dtype=int)
         self._place()
         self._followed, self._framed = remembered(self._follow), remembered(self._frame)
         self.move_checks(self.laid(near))
@@ -89,7 +87,8 @@ class PathSpace:
         out = ca.vertcat(piece.angles, piece.direction, piece.speed)
         arguments = [piece.shape, piece.given]
         slope = ca.densify(ca.vec(ca.jacobian(out, piece.shape)))
-        self._value, self._slope = ca.Function("place", arguments, [out]), ca.Function("slope", arguments, [slope])
+        self._value = ColumnFunction(ca.Function("place", arguments, [out]))
+        self._slope = ColumnFunction(ca.Function("slope", arguments, [slope]))
         self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
         self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
         self._scatter = selector(self._gather.ravel(), self._fixed.size)
@@ -107,7 +106,7 @@ class PathSpace:
                 if self._closed:
                     tangents[:, -1] = tangents[:, 0] * (1 if self.problem.gait.symmetry == NONE else -1)
                 p[self._tangents] = tangents / np.linalg.norm(tangents, axis=0)
-            step = self._chord.value(p[self._on_arcs], self._arc_h, 0.0).full()
+            step = self._chord(p[self._on_arcs], *self._along)
             start = p[self.shapes[:, :1]]
             p[self.shapes] = np.concatenate([start, start + np.cumsum(step, axis=1)], axis=1)
         return p
@@ -134,11 +133,8 @@ class PathSpace:
                 own[:, np.searchsorted(self.own, source)] = (np.eye(rows.size) - np.outer(unit, unit)) * sign / size
                 frame[rows] = own
         local = self._on_arcs
-        f = self._chord
-        nonzeros = f.jacobian(p[local], self._arc_h, 0.0).full()
-        n_joint, n = self.shapes.shape[0], local.shape[1]
-        jacobian = np.zeros((n, n_joint, f.n_local))
-        jacobian[:, f.jac_row, f.jac_col] = nonzeros.T
+        jacobian = np.zeros((local.shape[1], self.shapes.shape[0], local.shape[0]))
+        jacobian[:, *self._chord_entries] = self._chord_slope(p[local], *self._along).T
         # a chord does not depend on where the arc starts, so the frame of the shapes is not needed for it
         step = np.einsum("kjs,ksn->kjn", jacobian, frame[local.T])
         frame[self.shapes[:, 1:].T] = frame[self.shapes[:, 0]] + np.cumsum(step, axis=0)
@@ -197,7 +193,7 @@ class PathSpace:
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
-        out = self._value(self.full_parameters(v)[self._gather], self._given).full()
+        out = self._value(self.full_parameters(v)[self._gather], self._given).copy()
         angles, rates = np.split(out[:-1], 2)
         return angles, rates, out[-1]
 
@@ -205,7 +201,7 @@ class PathSpace:
         """See `colloc.reduced.motion.Shapes`."""
         p, frame = self.frame(v)
         n_out, n_shape = on_shape.shape[2] + 1, self._gather.shape[0]
-        slope = self._slope(p[self._gather], self._given).full().T.reshape(-1, n_shape, n_out)
+        slope = self._slope(p[self._gather], self._given).T.reshape(-1, n_shape, n_out)
         on_local = np.einsum("kto,tso->kst", np.concatenate([on_shape, on_pace[:, :, None]], axis=2), slope)
         return (on_local.reshape(on_local.shape[0], -1) @ self._scatter) @ frame
 
@@ -225,10 +221,9 @@ class PathSpace:
             given[check.name][:-1] = self._geometry.given(tau)
             given[check.name][-1, cells] = held_shares(check, gait, times)
             excess = max(excess, float(check.excess(values, limit).max()))
-        self._kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
-        self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
-        objective = fit.assembly.objective.parameters
-        self._moved = self._oracles.parameter_vector(1.0, [objective, *given.values()])
+        kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
+        self.row_lower, self.row_upper = fit.constraint_lower[kept], fit.constraint_upper[kept]
+        self._rows = ChosenRows(fit.assembly, kept, list(given.values()))
         return excess
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
@@ -245,13 +240,11 @@ class PathSpace:
 
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""
-        return self._row_values(self.full_parameters(v), self._moved).full().ravel()[self._kept]
+        return self._rows.values(self.full_parameters(v))
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        p, frame = self.frame(v)
-        jacobian = self._oracles.options["jac_g"](p, self._moved)[1]
-        return np.asarray(as_sparse(jacobian)[self._kept] @ frame)
+        return self._rows.slopes(*self.frame(v))
 
 
 class _Nearest:
