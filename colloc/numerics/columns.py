@@ -72,9 +72,9 @@ class ChosenRows:
         """``(n_row,)`` at the variables x."""
         return self._linear @ x + sum(part.values(x) for part in self._parts)
 
-    def slopes(self, x: np.ndarray, frame: np.ndarray) -> np.ndarray:
-        """Derivatives ``(n_row, n)`` where x changes by ``frame`` ``(n_variable, n)`` times other variables."""
-        return np.asarray(self._linear @ frame + sum(part.slopes(x, frame) for part in self._parts))
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives ``(n_row, n_variable)``."""
+        return np.asarray(sum((part.slopes(x) for part in self._parts), start=self._linear).toarray())
 
 
 class _Part:
@@ -92,7 +92,7 @@ class _Part:
     def values(self, x: np.ndarray) -> np.ndarray:
         return np.asarray(self._scatter @ self._value(x[self._gather], self._given, self._no_delta).ravel(order="F"))
 
-    def slopes(self, x: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    def slopes(self, x: np.ndarray) -> sparse.csr_matrix:
         nonzeros = self._jacobian(x[self._gather], self._given, self._no_delta).ravel()[self._order]
-        outputs = sparse.csr_matrix((nonzeros, self._columns, self._ends), shape=(self._ends.size - 1, frame.shape[0]))
-        return np.asarray(self._scatter @ (outputs @ frame))
+        outputs = sparse.csr_matrix((nonzeros, self._columns, self._ends), shape=(self._ends.size - 1, x.size))
+        return self._scatter @ outputs
