@@ -77,13 +77,20 @@ class Stationarity:
     on_bounds: np.ndarray
 
 
-def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
-    """Measure the first-order conditions at v, with the non-negative multipliers that minimise the Lagrangian's gradient."""
-    gradient, rows, slopes = program.gradient(v), program.rows(v), program.row_slopes(v)
-    values, unit = np.concatenate([rows, v]), np.vstack([slopes, np.eye(v.size)])
+def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which rows and bounds, counted on, may carry a multiplier at their upper and at their lower ends; and their slopes,
+    ``(n, n_binding)``, those at lower ends reversed."""
+    values, unit = np.concatenate([program.rows(v), v]), np.vstack([program.row_slopes(v), np.eye(v.size)])
     lower, upper = np.concatenate([program.row_lower, program.lower]), np.concatenate([program.row_upper, program.upper])
     high, low = np.flatnonzero(values > upper - _ACTIVE), np.flatnonzero(values < lower + _ACTIVE)
-    columns = np.concatenate([unit[high], -unit[low]]).T
+    return high, low, np.concatenate([unit[high], -unit[low]]).T
+
+
+def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
+    """Measure the first-order conditions at v, with the non-negative multipliers that minimise the Lagrangian's gradient."""
+    gradient, values = program.gradient(v), np.concatenate([program.rows(v), v])
+    lower, upper = np.concatenate([program.row_lower, program.lower]), np.concatenate([program.row_upper, program.upper])
+    high, low, columns = binding(program, v)
     multipliers, on = np.zeros(values.size), np.zeros(0)
     if columns.size and np.isfinite(columns).all() and np.isfinite(gradient).all():
         on, _ = nnls(columns, -gradient, maxiter=30 * columns.shape[1])
@@ -92,13 +99,10 @@ def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
     slack = np.where(multipliers > 0, upper - values, values - lower)
     slack = np.where((lower < upper) & (multipliers != 0), slack, 0.0)
     outside = np.maximum(np.maximum(lower - values, values - upper), 0.0)
-    left = gradient + unit.T @ multipliers
+    left = gradient + (columns @ on if on.size else 0.0)
+    on_rows, on_bounds = np.split(multipliers, [values.size - v.size])
     return Stationarity(
-        float(np.abs(left).max()),
-        float(outside.max()),
-        float(np.abs(multipliers * slack).max()),
-        multipliers[: rows.size],
-        multipliers[rows.size :],
+        float(np.abs(left).max()), float(outside.max()), float(np.abs(multipliers * slack).max()), on_rows, on_bounds
     )
 
 

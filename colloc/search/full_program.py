@@ -104,7 +104,8 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     """The gait of a search as a solution of the full program, and what does not hold, or "".
 
     Where IPOPT strays from a gait at which the first-order conditions of the full program hold, the gait is kept: at a kink
-    of the collocated objective its second derivatives mislead. So it is where those of the reduced program hold alone.
+    of the collocated objective its second derivatives mislead. So it is where those of the reduced program hold alone. A gait
+    that rests on a kink is not given to IPOPT.
 
     Parameters
     ----------
@@ -123,6 +124,11 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     if found.conditions.violation > RADIUS:  # no gait within reach is admissible
         kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
         return level_of(program, kept, delta, REDUCED), explanation(program, kept, delta)
+    here = found.conditions
+    in_reduced_space = replace(before, status=STATIONARY, kkt_error=here.kkt_error, complementarity=here.complementarity)
+    if found.on_kink and before.violation < STATIONARY_ROWS:
+        text = f"The optimum is a kink of the objective: gradients on its sides cancel (to {here.kkt_error:.1e})."
+        return level_of(program, in_reduced_space, delta, REDUCED), text
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
     for _ in range(_ROUNDS):  # the gait may have moved so far that other instants are the worst
@@ -139,13 +145,11 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
         return level_of(program, kept, delta, REDUCED), text
     if found.optimal and before.violation < STATIONARY_ROWS:
         # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits than the conditions need
-        here = found.conditions
-        kept = replace(before, status=STATIONARY, kkt_error=here.kkt_error, complementarity=here.complementarity)
         text = (
             f"First-order conditions hold in the reduced space (KKT error {here.kkt_error:.1e}; {before.kkt_error:.1e} on the "
             f"{problem.formulation} program); {ended}."
         )
-        return level_of(program, kept, delta, REDUCED), text
+        return level_of(program, in_reduced_space, delta, REDUCED), text
     kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
     return level_of(program, kept, delta, REDUCED), f"{explanation(program, kept, delta)} {ended}."
 

@@ -22,7 +22,7 @@ from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
 from colloc.search.prescribed import measured
-from colloc.search.reduced_search import FACTOR, Found, descended, refined, searched
+from colloc.search.reduced_search import FACTOR, Found, descended, kink_or_not, refined, searched
 from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.search.saddles import below_saddle
 from colloc.system.errors import NotConvergedError
@@ -91,7 +91,7 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
         found, lacks = refined(descended(_last_found(scaled, Solution(problem, before)), scaled, ended), ended)
     else:
         found, lacks = searched(scaled, scaled.guess, ended)
-    level, fails = answer(found)
+    level, fails = answer(kink_or_not(found))
     report(level)
     message = " ".join(part for part in (fails, lacks) if part)
     return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import Stationarity, minimised, stationarity
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
@@ -30,6 +31,10 @@ VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
 """Accuracy of the objective at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
 STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
 """What the first-order conditions have to keep to then; the objective is off by the square of that."""
+KINK_RADIUS = 1e-6
+"""Of the points whose gradients are taken together [rad]: as far as an optimum without a kink may be missed by."""
+_AROUND = (2, 16)
+"""How many those are per parameter; the second where several kinks meet."""
 _GROWTH, _FEW_POINTS = 3, 300
 """A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
 _DRIER, _LOST = 0.1, 0.5
@@ -63,6 +68,8 @@ class Found:
         Of it that was asked for.
     program : ReducedProgram, optional
         Whose conditions these are; by default the program of that space at that delta.
+    on_kink : bool
+        Whether the conditions hold on the sides of a kink, not at v itself.
     iterations, evaluations : int
     seconds : float
     curvature : (n, n), optional
@@ -80,6 +87,7 @@ class Found:
     seconds: float
     curvature: np.ndarray | None = None
     program: ReducedProgram | None = None
+    on_kink: bool = False
 
     @classmethod
     def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
@@ -100,6 +108,19 @@ class Found:
 
 
 Report = Callable[[Found], None]
+
+
+def kink_or_not(found: Found) -> Found:
+    """The gait as it is; where the conditions do not hold at it but around it, it rests on a kink, and they are those."""
+    if found.optimal:
+        return found
+    program = found.program or ReducedProgram(found.space, found.delta)
+    for points in _AROUND:
+        conditions = stationarity_around(program, found.v, found.conditions, KINK_RADIUS, points)
+        around = replace(found, conditions=conditions, on_kink=True)
+        if around.optimal:
+            return around
+    return found
 
 
 def settled(

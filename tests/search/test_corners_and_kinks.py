@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Friction, Harmonic, Problem, ellipse
+from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.sampling import latin_hypercube_gait
 from colloc.search.optimise import maximise_efficiency
 
@@ -35,3 +35,14 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
     checks = {check.name: check for check in solution.certificate.checks}
     assert checks["mesh error"].value < 2e-5
     assert len({level.edges.size for level in solution.levels}) <= 4
+
+
+def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
+    """Nearest to it, no gradient is below 1e-3; those of both sides cancel."""
+    problem = Problem(
+        "kink", body=Chain((0.2, 0.5, 0.3)), friction=Friction(0.5, 1.0, 5.0), gait=Harmonic(3, "none"), delta=1e-4
+    )
+    solution = maximise_efficiency(problem.with_(guess=latin_hypercube_gait(problem, 0, 3)))
+    assert solution.status == "solved", solution.message
+    assert "kink" in solution.message
+    assert solution.certificate.efficiency == pytest.approx(0.4162, abs=2e-4)

@@ -1,0 +1,71 @@
+"""First-order conditions at a kink: some mean of the gradients around the point vanishes, where no single one does.
+
+An objective that is the larger of two smooth ones may have its least value where they meet, and both gradients point away from
+the kink there. Such a point is stationary in the sense of Clarke and Goldstein: 0 is a convex combination of gradients at
+points near it. With points drawn by chance within a small radius this can be measured (Burke, Lewis and Overton, SIAM J. Optim.
+15, 2005).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import nnls
+
+from colloc.numerics.sqp import NonlinearProgram, Stationarity, binding
+
+_LOWER = 0.1
+"""A kink that bends down has the same gradients. There, points are lower by more than this part of what they would be higher by
+where it bends up."""
+
+
+def stationarity_around(
+    program: NonlinearProgram, v: np.ndarray, at: Stationarity, radius: float, points: int = 4, seed: int = 0
+) -> Stationarity:
+    """The conditions at v, with the mean of the gradients around it that comes closest to them in place of the one at v.
+
+    Parameters
+    ----------
+    program : NonlinearProgram
+    v : (n,)
+    at : Stationarity
+        At v alone.
+    radius : float
+        In every unknown, within which the gradients are taken.
+    points : int
+        How many are drawn, per unknown: on both sides of a kink, and in all corners of a few that meet.
+    seed : int
+        Of the points.
+
+    Returns
+    -------
+    Stationarity
+        `at` itself if no mean is closer, or if some point around is clearly lower.
+
+    Examples
+    --------
+    >>> from colloc.numerics.sqp import stationarity
+    >>> class Vee:  # |v| is least at 0
+    ...     lower, upper = -np.ones(1), np.ones(1)
+    ...     row_lower = row_upper = np.empty(0)
+    ...     objective, gradient = staticmethod(lambda v: abs(v[0])), staticmethod(lambda v: np.sign(v) + (v == 0))
+    ...     rows, row_slopes = staticmethod(lambda v: np.empty(0)), staticmethod(lambda v: np.empty((0, 1)))
+    >>> at = stationarity(Vee, np.zeros(1))
+    >>> at.kkt_error, round(stationarity_around(Vee, np.zeros(1), at, 1e-6).kkt_error, 12)
+    (1.0, 0.0)
+    """
+    slopes, columns = program.row_slopes(v), binding(program, v)[2]
+    drawn = v + radius * np.random.default_rng(seed).uniform(-1.0, 1.0, (points * v.size, v.size))
+    places = [v, *np.clip(drawn, program.lower, program.upper)]
+    # rows have kinks too: they count with the multipliers that are known
+    gradients = np.array([program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes) for u in places]).T
+    heights = np.array([program.objective(u) + at.on_rows @ program.rows(u) + at.on_bounds @ u for u in places])
+    if not np.isfinite(gradients).all() or (heights[0] - heights).max() > _LOWER * (heights - heights[0]).max():
+        return at
+    # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
+    size = np.abs(gradients).max()
+    matrix = np.vstack([np.hstack([gradients, columns]), np.repeat([size, 0.0], [len(places), columns.shape[1]])])
+    found, _ = nnls(matrix, np.append(np.zeros(v.size), size), maxiter=30 * matrix.shape[1])
+    error = float(np.abs(matrix[:-1] @ found).max() / found[: len(places)].sum())
+    return replace(at, kkt_error=error) if error < at.kkt_error else at
