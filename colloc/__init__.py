@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
     from colloc.verification.replay import replay
+    from colloc.verification.slope import heading_map, slope_motion
 
 _HOME = {
     "gaits.problem": ("Problem",),
@@ -82,6 +83,7 @@ _HOME = {
     "results.store": ("load", "save"),
     "results.certificate": ("certify",),
     "verification.replay": ("replay",),
+    "verification.slope": ("slope_motion", "heading_map"),
     "mechanics.fixed_point": ("solve_balance",),
     "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
 }
@@ -119,6 +121,7 @@ __all__ = [
     "Wave",
     "certify",
     "ellipse",
+    "heading_map",
     "load",
     "load_problem",
     "maximise_efficiency",
@@ -126,6 +129,7 @@ __all__ = [
     "pareto_front",
     "replay",
     "save",
+    "slope_motion",
     "solve",
     "solve_balance",
     "sweep",
