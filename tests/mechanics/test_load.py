@@ -1,4 +1,4 @@
-"""The balance of a chain under an outside force at its centre of mass: against a quadrature of its own, and what it must obey."""
+"""The balance of a chain under an outside force at its centre of mass: against a quadrature of its own, and physics."""
 
 import numpy as np
 import pytest

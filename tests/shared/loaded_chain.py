@@ -4,7 +4,7 @@ import numpy as np
 
 
 def left_over(z, lengths, weights, mu, angles, rates, load, delta):
-    """Force and torque about the tail on a chain of points that weigh what Gauss's rule says, one instant; nothing of colloc."""
+    """Force and torque about the tail on a chain of points that weigh what Gauss's rule says, at one instant."""
     nodes, shares = np.polynomial.legendre.leggauss(80)
     place, speed, heading, turning = 0j, complex(z[0], z[1]), 0.0, z[2]
     force, torque = 0j, 0.0

@@ -167,7 +167,9 @@ def test_rates_may_jump_where_that_is_said():
         along = 4 * np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
         return start[:, leg] + along[:, leg] * (there - leg / 4), along[:, leg]
 
-    told, untold = (slope_motion(Chain(), Friction(), corners, 1e-2, 0.2, breaks=b, tolerance=1e-5) for b in ((0.25, 0.5, 0.75), ()))
+    told, untold = (
+        slope_motion(Chain(), Friction(), corners, 1e-2, 0.2, breaks=b, tolerance=1e-5) for b in ((0.25, 0.5, 0.75), ())
+    )
     np.testing.assert_allclose(told.states[:5, -1], untold.states[:5, -1], atol=1e-4)
 
 
