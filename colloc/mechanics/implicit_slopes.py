@@ -23,8 +23,9 @@ Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Changes(NamedTuple):
-    """Derivatives along (shape, rates), or a load: of the anchor's velocity ``(3, n, n_time)``; of the parts' velocities in the
-    body's axes, along and across the part, and of their rotation rates, ``(n_part, n, n_time)``; of the power ``(n, n_time)``."""
+    """Derivatives along (shape, rates), or a load: of the anchor's velocity ``(3, n, n_time)``; of the parts' velocities in
+    the body's axes, along and across the part, and of their rotation rates, ``(n_part, n, n_time)``; of the power
+    ``(n, n_time)``."""
 
     anchor: np.ndarray
     vx: np.ndarray

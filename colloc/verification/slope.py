@@ -38,7 +38,7 @@ from colloc.verification.replay import Path
 
 _STEP = 1 / 100
 """Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and then skip one unnoticed
-(Runge and Kutta's left 1e-5 at 1e-7 a step, 1e-4 with eight orders); Adams' takes short ones, and errs by 8 to 40 times a step."""
+(Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams' takes short ones, and errs by 8 to 40 times a step."""
 _LOOSER = 30.0
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
