@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
+    from colloc.search.slope_search import climbing_gait
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.crawler_body import CrawlerBody
     from colloc.smooth.modal_body import ModalBody
@@ -76,6 +77,7 @@ _HOME = {
     "gaits.relaxed": ("Relaxed",),
     "gaits.paths": ("ArcPath", "Corners"),
     "search.optimise": ("maximise_efficiency",),
+    "search.slope_search": ("climbing_gait",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
     "studies.pareto": ("pareto_front",),
@@ -120,6 +122,7 @@ __all__ = [
     "Viscous",
     "Wave",
     "certify",
+    "climbing_gait",
     "ellipse",
     "heading_map",
     "load",

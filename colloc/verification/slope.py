@@ -191,6 +191,7 @@ def slope_motion(
     grade: float,
     *,
     heading: float = 0.0,
+    theta: float | None = None,
     periods: int = 1,
     tolerance: float = 1e-6,
     breaks: np.ndarray | tuple[float, ...] = (),
@@ -212,6 +213,8 @@ def slope_motion(
     heading : float
         At the start: the direction in which the gait would go on the level, from straight uphill, positive to the left [rad].
         Of a gait that goes nowhere on the level, the direction of its tail link at phase 0.
+    theta : float, optional
+        The same by the direction of the tail link at phase 0 from straight uphill; instead of a heading.
     periods : int
     tolerance : float
         Of headings, ways and works over a period, about; what is left is stated (`SlopeMotion.error`).
@@ -242,6 +245,7 @@ def slope_motion(
     if not isinstance(periods, (int, np.integer)) or periods < 1:
         raise ProblemError(f"periods must be a whole number from 1, not {periods!r}.")
     course = on.course(tolerance)
+    heading = heading if theta is None else theta + course
     loose = _run(on, course, heading, periods, _LOOSER * tolerance).states[:5, -1]
     ran = _run(on, course, heading, periods, tolerance)
     return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()))
