@@ -54,8 +54,9 @@ if TYPE_CHECKING:
     from colloc.studies.pareto import pareto_front
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
+    from colloc.verification.heading_map import heading_map
     from colloc.verification.replay import replay
-    from colloc.verification.slope import heading_map, slope_motion
+    from colloc.verification.slope import slope_motion
 
 _HOME = {
     "gaits.problem": ("Problem",),
@@ -85,7 +86,8 @@ _HOME = {
     "results.store": ("load", "save"),
     "results.certificate": ("certify",),
     "verification.replay": ("replay",),
-    "verification.slope": ("slope_motion", "heading_map"),
+    "verification.slope": ("slope_motion",),
+    "verification.heading_map": ("heading_map",),
     "mechanics.fixed_point": ("solve_balance",),
     "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
 }

@@ -2,7 +2,7 @@ r"""The program of a search on a slope: a gait's parameters and its heading; cli
 
 On a mesh the orientation at the points obeys ``theta = theta_0 + H omega(theta, v)``: H integrates from the start, and omega is
 that of the balance under the weight's pull, which depends on theta (`colloc.verification.slope`). Newton's method solves for
-all points at once; with Omega the diagonal matrix of d omega/d theta it steps with ``I - H Omega``. So every number Phi changes by
+all points at once; with Omega the diagonal matrix of d omega/d theta it steps with ``I - H Omega``. So a number Phi changes by
 
     d Phi = Phi_v dv + mu^T (d theta_0 + H omega_v dv),      (I - H Omega)^T mu = Phi_theta.
 """
@@ -17,6 +17,7 @@ from colloc.gaits.symmetry import BILATERAL
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.reduced.harmonic_space import HarmonicSpace
+from colloc.verification.slope import checked_chain
 
 _TOLERANCE, _ACCEPTED = 1e-12, 1e-9
 _CLOSED, _STEPS = 1e-12, 30
@@ -55,6 +56,7 @@ class SlopeProgram:
 
     def __init__(self, space: HarmonicSpace, grade: float, delta: float) -> None:
         self.space, self.grade, self.delta = space, grade, delta
+        self._body = checked_chain(space.problem.body, space.problem.friction, grade)
         mesh, rule = space.mesh, space.mesh.scheme
         self._weight = (mesh.h[:, None] * rule.b).ravel()
         self._integral = np.tril(np.ones((mesh.n, mesh.n)), -1).repeat(rule.s, 0).repeat(rule.s, 1) * self._weight
@@ -85,18 +87,19 @@ class SlopeProgram:
             return last
         angles, rates, _ = self.space.at(u[:-1])
         theta = np.full(angles.shape[1], u[-1]) if last is None else last.theta + u[-1] - last.u[-1]
-        z, problem = None if last is None else last.z, self.space.problem
-        at = problem.body, problem.friction, angles, rates, self.delta
+        z = np.zeros((3, theta.size)) if last is None else last.z
+        at = self._body, self.space.problem.friction, angles, rates, self.delta
         for _ in range(_STEPS):
             pull = -self.grade * np.exp(-1j * theta)
             load, turned = np.stack([pull.real, pull.imag]), -1j * pull
             solved = solve_balance(*at, load=load, start=z, tolerance=_TOLERANCE)
+            held = bool((solved.residual < _ACCEPTED).all())
             now, slopes = chain_slopes(*at, solved, load)
             z, slopes = solved.z, slopes[_OUTPUTS]
             on_theta = (slopes[:, _LOAD] * np.stack([turned.real, turned.imag])).sum(axis=1)
             left_over = theta - u[-1] - self._integral @ now.z[2]
-            done = np.abs(left_over).max() < _CLOSED
-            if done or not (solved.residual < _ACCEPTED).all():
+            done = held and bool(np.abs(left_over).max() < _CLOSED)
+            if done or not held:
                 break
             theta = theta - np.linalg.solve(self._left(on_theta), left_over)
         omega = now.z[2] if done else np.full_like(theta, np.nan)

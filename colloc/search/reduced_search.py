@@ -165,8 +165,10 @@ def settled(
 ) -> Found:
     """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
-    v, objective, conditions, *counts, curvature = at_rest(program, v, radius, accuracy, curvature, rounds)
-    return Found(space, v, delta, objective, conditions, accuracy, *counts, time.perf_counter() - begin, curvature, program)
+    rested = at_rest(program, v, radius, accuracy, curvature, rounds)
+    v, objective, conditions, iterations, evaluations, curvature = rested
+    counts = iterations, evaluations, time.perf_counter() - begin
+    return Found(space, v, delta, objective, conditions, accuracy, *counts, curvature, program)
 
 
 def settled_apart(

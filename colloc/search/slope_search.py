@@ -1,13 +1,12 @@
-"""The gait of a class that climbs a slope at the least work, by the same SQP as on the level, and what an own replay says of it.
+"""The gait of a class that climbs a slope at the least work, by the same SQP as on the level, and what a replay says of it.
 
-Starts are those of a search on the level, each pointed the way in which it goes uphill there. They are told apart on a coarse
-mesh at a large delta; the best few are followed down in delta, and the best of these is optimised on meshes whose edges lie where
+Starts are those of a search on the level, each pointed so that it would go uphill there. They are told apart on a coarse mesh
+at a large delta; the best few are followed down in delta, and the best of these is optimised on meshes whose edges lie where
 the replay's steps do, until mesh and replay agree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -26,7 +25,7 @@ from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FINE, FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, ROUGH, VERY_ROUGH, at_rest, deltas
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
-from colloc.verification.slope import SlopeMotion, slope_motion
+from colloc.verification.slope import SlopeMotion, checked_chain, slope_motion
 
 STARTS = 12
 _SCHEME = "gauss-3"
@@ -71,7 +70,9 @@ class ClimbingGait:
 
     def __str__(self) -> str:
         climb, work = self.motion.climb[0], self.motion.joint_work[0]
-        head = f"climb {climb:.6f}, work of the joints {work:.6f}, climb/work {self.value:.6f} on a grade of {self.motion.grade:g}"
+        head = (
+            f"climb {climb:.6f}, work of the joints {work:.6f}, climb/work {self.value:.6f} on a grade of {self.motion.grade:g}"
+        )
         return "\n".join([head, *(check.line() for check in self.checks)])
 
 
@@ -141,7 +142,7 @@ def _check(problem: Problem, grade: float) -> None:
         raise ProblemError("a gait for a slope is sought for chains of straight links, in a class Harmonic.")
     if problem.objective != EFFICIENCY or problem.at_least or problem.actuator_limits.names or problem.rotation != 0:
         raise ProblemError("on a slope climb/work is maximised: leave objective, rotation, at_least and limits of joints out.")
-    slope_motion(problem.body, problem.friction, problem.guess, 1.0, grade, tolerance=1.0)  # says what is wrong with the grade
+    checked_chain(problem.body, problem.friction, grade)
 
 
 def _begun(problem: Problem, grade: float, gait: Fourier, delta: float) -> tuple[SlopeProgram, np.ndarray]:
@@ -150,7 +151,10 @@ def _begun(problem: Problem, grade: float, gait: Fourier, delta: float) -> tuple
     v = space.parameters(gait)
     level = SlopeProgram(space, 0.0, delta)
     ahead, aside = (level.values(np.append(v, theta))[0] for theta in (0.0, -0.5 * np.pi))
-    return SlopeProgram(space, grade, delta), np.append(v, -np.arctan2(aside, ahead))
+    program, u = SlopeProgram(space, grade, delta), np.append(v, -np.arctan2(aside, ahead))
+    if not np.isfinite(program.objective(u)):
+        raise NotConvergedError("friction does not hold the body, or its joints brake it.")
+    return program, u
 
 
 def _program(program: SlopeProgram, space: HarmonicSpace | None = None, delta: float | None = None) -> SlopeProgram:
@@ -184,7 +188,8 @@ def _refined(found: _Found, starts: int) -> ClimbingGait:
         apart = abs(value + found.objective) / abs(value)
         if apart < space.problem.mesh_tolerance or 2 * intervals > _MOST:
             gait = space.member(found.u[:-1])
-            return ClimbingGait(gait, float(replayed.headings[0]), replayed, value, _checks(found, replayed, apart), starts)
+            heading = float(np.angle(np.exp(1j * replayed.headings[0])))
+            return ClimbingGait(gait, heading, replayed, value, _checks(found, replayed, apart), starts)
         intervals, radius = 2 * intervals, REMESH_RADIUS
 
 
@@ -199,8 +204,7 @@ def _replay(found: _Found, part: float = 1.0) -> SlopeMotion:
     """A period by the differential equation, from the same theta."""
     problem, gait = found.program.space.problem, found.program.space.member(found.u[:-1])
     at = problem.body, problem.friction, gait, part * found.program.delta, found.program.grade
-    ran = slope_motion(*at, theta=float(found.u[-1]))
-    return ran
+    return slope_motion(*at, theta=float(found.u[-1]))
 
 
 def _checks(found: _Found, replayed: SlopeMotion, apart: float) -> tuple[Check, ...]:
@@ -215,7 +219,9 @@ def _checks(found: _Found, replayed: SlopeMotion, apart: float) -> tuple[Check, 
     return (
         Check("KKT error", stationary, _KKT, "gradient of the Lagrangian, complementarity"),
         Check("constraint violation", conditions.violation, _VIOLATION, "largest violated row or bound"),
-        Check("admissible", found.program.place_rows(found.u), _ADMISSIBLE, "excess over joint limits and contact [rad]"),
+        Check(
+            "admissible", max(found.program.place_rows(found.u), 0.0), _ADMISSIBLE, "excess over joint limits and contact [rad]"
+        ),
         Check("crossing", crossing, _CROSSING, "depth to which links pass through each other"),
         Check("replay", apart, 1e-4, "climb/work of the mesh against the replay, relative"),
         Check("error of the replay", replayed.error / abs(replayed.climb[0]), 1e-3, "relative to the climb"),

@@ -13,10 +13,6 @@ the body,
     work of the joints = work against friction + g climb,
 
 which is measured on both sides: the left one from the moments in the joints.
-
-A period takes the heading h at its start to one at its end, h -> f(h). The equation is of first order, so f is a monotone map
-of the circle: a heading either lasts, f(h) = h, and then others come closer to it period by period where f'(h) < 1 and leave it
-where f'(h) > 1; or none does, and the body turns for ever.
 """
 
 from __future__ import annotations
@@ -27,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.fixed_point import solve_balance
@@ -43,7 +39,6 @@ _LOOSER = 30.0
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
 _OMEGA, _LOAD = 2, slice(-2, None)
-_NEUTRAL = 10.0
 
 
 @dataclass(frozen=True)
@@ -95,26 +90,7 @@ class SlopeMotion:
         return bool(np.prod(self.steering) < 1.0)
 
 
-class HeadingMap(NamedTuple):
-    """What a period on a slope does to headings.
-
-    Attributes
-    ----------
-    headings, turns : (n,)
-        Headings over a full circle, and how far a period turns each [rad].
-    neutral : bool
-        No heading is turned, within the accuracy.
-    lasting : tuple of SlopeMotion
-        One period from each heading that is its own image; none where the body turns for ever, or where all are.
-    """
-
-    headings: np.ndarray
-    turns: np.ndarray
-    neutral: bool
-    lasting: tuple[SlopeMotion, ...]
-
-
-class _Gait(NamedTuple):
+class GaitOnSlope(NamedTuple):
     """A gait of a body, and the slope it is on."""
 
     body: Chain
@@ -149,6 +125,21 @@ class _Gait(NamedTuple):
             states.append(run.y)
         return np.concatenate(phases), np.concatenate(states, axis=1)
 
+    def run(self, course: float, heading: float, periods: int, tolerance: float) -> SlopeMotion:
+        """The motion through periods from a heading, without its error."""
+        state = np.array([heading - course, 0.0, 0.0, 0.0, 0.0, 0.0])
+        ends, phases, states = [state], [], []
+        for period in range(periods):
+            t, through = self.followed(ends[-1], tolerance)
+            ends.append(through[:, -1])
+            phases.append(period + t)
+            states.append(through)
+        theta, *sums = np.stack(ends, axis=1)
+        climb, aside, friction_work, joint_work, steering = np.diff(sums)
+        unknown = np.concatenate(phases), np.concatenate(states, axis=1)
+        works = friction_work, joint_work
+        return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, *unknown)
+
     def _rates(self, t: float, theta: float, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
         pull = -self.grade * np.exp(-1j * theta)
@@ -166,9 +157,8 @@ class _Gait(NamedTuple):
         return np.array([now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], steering]), solved.z
 
 
-def _checked(
-    body: Chain, friction: Law, gait: Path, delta: float, grade: float, breaks: np.ndarray | tuple[float, ...]
-) -> _Gait:
+def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
+    """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
     if not isinstance(body, Chain):
         raise ProblemError(f"only chains of straight links can be put on a slope, not {type(body).__name__}.")
     if isinstance(grade, bool) or not isinstance(grade, (int, float, np.number)) or not 0 <= grade < np.inf:
@@ -178,13 +168,21 @@ def _checked(
             f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most {friction.largest:g} times "
             "the force that presses it on the ground."
         )
+    return body
+
+
+def gait_on_slope(
+    body: Body, friction: Law, gait: Path, delta: float, grade: float, breaks: np.ndarray | tuple[float, ...]
+) -> GaitOnSlope:
+    """A gait of a body on a slope, or a `ProblemError` that says why it cannot be there."""
+    chain = checked_chain(body, friction, grade)
     if len(gait(np.zeros(1))) != 2:
         raise ProblemError("a relaxed gait cannot be put on a slope, where it matters how long each of its directions lasts.")
-    return _Gait(body, friction, gait, delta, tuple(float(t) for t in breaks), float(grade))
+    return GaitOnSlope(chain, friction, gait, delta, tuple(float(t) for t in breaks), float(grade))
 
 
 def slope_motion(
-    body: Chain,
+    body: Body,
     friction: Law,
     gait: Path,
     delta: float,
@@ -241,72 +239,11 @@ def slope_motion(
     [0.181] [1.041]
     [0.091] [1.048]
     """
-    on = _checked(body, friction, gait, delta, grade, breaks)
+    on = gait_on_slope(body, friction, gait, delta, grade, breaks)
     if not isinstance(periods, (int, np.integer)) or periods < 1:
         raise ProblemError(f"periods must be a whole number from 1, not {periods!r}.")
     course = on.course(tolerance)
     heading = heading if theta is None else theta + course
-    loose = _run(on, course, heading, periods, _LOOSER * tolerance).states[:5, -1]
-    ran = _run(on, course, heading, periods, tolerance)
+    loose = on.run(course, heading, periods, _LOOSER * tolerance).states[:5, -1]
+    ran = on.run(course, heading, periods, tolerance)
     return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()))
-
-
-def _run(on: _Gait, course: float, heading: float, periods: int, tolerance: float) -> SlopeMotion:
-    """`slope_motion` without its error."""
-    state = np.array([heading - course, 0.0, 0.0, 0.0, 0.0, 0.0])
-    ends, phases, states = [state], [], []
-    for period in range(periods):
-        t, through = on.followed(ends[-1], tolerance)
-        ends.append(through[:, -1])
-        phases.append(period + t)
-        states.append(through)
-    theta, *sums = np.stack(ends, axis=1)
-    climb, aside, friction_work, joint_work, steering = np.diff(sums)
-    unknown = np.concatenate(phases), np.concatenate(states, axis=1)
-    works = friction_work, joint_work
-    return SlopeMotion(on.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, *unknown)
-
-
-def heading_map(
-    body: Chain,
-    friction: Law,
-    gait: Path,
-    delta: float,
-    grade: float,
-    *,
-    count: int = 12,
-    tolerance: float = 1e-6,
-    breaks: np.ndarray | tuple[float, ...] = (),
-) -> HeadingMap:
-    """How a period turns a body on a slope, by its heading, and which headings last.
-
-    Parameters
-    ----------
-    count : int
-        Headings that are tried; lasting ones are found between two of them that turn opposite ways.
-
-    Other parameters and errors are those of `slope_motion`.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> gait = colloc.Fourier([0, 0], [[1.5], [0]], [[0], [1]])
-    >>> at = colloc.Chain(), colloc.Friction(2, 1, 1), gait
-    >>> found = colloc.heading_map(*at, delta=1e-2, grade=0.1, count=4, tolerance=1e-4)
-    >>> [(round(float(ran.headings[0]), 2), ran.stable) for ran in found.lasting]
-    [(-3.13, True), (-0.01, False)]
-    """
-    on = _checked(body, friction, gait, delta, grade, breaks)
-    course = on.course(tolerance)
-
-    def turn(heading: float) -> float:
-        return float(np.angle(np.exp(1j * _run(on, course, heading, 1, tolerance).turn)))
-
-    headings = np.linspace(-np.pi, np.pi, count, endpoint=False)
-    turns = np.array([turn(heading) for heading in headings])
-    lasting = []
-    neutral = bool(np.abs(turns).max() <= _NEUTRAL * tolerance)
-    for (first, there), (last, back) in pairwise(zip([*headings, np.pi], [*turns, turns[0]], strict=True)):
-        if not neutral and there * back <= 0 and abs(there - back) < np.pi:
-            lasting.append(_run(on, course, brentq(turn, first, last, xtol=tolerance), 1, tolerance))
-    return HeadingMap(headings, turns, neutral, tuple(lasting))

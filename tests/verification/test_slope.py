@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from scipy.optimize import root
 from shared.loaded_chain import left_over
 
 from colloc import Chain, CrawlerBody, Fourier, Friction, NotConvergedError, ProblemError, ellipse, replay
-from colloc.verification.slope import heading_map, slope_motion
+from colloc.verification.heading_map import heading_map
+from colloc.verification.slope import slope_motion
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 """A gait without any symmetry."""
@@ -31,7 +32,7 @@ def test_the_motion_is_that_of_a_program_of_its_own():
         (angles, rates), turn = SKEW(np.array([t])), np.exp(1j * state[0])
         pull = -grade * np.conj(turn)
         at = LOPSIDED.lengths, LOPSIDED.weights, mu, angles[:, 0], rates[:, 0], (pull.real, pull.imag), delta
-        near = least_squares(left_over, near, args=at, xtol=1e-12, ftol=1e-12, gtol=1e-12).x
+        near = root(left_over, near, args=at, tol=1e-11).x
         place, heading, centre, swing = 0j, 0.0, 0j, 0j
         for i, (length, weight) in enumerate(zip(LOPSIDED.lengths, LOPSIDED.weights, strict=True)):
             if i:
@@ -124,14 +125,14 @@ def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
 
 
 def test_an_antipodal_gait_settles_along_the_fall_line():
-    found = heading_map(Chain(), Friction(), ANTIPODAL, 1e-2, 0.1, count=4, tolerance=1e-5)
+    found = heading_map(Chain(), Friction(), ANTIPODAL, 0.05, 0.1, count=4, tolerance=1e-4)
     assert sorted(ran.stable for ran in found.lasting) == [False, True]
     for ran in found.lasting:
-        assert abs(ran.turn) < 1e-4
-        assert abs(ran.aside[0]) < 1e-4  # its halves are mirror images
+        assert abs(ran.turn) < 1e-3
+        assert abs(ran.aside[0]) < 1e-3  # its halves are mirror images
         assert abs(ran.climb[0]) > 1e-2
     (settled,) = (ran for ran in found.lasting if ran.stable)
-    run = slope_motion(Chain(), Friction(), ANTIPODAL, 1e-2, 0.1, heading=settled.headings[0] + 0.3, periods=4, tolerance=1e-5)
+    run = slope_motion(Chain(), Friction(), ANTIPODAL, 0.05, 0.1, heading=settled.headings[0] + 0.3, periods=4, tolerance=1e-4)
     left = run.headings - settled.headings[0]
     np.testing.assert_allclose(left[1:] / left[:-1], settled.steering[0], atol=3e-3)
     assert left[-1] < 0.9 * left[0]
@@ -153,8 +154,8 @@ def test_the_steering_is_the_slope_of_the_map():
 
 def test_the_stated_error_covers_the_true_one():
     at = LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-3, 0.3
-    exact = slope_motion(*at, tolerance=1e-8).states[:5, -1]
-    for tolerance in (1e-3, 1e-5):
+    exact = slope_motion(*at, tolerance=1e-7).states[:5, -1]
+    for tolerance in (1e-3, 1e-4):
         ran = slope_motion(*at, tolerance=tolerance)
         assert np.abs(ran.states[:5, -1] - exact).max() < ran.error < 30 * tolerance
 
