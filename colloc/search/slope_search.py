@@ -114,7 +114,7 @@ def climbing_gait(problem: Problem, grade: float, starts: int = STARTS) -> Climb
     >>> problem = colloc.Problem("steep", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     >>> found = colloc.climbing_gait(problem, grade=0.1, starts=2)
     >>> found.passed, round(found.value, 2)
-    (True, 0.11)
+    (True, 0.09)
     """
     _check(problem, grade)
     if starts < 1:

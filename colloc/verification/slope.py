@@ -30,6 +30,7 @@ from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law, rate_independent
 from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import Path
 
 _STEP = 1 / 100
@@ -39,6 +40,9 @@ _LOOSER = 30.0
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
 _OMEGA, _LOAD = 2, slice(-2, None)
+_PANELS = 40
+_OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0, "driven_work": 0.0}
+"""Shares in the error of the motion on the level: its way alone is asked for."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +106,8 @@ class GaitOnSlope(NamedTuple):
 
     def course(self, tolerance: float) -> float:
         """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
-        _, states = self._replace(grade=0.0).followed(np.zeros(len(_UNKNOWNS)), tolerance)
-        way = complex(states[1, -1], states[2, -1])
+        edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), self.breaks)
+        way = fine_motion(self.body, self.friction, self.path, self.delta, edges, tolerance, lambda period: _OF_WAY).path[-1]
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
     def followed(self, state: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:

@@ -42,6 +42,7 @@ def test_no_gait_and_no_heading_beside_it_climbs_better():
     assert found.value > 1.05 * level.climb[0] / level.joint_work[0]
 
 
+@pytest.mark.slow
 def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     free = PROBLEM.with_(
         gait=Harmonic(1), guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]), friction=Friction(3, 1, 2), delta=1e-3
