@@ -35,7 +35,7 @@ _DELTA = 0.2
 """Where starts are told apart, in units of the problem's first delta."""
 _FOLLOWED = 3
 _ADMISSIBLE, _TURN, _KKT, _VIOLATION, _CROSSING, _PHASES = 1e-6, 1e-4, 1e-6, 1e-8, 1e-8, 2000
-_DRIER = 0.1
+_DRIER, _SEVERAL = 0.1, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +226,7 @@ def _checks(found: _Found, replayed: SlopeMotion, apart: float) -> tuple[Check, 
         Check("replay", apart, 1e-4, "climb/work of the mesh against the replay, relative"),
         Check("error of the replay", replayed.error / abs(replayed.climb[0]), 1e-3, "relative to the climb"),
         Check("turn", replayed.turn, _TURN, "of the heading in a period, by the replay [rad]"),
+        Check("one motion", replayed.several, _SEVERAL, "part of the period at which several motions are balanced"),
         Check("work", paid, 1e-6, "work of the joints less that against friction and of the climb"),
         Check("delta influence", influence, usual.delta_influence, "change of climb/work at a tenth of delta, relative"),
     )

@@ -29,6 +29,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law, rate_independent
+from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import Path
@@ -66,6 +67,9 @@ class SlopeMotion:
         Derivative of the heading at the end of a period with respect to that at its start; always positive.
     error : float
         Of headings, ways and works at the end: how much they change where steps are allowed 30 times the error.
+    several : float
+        Part of the time at which several motions are balanced, by the solver's steps; 0 for laws that leave one. One of them is
+        followed, and no error says what the others would change.
     phases, states : (n,), (6, n)
         Where the solver stepped, counted from the first start, and its unknowns: theta, way up and aside, work against
         friction and of the joints, logarithm of the steering, all but theta from the first start.
@@ -80,6 +84,7 @@ class SlopeMotion:
     joint_work: np.ndarray
     steering: np.ndarray
     error: float
+    several: float
     phases: np.ndarray = field(repr=False, compare=False)
     states: np.ndarray = field(repr=False, compare=False)
 
@@ -129,6 +134,20 @@ class GaitOnSlope(NamedTuple):
             states.append(run.y)
         return np.concatenate(phases), np.concatenate(states, axis=1)
 
+    def pull(self, theta: np.ndarray) -> np.ndarray:
+        """Of the weight, in the body's axes, ``(2, n)``."""
+        pull = -self.grade * np.exp(-1j * theta)
+        return np.stack([pull.real, pull.imag])
+
+    def several(self, ran: SlopeMotion) -> float:
+        """Part of the time of a run at which several motions are balanced."""
+        if self.friction.associated:
+            return 0.0
+        angles, rates = self.path(ran.phases % 1.0)
+        load = self.pull(ran.states[0])
+        several = all_balanced_velocities(self.body, self.friction, angles, rates, self.delta, load).number > 1
+        return float(np.diff(ran.phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(ran.phases[-1])
+
     def run(self, course: float, heading: float, periods: int, tolerance: float) -> SlopeMotion:
         """The motion through periods from a heading, without its error."""
         state = np.array([heading - course, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -142,12 +161,11 @@ class GaitOnSlope(NamedTuple):
         climb, aside, friction_work, joint_work, steering = np.diff(sums)
         unknown = np.concatenate(phases), np.concatenate(states, axis=1)
         works = friction_work, joint_work
-        return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, *unknown)
+        return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, np.nan, *unknown)
 
     def _rates(self, t: float, theta: float, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
-        pull = -self.grade * np.exp(-1j * theta)
-        load = np.array([[pull.real], [pull.imag]])
+        load = self.pull(np.array([theta]))
         at = self.body, self.friction, *self.path(np.array([t])), self.delta
         solved = solve_balance(*at, load=load, start=near)
         if not solved.converged.all():
@@ -156,8 +174,8 @@ class GaitOnSlope(NamedTuple):
                 "may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
             )
         now, slopes = chain_slopes(*at, solved, load)
-        moved, turned = np.exp(1j * theta) * complex(*now.centre[:, 0]), -1j * pull
-        steering = slopes[_OMEGA, _LOAD, 0] @ [turned.real, turned.imag]
+        moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
+        steering = slopes[_OMEGA, _LOAD, 0] @ [load[1, 0], -load[0, 0]]  # the pull turns against theta
         return np.array([now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], steering]), solved.z
 
 
@@ -250,4 +268,4 @@ def slope_motion(
     heading = heading if theta is None else theta + course
     loose = on.run(course, heading, periods, _LOOSER * tolerance).states[:5, -1]
     ran = on.run(course, heading, periods, tolerance)
-    return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()))
+    return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()), several=on.several(ran))

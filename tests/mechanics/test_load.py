@@ -9,6 +9,7 @@ from shared.loaded_chain import left_over
 from colloc import Chain, Elliptic, Friction, OwnLaw, PowerLaw, ProblemError, Viscous, solve_balance
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.solution_branches import all_balanced_velocities
 
 BODY = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Friction(10, 1, 3), Elliptic(2, 1, 1.5), OwnLaw("-vs/speed", "-2*vn/speed")]
@@ -117,3 +118,16 @@ def test_a_load_beyond_friction_is_not_balanced():
 def test_unusable_loads_are_named(load):
     with pytest.raises(ProblemError, match="load must be"):
         solve_balance(BODY, Friction(), *random_instants(5), 1e-3, load=load)
+
+
+def test_all_motions_under_a_load_are_balanced_and_counted_by_their_signs():
+    law = Friction(1, 0.01, 100)  # as in the printed example of several motions
+    angles, rates = (np.tile(a, 9) for a in ([[0.78302927], [1.74481885]], [[-3.0], [0.0]]))
+    load = np.vstack([np.linspace(-0.004, 0.004, 9), np.full(9, 1e-4)])
+    found = all_balanced_velocities(Chain(), law, angles, rates, 1e-4, load)
+    assert found.number.max() == 3
+    assert found.complete.all()
+    for z, sign in zip(found.z, found.sign, strict=True):
+        at = np.flatnonzero(sign)
+        stays = solve_balance(Chain(), law, angles[:, at], rates[:, at], 1e-4, load=load[:, at], start=z[:, at])
+        np.testing.assert_allclose(stays.z, z[:, at], atol=1e-6)
