@@ -41,7 +41,7 @@ def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], star
     found: list[ClimbingGait | None] = []
     for grade in grades:
         try:
-            best = climbing_gait(problem, grade, starts)
+            best = climbing_gait(problem, grade, starts=starts)
         except NotConvergedError:
             found.append(None)
             continue

@@ -52,6 +52,15 @@ def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     assert abs(found.motion.turn) < 1e-5
 
 
+def test_a_gait_goes_across_the_slope_if_it_is_asked_to():
+    across = climbing_gait(PROBLEM.with_(gait=Harmonic(2, "bilateral")), 0.1, towards=np.pi / 2, starts=1)
+    assert across.passed, str(across)
+    assert abs(across.motion.climb[0]) < 1e-3 * across.way
+    assert across.way == pytest.approx(across.motion.aside[0], rel=1e-6)
+    assert 0 < across.heading < np.pi / 2  # it points uphill of where it goes
+    assert across.motion.joint_work[0] == pytest.approx(across.motion.friction_work[0], abs=1e-4)
+
+
 @pytest.mark.parametrize(
     ("changed", "grade", "said"),
     [
