@@ -25,7 +25,7 @@ from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FINE, FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, ROUGH, VERY_ROUGH, at_rest, deltas
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
-from colloc.verification.slope import SlopeMotion, checked_chain, slope_motion
+from colloc.verification.slope import SlopeMotion, check_finite, checked_chain, slope_motion
 
 STARTS = 12
 _SCHEME = "gauss-3"
@@ -38,7 +38,7 @@ _ADMISSIBLE, _TURN, _KKT, _VIOLATION, _CROSSING, _PHASES = 1e-6, 1e-4, 1e-6, 1e-
 _DRIER, _SEVERAL, _ASTRAY = 0.1, 1e-3, 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ClimbingGait:
     """A gait for a slope, and how it was checked.
 
@@ -69,10 +69,17 @@ class ClimbingGait:
         """Whether all checks hold."""
         return all(check.passed for check in self.checks)
 
-    def __str__(self) -> str:
+    @property
+    def line(self) -> str:
+        """What it achieves."""
         work, grade = self.motion.joint_work[0], self.motion.grade
-        head = f"way {self.way:.6f}, work of the joints {work:.6f}, way/work {self.value:.6f} on a grade of {grade:g}"
-        return "\n".join([head, *(check.line() for check in self.checks)])
+        return f"way {self.way:.6f}, work of the joints {work:.6f}, way/work {self.value:.6f} on a grade of {grade:g}"
+
+    def __repr__(self) -> str:
+        return f"<ClimbingGait: {self.line}; {'all checks hold' if self.passed else 'not all checks hold'}>"
+
+    def __str__(self) -> str:
+        return "\n".join([self.line, *(check.line() for check in self.checks)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +126,7 @@ def climbing_gait(problem: Problem, grade: float, *, towards: float | None = Non
     (True, 0.09)
     """
     _check(problem, grade)
+    check_finite(towards=0.0 if towards is None else towards)
     if starts < 1:
         raise ProblemError(f"starts must be at least 1, not {starts}.")
     first = max(_DELTA * problem.delta_start, problem.delta)

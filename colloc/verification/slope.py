@@ -17,7 +17,7 @@ which is measured on both sides: the left one from the moments in the joints.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -41,12 +41,12 @@ _LOOSER = 30.0
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
 _OMEGA, _LOAD = 2, slice(-2, None)
-_PANELS = 40
+_PANELS, _ONE_SIDED = 40, 1e-12
 _OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0, "driven_work": 0.0}
 """Shares in the error of the motion on the level: its way alone is asked for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class SlopeMotion:
     """A gait on a slope, period by period.
 
@@ -85,8 +85,13 @@ class SlopeMotion:
     steering: np.ndarray
     error: float
     several: float
-    phases: np.ndarray = field(repr=False, compare=False)
-    states: np.ndarray = field(repr=False, compare=False)
+    phases: np.ndarray
+    states: np.ndarray
+
+    def __repr__(self) -> str:
+        count = f"{self.climb.size} period{'s' * (self.climb.size > 1)} on a grade of {self.grade:g}"
+        ends = f"heading {self.headings[0]:.4f} -> {self.headings[-1]:.4f}"
+        return f"<SlopeMotion of {count}: climb {self.climb.sum():.6g}, work of the joints {self.joint_work.sum():.6g}, {ends}>"
 
     @property
     def turn(self) -> float:
@@ -121,7 +126,8 @@ class GaitOnSlope(NamedTuple):
 
         def slope(t: float, state: np.ndarray) -> np.ndarray:
             nonlocal near
-            found, near = self._rates(t, state[0], near)
+            one_sided = min(max(t, first + _ONE_SIDED), last - _ONE_SIDED)  # rates may jump at the ends
+            found, near = self._rates(one_sided, state[0], near)
             return found
 
         phases, states = [], []
@@ -179,6 +185,14 @@ class GaitOnSlope(NamedTuple):
         return np.array([now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], steering]), solved.z
 
 
+def check_finite(positive: bool = False, **numbers: object) -> None:
+    """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
+    for name, value in numbers.items():
+        usable = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
+        if not usable or (positive and not value > 0):  # type: ignore[operator]
+            raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
+
+
 def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
     """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
     if not isinstance(body, Chain):
@@ -200,7 +214,7 @@ def gait_on_slope(
     chain = checked_chain(body, friction, grade)
     if len(gait(np.zeros(1))) != 2:
         raise ProblemError("a relaxed gait cannot be put on a slope, where it matters how long each of its directions lasts.")
-    return GaitOnSlope(chain, friction, gait, delta, tuple(float(t) for t in breaks), float(grade))
+    return GaitOnSlope(chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), float(grade))
 
 
 def slope_motion(
@@ -262,6 +276,8 @@ def slope_motion(
     [0.091] [1.048]
     """
     on = gait_on_slope(body, friction, gait, delta, grade, breaks)
+    check_finite(heading=heading, theta=0.0 if theta is None else theta)
+    check_finite(positive=True, tolerance=tolerance)
     if not isinstance(periods, (int, np.integer)) or periods < 1:
         raise ProblemError(f"periods must be a whole number from 1, not {periods!r}.")
     course = on.course(tolerance)
