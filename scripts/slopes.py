@@ -19,7 +19,8 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.search.slope_search import ClimbingGait, climbing_gait
 from colloc.system.errors import NotConvergedError
-from colloc.verification.slope import SlopeMotion, slope_motion
+from colloc.verification.gait_on_slope import SlopeMotion
+from colloc.verification.slope import slope_motion
 
 SCENES = (
     ("equal friction", Friction(), 1, (0.0, 0.05, 0.1, 0.15, 0.2)),

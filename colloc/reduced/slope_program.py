@@ -1,8 +1,9 @@
 r"""The program of a search on a slope: a gait's parameters and its heading; way and work of the joints, with exact gradients.
 
 On a mesh the orientation at the points obeys ``theta = theta_0 + H omega(theta, v)``: H integrates from the start, and omega is
-that of the balance under the weight's pull, which depends on theta (`colloc.verification.slope`). Newton's method solves for
-all points at once; with Omega the diagonal matrix of d omega/d theta it steps with ``I - H Omega``. So a number Phi changes by
+that of the balance under the weight's pull, which depends on theta (`colloc.verification.gait_on_slope`). Newton's method
+solves for all points at once; with Omega the diagonal matrix of d omega/d theta it steps with ``I - H Omega``. So a number Phi
+changes by
 
     d Phi = Phi_v dv + mu^T (d theta_0 + H omega_v dv),      (I - H Omega)^T mu = Phi_theta.
 """

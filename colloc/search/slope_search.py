@@ -25,7 +25,8 @@ from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FINE, FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, ROUGH, VERY_ROUGH, at_rest, deltas
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
-from colloc.verification.slope import SlopeMotion, check_finite, checked_chain, slope_motion
+from colloc.verification.gait_on_slope import SlopeMotion
+from colloc.verification.slope import check_finite, checked_chain, slope_motion
 
 STARTS = 12
 _SCHEME = "gauss-3"

@@ -16,6 +16,15 @@ REVERSIBLE = ellipse(A0=0.4, A1=1.5, B1=1.0)
 LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 
 
+class Belt(Chain):
+    """One motor for both joints: the kernel would read what is not there."""
+
+    n_joint = 1
+
+    def solve(self, *arguments, **settings):
+        raise NotImplementedError
+
+
 def still(t):
     """A bent body whose joints rest."""
     return np.tile([[0.4], [-0.7]], np.size(t)), np.zeros((2, np.size(t)))
@@ -179,7 +188,8 @@ def test_rates_may_jump_where_that_is_said():
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"body": CrawlerBody()}, "only chains of straight links"),
+        ({"body": CrawlerBody()}, "only a Chain"),
+        ({"body": Belt()}, "only a Chain, whose joints are its own, can be put on a slope, not Belt"),
         ({"grade": -0.1}, "grade must be a number that is not negative"),
         ({"grade": np.nan}, "grade must be"),
         ({"periods": 0}, "periods must be a whole number from 1"),
