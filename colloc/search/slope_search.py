@@ -15,6 +15,7 @@ import numpy as np
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.gaits.sampling import on_speed_floor
 from colloc.mechanics.body import Chain
 from colloc.numerics.sqp import Stationarity
 from colloc.reduced.closure import closed_gait
@@ -36,7 +37,9 @@ _DELTA = 0.2
 """Where starts are told apart, in units of the problem's first delta."""
 _FOLLOWED = 3
 _ADMISSIBLE, _TURN, _KKT, _VIOLATION, _CROSSING, _PHASES = 1e-6, 1e-4, 1e-6, 1e-8, 1e-8, 2000
-_DRIER, _SEVERAL, _ASTRAY = 0.1, 1e-3, 1e-3
+_MESH, _REPLAYED, _SEVERAL, _ASTRAY, _PAID = 1e-4, 1e-3, 1e-3, 1e-3, 1e-6
+"""What the checks allow, by their meanings below."""
+_DRIER = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,6 +58,8 @@ class ClimbingGait:
     checks : tuple of Check
     starts : int
         Tried in all.
+    smallest : bool
+        Whether it is as small as the problem's ``smallest_shape_speed`` allows: then that bound chose its size.
     """
 
     gait: Fourier
@@ -64,6 +69,7 @@ class ClimbingGait:
     value: float
     checks: tuple[Check, ...]
     starts: int
+    smallest: bool
 
     @property
     def passed(self) -> bool:
@@ -80,7 +86,8 @@ class ClimbingGait:
         return f"<ClimbingGait: {self.line}; {'all checks hold' if self.passed else 'not all checks hold'}>"
 
     def __str__(self) -> str:
-        return "\n".join([self.line, *(check.line() for check in self.checks)])
+        size = ["the gait shrank to the bound smallest_shape_speed"] * self.smallest
+        return "\n".join([self.line, *size, *(check.line() for check in self.checks)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +211,16 @@ def _refined(found: _Found, starts: int) -> ClimbingGait:
         if apart < space.problem.mesh_tolerance or 2 * intervals > _MOST:
             gait = space.member(found.u[:-1])
             heading, way = float(np.angle(np.exp(1j * replayed.headings[0]))), _way(found, replayed).real
-            return ClimbingGait(gait, heading, replayed, way, value, _checks(found, replayed, apart), starts)
+            return ClimbingGait(
+                gait,
+                heading,
+                replayed,
+                way,
+                value,
+                _checks(found, replayed, apart),
+                starts,
+                on_speed_floor(space.problem, gait),
+            )
         intervals, radius = 2 * intervals, REMESH_RADIUS
 
 
@@ -243,11 +259,11 @@ def _checks(found: _Found, replayed: SlopeMotion, apart: float) -> tuple[Check, 
             "admissible", max(found.program.place_rows(found.u), 0.0), _ADMISSIBLE, "excess over joint limits and contact [rad]"
         ),
         Check("crossing", crossing, _CROSSING, "depth to which links pass through each other"),
-        Check("replay", apart, 1e-4, "way/work of the mesh against the replay, relative"),
-        Check("error of the replay", replayed.error / abs(way.real), 1e-3, "relative to the way"),
+        Check("replay", apart, _MESH, "way/work of the mesh against the replay, relative"),
+        Check("error of the replay", replayed.error / abs(way.real), _REPLAYED, "relative to the way"),
         Check("direction", astray, _ASTRAY, "of the way, off the one that was asked for [rad]"),
         Check("turn", replayed.turn, _TURN, "of the heading in a period, by the replay [rad]"),
         Check("one motion", replayed.several, _SEVERAL, "part of the period at which several motions are balanced"),
-        Check("work", paid, 1e-6, "work of the joints less that against friction and of the climb"),
+        Check("work", paid, _PAID, "work of the joints less that against friction and of the climb"),
         Check("delta influence", influence, usual.delta_influence, "change of way/work at a tenth of delta, relative"),
     )

@@ -76,6 +76,13 @@ def test_what_cannot_be_asked_is_named(changed, grade, said):
         climbing_gait(PROBLEM.with_(**changed), grade)
 
 
+def test_a_gait_that_shrinks_to_the_bound_says_so():
+    small = PROBLEM.with_(smallest_shape_speed=1.5, guess=ellipse(1.0, 0.9, 1.3))
+    found = climbing_gait(small, 0.0, starts=1)
+    assert found.smallest
+    assert "shrank to the bound smallest_shape_speed" in str(found)
+
+
 def test_a_slope_that_no_start_climbs_is_said_so():
     with pytest.raises(NotConvergedError, match=r"no gait was found that climbs a grade of 0\.9"):
         climbing_gait(PROBLEM, 0.9, starts=1)
