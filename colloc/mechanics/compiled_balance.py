@@ -24,6 +24,7 @@ def balance(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    load: np.ndarray | None,
     start: np.ndarray | None,
     tolerance: float,
     max_iterations: int,
@@ -33,14 +34,14 @@ def balance(
     n_time = angles.shape[1]
     chain = body_arguments(body, friction)
     angles, rates = np.ascontiguousarray(angles), np.ascontiguousarray(rates)
-    start = None if start is None else np.ascontiguousarray(start)
+    load, start = (None if a is None else np.ascontiguousarray(a) for a in (load, start))
     z, anchor_velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
     iterations, anchor = np.empty(n_time, dtype=np.int64), np.empty(n_time, dtype=np.int64)
     before = (body.n_link, *map(address, chain), n_time)
     after = (
         *map(address, (angles, rates)),
         delta,
-        address(start),
+        *map(address, (load, start)),
         tolerance,
         max_iterations,
         METHODS.index(method),
@@ -60,20 +61,23 @@ def motion(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    load: np.ndarray | None,
     anchor: np.ndarray,
     anchor_velocity: np.ndarray,
     *,
     with_slopes: bool,
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, 2 n_joint, n_time)``."""
+    """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, n, n_time)``."""
     n_time = angles.shape[1]
     chain = body_arguments(body, friction)
-    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity)]
+    angles, rates, velocity = (np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity))
+    load = None if load is None else np.ascontiguousarray(load)
     anchor = np.ascontiguousarray(anchor, dtype=np.int64)
     values = np.empty((_ROWS, n_time))
-    slopes = np.empty((_DIFFERENTIATED_ROWS, 2 * body.n_joint, n_time)) if with_slopes else None
+    columns = 2 * body.n_joint + (0 if load is None else 2)
+    slopes = np.empty((_DIFFERENTIATED_ROWS, columns, n_time)) if with_slopes else None
     before = (body.n_link, *map(address, chain), n_time)
-    after = (*map(address, given[:2]), delta, *map(address, (anchor, given[2], values, slopes)))
+    after = (*map(address, (angles, rates)), delta, *map(address, (load, anchor, velocity, values, slopes)))
     each_piece(n_time, lambda first, last: library.colloc_motion(*before, first, last, *after))
     return values, slopes
 

@@ -44,10 +44,10 @@ _PIECE = 4000
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 _BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
-    "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
+    "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_loaded": (*_BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
     "colloc_enclosure": (_ARRAY, _COUNT, _COUNT, *[_ARRAY] * 6, _REAL, _ARRAY),
-    "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 4),
+    "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
 }
 
 
