@@ -27,7 +27,7 @@ NEW = {
         "gaits/mixture gaits/relaxed reduced/mixture_space search/relaxed_search results/relaxation results/realisation "
         "pictures/relaxed_figure"
     ),
-    "the best of many starts, and of hops from the best": "search/global_search results/search_step results/alternative",
+    "the best of many starts, and of hops from the best": "search/global_search",
     "optima and saddles told apart": "reduced/second_order search/saddles",
     "IPOPT's word on every answer": "search/full_program",
     "instants with several balanced motions": "mechanics/solution_branches verification/followed_motion",

@@ -20,7 +20,8 @@ from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
-from colloc.results.distinct_optima import CRASHED, ERROR, STATUSES, TIME_LIMIT, Basin, Outcome, basins, counts
+from colloc.results.distinct_optima import Basin, basins
+from colloc.results.outcome import CRASHED, ERROR, STATUSES, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine

@@ -19,9 +19,8 @@ from colloc.commands.options import add_bound, add_printing, add_problem, change
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.results.level import Level
-from colloc.results.search_step import SearchStep
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
+from colloc.results.steps import Level, SearchStep
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
 

@@ -19,13 +19,12 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Sliding
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
-from colloc.results.level import REALISED, Level
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution_card import solution_card
+from colloc.results.steps import REALISED, Alternative, Level
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 

@@ -28,8 +28,7 @@ from colloc.mechanics.body import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import SearchSpace
 from colloc.reduced.spaces import space_about, space_near
-from colloc.results.alternative import Alternative
-from colloc.results.search_step import SearchStep
+from colloc.results.steps import Alternative, SearchStep
 from colloc.search.reduced_search import (
     FIRST_RADIUS,
     NEXT_RADIUS,
@@ -205,7 +204,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     seconds : float
         Wall time after which no other start is begun and no other gait is followed.
     watch : callable
-        Called with a `colloc.results.search_step.SearchStep` after every start and every gait that was followed.
+        Called with a `colloc.results.steps.SearchStep` after every start and every gait that was followed.
 
     Raises
     ------

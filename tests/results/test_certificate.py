@@ -14,9 +14,10 @@ from colloc.mechanics.body import Chain
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
+from colloc.results import measured
 from colloc.results.certificate import certify
 from colloc.results.checks import Check
-from colloc.results.delta_limit import extrapolated_limit
+from colloc.results.measured import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.verification.replay import replay
@@ -34,7 +35,7 @@ def replays(three_link):
         return found[arguments[3]]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(verify, "replay", kept)
+        patch.setattr(measured, "replay", kept)
         assert certify(three_link).passed
     return found
 
@@ -45,7 +46,7 @@ def failures(three_link, replays, monkeypatch):
 
     def names(solution=three_link, change=lambda part, replayed: replayed):
         largest = max(replays)
-        monkeypatch.setattr(verify, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
+        monkeypatch.setattr(measured, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
         return {check.name for check in certify(solution).failures}
 
     return names
@@ -235,7 +236,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
 
 
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
-    monkeypatch.setattr(verify, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
+    monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
     known, fine = certify(three_link), replays[max(replays)]
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
@@ -262,7 +263,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     gapped = with_last(three_link, efficiency=fine.efficiency * (1 + 3e-4))
     assert failures(gapped) == {"replay gap"}
     assert failures(gapped, open_by(2.5e-4)) == set()
-    monkeypatch.setattr(verify, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
+    monkeypatch.setattr(measured, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
     known = certify(three_link)
     assert min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency) >= 5e-3
     assert known.work_error >= 5e-3 * known.work

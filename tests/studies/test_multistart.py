@@ -23,7 +23,8 @@ from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
-from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
+from colloc.results.distinct_optima import basins
+from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
 from colloc.search.optimise import is_trivial, maximise_efficiency, optimum

@@ -17,7 +17,7 @@ from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.paths import ArcPath, Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.results.distinct_optima import CRASHED, Outcome
+from colloc.results.outcome import CRASHED, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, start_key
