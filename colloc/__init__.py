@@ -134,6 +134,7 @@ __all__ = [
 # what a solution offers and packages above it do
 bind(
     {
+        "card": "colloc.pictures.solution_card:solution_card",
         "plot": "colloc.pictures.solution_figure:solution_figure",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
