@@ -26,10 +26,10 @@ from typing import TYPE_CHECKING
 from colloc.system.late_binding import bind
 
 if TYPE_CHECKING:
+    from colloc.gaits.free_path import ArcPath, FreePath
     from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
     from colloc.gaits.objective import Objective
-    from colloc.gaits.path_classes import FreePath, Polygon
-    from colloc.gaits.paths import ArcPath, Corners
+    from colloc.gaits.polygon import Corners, Polygon
     from colloc.gaits.problem import Problem
     from colloc.gaits.problem_file import Reference, load_problem
     from colloc.gaits.relaxed import Relaxed
@@ -71,9 +71,9 @@ _HOME = {
     "laws.power_law": ("PowerLaw",),
     "laws.own_law": ("OwnLaw",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
-    "gaits.path_classes": ("FreePath", "Polygon"),
+    "gaits.free_path": ("FreePath", "ArcPath"),
+    "gaits.polygon": ("Polygon", "Corners"),
     "gaits.relaxed": ("Relaxed",),
-    "gaits.paths": ("ArcPath", "Corners"),
     "search.optimise": ("maximise_efficiency",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),

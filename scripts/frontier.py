@@ -30,8 +30,7 @@ from colloc.bounds.infinitesimal import best_small_gait, small_gait
 from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.gaits.guesses import largest_factor
-from colloc.gaits.path_classes import Polygon
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.body import Chain

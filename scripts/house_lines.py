@@ -24,7 +24,7 @@ NEW = {
         "mechanics/actuators reduced/actuator_slopes reduced/actuator_rows"
     ),
     "relaxed gaits and the finite ones near them": (
-        "gaits/mixture gaits/relaxed reduced/mixture_space search/relaxed_search results/relaxation results/realisation "
+        "gaits/relaxed reduced/mixture_space search/relaxed_search results/relaxation results/realisation "
         "pictures/relaxed_figure"
     ),
     "the best of many starts, and of hops from the best": "search/global_search",

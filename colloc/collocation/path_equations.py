@@ -16,9 +16,9 @@ import numpy as np
 
 from colloc.collocation.point_equations import forward
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits import arcs
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.numerics import arcs
 from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
 
 OMEGA, ADVANCE, POWER = range(3)

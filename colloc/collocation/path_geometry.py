@@ -9,8 +9,8 @@ from scipy import sparse
 
 from colloc.collocation.path_equations import Piece, arc, chord, excess_turn, placed_check, side, side_lengths, unit_norm
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.free_path import ArcPath, FreePath
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
 from colloc.mechanics.bodies import Pairs

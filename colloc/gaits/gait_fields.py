@@ -11,12 +11,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.mixture import Mixture
-from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
-from colloc.gaits.relaxed import Relaxed
+from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw

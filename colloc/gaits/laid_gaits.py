@@ -8,7 +8,7 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import Limit, largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through, path_length
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain

@@ -10,9 +10,9 @@ from typing import Protocol
 
 import numpy as np
 
+from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, fraction
 
 _DENSE = 2000

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits import gait_fields
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import Limit, check_guess, checked_limit, travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
-from colloc.gaits.path_classes import FreePath
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 from colloc.mechanics.actuators import ActuatorLimits, checked_actuator_limit

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from colloc.gaits.mixture import Mixture
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Mixture
 from colloc.pictures.figure import draw_allowed, set_log
 from colloc.pictures.style import BLUE, GREY, ORANGE, VERMILION
 from colloc.results.relaxation import Relaxation

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.collocation.shape_checks import shape_checks
-from colloc.gaits.mixture import Mixture
 from colloc.gaits.path_samples import Gait, symmetric_samples
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Mixture
 from colloc.gaits.symmetry import end_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh

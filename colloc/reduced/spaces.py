@@ -12,8 +12,9 @@ import numpy as np
 from colloc.collocation.path_transcription import transcribe_path
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.symmetry import ANTIPODAL

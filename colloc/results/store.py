@@ -24,9 +24,9 @@ import h5py
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from
-from colloc.gaits.mixture import Mixture
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem, statement_hash
+from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.former_format import converted, is_former
 from colloc.results.motion import SAMPLES, motion_columns

@@ -14,9 +14,9 @@ from itertools import islice
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.mixture import Mixture
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Mixture
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram

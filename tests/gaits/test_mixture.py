@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.gaits.gait_fields import class_from, fields, gait_from
-from colloc.gaits.mixture import Mixture, corners_of
-from colloc.gaits.relaxed import Relaxed
+from colloc.gaits.relaxed import Mixture, Relaxed, corners_of
 from colloc.system.errors import ProblemError
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.arcs import advance, direction
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import (
@@ -16,6 +15,7 @@ from colloc.gaits.path_samples import (
 )
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.numerics.arcs import advance, direction
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.replay import replay

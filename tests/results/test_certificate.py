@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from colloc.commands.verify import main as recheck
+from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.path_classes import FreePath
-from colloc.gaits.paths import ArcPath
 from colloc.mechanics.body import Chain
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature

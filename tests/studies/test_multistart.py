@@ -10,11 +10,11 @@ import pytest
 
 from colloc.commands import multistart
 from colloc.gaits.equivalence import distance, images, phase_distance, reversed_in_time
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
-from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.path_samples import arcs_through
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, start_gait
