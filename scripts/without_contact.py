@@ -20,8 +20,8 @@ import numpy as np
 from colloc import Corners, FreePath, Friction, Harmonic, Polygon, Problem
 from colloc.bounds.infinitesimal import small_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait, fields, gait_from
-from colloc.gaits.laid_gaits import delta_in, laid_into, prolonged
 from colloc.gaits.path_samples import path_length
+from colloc.gaits.starts import delta_in, laid_into, prolonged
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError

@@ -8,7 +8,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from colloc.gaits.guesses import Limit
+from colloc.gaits.limits import Limit
 from colloc.mechanics.bodies import Body, Contact, Pairs
 from colloc.mechanics.contact import share_of_first, smooth_minimum, tangent_of_minimum
 

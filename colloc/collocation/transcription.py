@@ -35,7 +35,7 @@ from colloc.collocation.point_equations import (
 )
 from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.gaits.guesses import widest
+from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
 from colloc.numerics.constraint_rows import (

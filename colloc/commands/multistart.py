@@ -19,7 +19,7 @@ from colloc.commands.options import add_bound, add_printing, add_problem, change
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
+from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import CRASHED, ERROR, STATUSES, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED

@@ -96,11 +96,6 @@ class ArcPath(UnitSpeedGait):
         angles = self.shapes[:, k] + self.length * h * advance(t0, t1, tau)
         return imaged(self.symmetry, angles, self.length * direction(t0, t1, tau), image)
 
-    @property
-    def corner_phases(self) -> np.ndarray:
-        """Phases in (0, 1) where the rates jump: none."""
-        return np.empty(0)
-
     def largest_jump(self) -> float:
         """Largest jump of the angles where arcs meet and where a symmetry continues them [rad]."""
         seams = np.concatenate([self.edges, 1 - self.edges, 0.5 + self.edges])

@@ -49,6 +49,21 @@ class GaitFunction:
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         raise NotImplementedError
 
+    @property
+    def delta_unit(self) -> float:
+        """What the delta of the gait's class is multiplied by to get delta per period."""
+        return 1.0
+
+    @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: by default per radian of phase."""
+        return 2 * np.pi
+
+    @property
+    def corner_phases(self) -> np.ndarray:
+        """Phases in (0, 1) where the rates jump: by default none."""
+        return np.empty(0)
+
     def lines(self, coordinate: str = "joint") -> list[str]:
         """The gait in words or as a formula; `coordinate` is what the body calls its shape coordinates."""
         raise NotImplementedError

@@ -13,12 +13,13 @@ import numpy as np
 from colloc.gaits import gait_fields
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.guesses import Limit, check_guess, checked_limit, travelling_wave
+from colloc.gaits.guesses import check_guess, travelling_wave
 from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
-from colloc.mechanics.actuators import ActuatorLimits, checked_actuator_limit
+from colloc.mechanics.actuators import ActuatorLimits
 from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction

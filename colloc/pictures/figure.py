@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from colloc.gaits.guesses import Limit, under_one_limit
+from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import lab_outline

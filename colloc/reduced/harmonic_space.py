@@ -8,8 +8,8 @@ from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.guesses import widest
 from colloc.gaits.harmonic import Fourier
+from colloc.gaits.limits import widest
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs

@@ -24,7 +24,7 @@ import h5py
 import numpy as np
 
 from colloc.gaits.problem import Problem, statement_hash
-from colloc.gaits.sampling import on_speed_floor
+from colloc.gaits.starts import on_speed_floor
 from colloc.results.distinct_optima import basins, fourier_series
 from colloc.results.outcome import Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions

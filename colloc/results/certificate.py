@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.guesses import under_one_limit
+from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.results.checks import Certificate, Check
 from colloc.results.measured import astray, measured

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.gaits.guesses import largest_factor, under_one_limit
+from colloc.gaits.guesses import largest_factor
+from colloc.gaits.limits import under_one_limit
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture

@@ -11,7 +11,7 @@ import dataclasses
 
 import numpy as np
 
-from colloc.gaits.guesses import Limit
+from colloc.gaits.limits import Limit
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.law import Law

@@ -20,10 +20,9 @@ from colloc.gaits.equivalence import distance
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor, seed_class
+from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
 from colloc.mechanics.body import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import SearchSpace

@@ -10,7 +10,7 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import on_speed_floor
+from colloc.gaits.starts import on_speed_floor
 from colloc.gaits.symmetry import NONE
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify

@@ -13,7 +13,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.gaits.sampling import LATIN_HYPERCUBE
+from colloc.gaits.starts import LATIN_HYPERCUBE
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import Outcome, counts

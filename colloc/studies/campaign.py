@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.results.checks import Certificate
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution

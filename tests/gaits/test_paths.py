@@ -5,7 +5,6 @@ import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.harmonic import shifted
-from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import (
     corners_through,
     fourier_through,
@@ -13,6 +12,7 @@ from colloc.gaits.path_samples import (
     path_length,
     symmetric_samples,
 )
+from colloc.gaits.starts import prolonged
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.numerics.arcs import advance, direction
