@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,7 +19,7 @@ from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objectiv
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 from colloc.mechanics.actuators import ActuatorLimits
-from colloc.mechanics.bodies import FULL, IMPLICIT, Body
+from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
@@ -30,10 +29,8 @@ from colloc.system.errors import ProblemError
 
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
-LONGEST_NAME = 200
+_NAME, LONGEST_NAME = re.compile(r"[A-Za-z0-9_.-]+"), 200
 """File systems allow 255 bytes, and results of a problem add endings to its name."""
-_AIMS = 5
-"""The last fields say what is asked of a gait, from the objective on; files that know of nothing else leave them out."""
 
 
 @named_arguments
@@ -156,7 +153,7 @@ class Problem:
             raise ProblemError(f"body must be a {_names(gait_fields.BODIES)}, not {type(self.body).__name__}.")
 
     def _check_parts(self) -> None:
-        if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
+        if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
         if len(self.name) > LONGEST_NAME:
             raise ProblemError(
@@ -297,13 +294,7 @@ class Problem:
 
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON)."""
-        stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        for name in ("guess", "gait", "body"):
-            stated[name] = gait_fields.fields(stated[name])
-        stated["friction"] = gait_fields.law_fields(self.friction)
-        usual = [f.name for f in dataclasses.fields(self)[-_AIMS:] if stated[f.name] == f.default]
-        stated |= {"objective": self.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in self.at_least]}
-        return {name: value for name, value in stated.items() if name not in usual}
+        return gait_fields.problem_fields(self)
 
     @classmethod
     def from_dict(cls, stated: dict) -> Problem:
@@ -315,33 +306,15 @@ class Problem:
             If a field is missing, unknown or has an unusable value.
         """
         try:
-            stated = dict(stated)
-            stated["guess"] = gait_fields.gait_from(stated["guess"])
-            stated["body"] = gait_fields.body_from(stated["body"])
-            stated["friction"] = gait_fields.law_from(stated["friction"])
-            stated["gait"] = gait_fields.class_from(stated["gait"])
-            stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
-            return cls(**stated)
+            return cls(**gait_fields.problem_arguments(stated))
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
 
     @property
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
-        return statement_hash(self.to_dict())
-
-
-_EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
-"""What earlier files call the formulations; those of paths name none."""
-
-
-def statement_hash(stated: dict) -> str:
-    """SHA-256 of what `Problem.to_dict` gave."""
-    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
+        return gait_fields.statement_hash(self.to_dict())
 
 
 def _names(kinds: Sequence[type]) -> str:
     return " or ".join(kind.__name__ for kind in kinds)
-
-
-_NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

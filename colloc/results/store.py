@@ -23,9 +23,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyGait, fields, gait_from
+from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
 from colloc.gaits.polygon import Corners
-from colloc.gaits.problem import Problem, statement_hash
+from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.former_format import converted, is_former
