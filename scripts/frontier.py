@@ -34,8 +34,8 @@ from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import gap
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.width import gap
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save

@@ -33,7 +33,6 @@ NEW = {
     "instants with several balanced motions": "mechanics/solution_branches verification/followed_motion",
     "the balance compiled, with exact slopes": "mechanics/native_kernel mechanics/compiled_balance mechanics/chain_motion",
     "prescribed motions as problems": "gaits/prescribed smooth/prescribed_body search/prescribed",
-    "links of a width": "mechanics/width",
     "the multipliers of a bound as a measure, bounds checked again": "bounds/measure bounds/recheck bounds/knots",
     "a problem file begun, archives opened, the Tab key": "commands/init commands/open commands/completion",
     "commands as functions, for notebooks": "studies/calls system/late_binding system/argument_names",

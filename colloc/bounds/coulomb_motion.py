@@ -13,11 +13,10 @@ import numpy as np
 
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.body import Chain
-from colloc.mechanics.contact import crossing_bounds
+from colloc.mechanics.contact import crossing_bounds, gap
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.mechanics.width import gap
 
 DELTA = 1e-9
 """Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""

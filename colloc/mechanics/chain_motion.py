@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant, link_stiffness, total_power
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.compiled_balance import motion
 from colloc.mechanics.implicit_slopes import implicit_changes
 from colloc.mechanics.law import Law

@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 from colloc.mechanics.balance import Instant, balance_jacobian, dissipation_potential, instant, net_force, secant_matrix
-from colloc.mechanics.bodies import BalanceSolution
+from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.compiled_balance import balance
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
 from colloc.mechanics.law import Law

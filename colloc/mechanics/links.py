@@ -47,7 +47,7 @@ class Links:
     lengths : tuple of float
         Link lengths from tail to head; they add up to the body length, 1.
     width : float
-        Of every link [body lengths], see `colloc.mechanics.width`; by default links are lines.
+        Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines.
     weights : tuple of float
         Of the links, in parts of the body's; by default the body is as heavy everywhere.
     """

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant
-from colloc.mechanics.bodies import BalanceSolution, Branches
+from colloc.mechanics.balance_results import BalanceSolution, Branches
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links

@@ -16,7 +16,7 @@ from colloc.collocation.layout import Layout, problem_layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.mechanics.bodies import Sliding
+from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.checks import UNCERTIFIED, Certificate

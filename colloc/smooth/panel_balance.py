@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
 from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
 from colloc.mechanics.implicit_slopes import implicit_changes
 from colloc.mechanics.law import Law

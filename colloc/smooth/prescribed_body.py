@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
+from colloc.mechanics.bodies import Usual
 from colloc.mechanics.law import Law
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.smooth.smooth_body import SmoothBody

@@ -7,7 +7,8 @@ from typing import Self
 
 import numpy as np
 
-from colloc.mechanics.bodies import ARROWS, IMPLICIT, BalancedMotion, Contact, Lifted, Pairs
+from colloc.mechanics.balance_results import BalancedMotion, Lifted
+from colloc.mechanics.bodies import ARROWS, IMPLICIT, Contact, Pairs
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.balance import SmoothSolution, solve_smooth

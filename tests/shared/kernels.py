@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion
+from colloc.mechanics.balance_results import BalancedMotion
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.native_kernel import numpy_instead
 
