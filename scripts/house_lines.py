@@ -31,7 +31,7 @@ NEW = {
     "optima and saddles told apart": "reduced/second_order search/saddles",
     "IPOPT's word on every answer": "search/full_program",
     "instants with several balanced motions": "mechanics/solution_branches verification/followed_motion",
-    "the balance compiled, with exact slopes": "mechanics/native_kernel mechanics/compiled_balance mechanics/chain_motion",
+    "the balance compiled, with exact slopes": "mechanics/native_kernel mechanics/chain_motion",
     "prescribed motions as problems": "gaits/prescribed smooth/prescribed_body search/prescribed",
     "the multipliers of a bound as a measure, bounds checked again": "bounds/measure bounds/recheck bounds/knots",
     "a problem file begun, archives opened, the Tab key": "commands/init commands/open commands/completion",

@@ -13,9 +13,8 @@ import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, dissipation_potential, instant, net_force, total_power
 from colloc.mechanics.body import Chain
-from colloc.mechanics.compiled_balance import loaded
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.native_kernel import native_kernel
+from colloc.mechanics.native_kernel import compiled_loaded, native_kernel
 
 _UNIT = Friction()
 _SHRINK = (0.5,) * 3 + (0.1,) * 5
@@ -57,7 +56,7 @@ def loaded_balance(
     """
     library = native_kernel(body)
     if library is not None:
-        return Loaded(*loaded(library, body, _UNIT, angles, rates, load, start, delta, steps))
+        return Loaded(*compiled_loaded(library, body, _UNIT, angles, rates, load, start, delta, steps))
     state = _newton(body, angles, rates, load, start, delta, steps)
     stalled = np.flatnonzero(state.residual.max(axis=0) > _STALLED)
     if stalled.size:

@@ -8,41 +8,32 @@ import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant, link_stiffness, total_power
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
-from colloc.mechanics.compiled_balance import motion
 from colloc.mechanics.implicit_slopes import implicit_changes
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
-from colloc.mechanics.native_kernel import native_kernel
-
-N_SLOPES = 6
-"""Rows of `BalancedMotion` that are differentiated: tail velocity, centre velocity, power."""
+from colloc.mechanics.native_kernel import compiled_motion, native_kernel
 
 
 def chain_motion(
     body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> BalancedMotion:
     """The motion at instants that were solved for; arguments as for `colloc.mechanics.fixed_point.solve_balance`."""
-    library, arguments = (
-        native_kernel(body, friction),
-        (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity),
-    )
-    values = _numpy_values(*arguments) if library is None else motion(library, *arguments, with_slopes=False)[0]
-    return _named(values)
+    library, at = native_kernel(body, friction), (angles, rates, delta, solved.anchor, solved.anchor_velocity)
+    if library is None:
+        return _named(_by_anchor(_values, (7,), body, friction, *at))
+    return _named(compiled_motion(library, body, friction, *at, with_slopes=False)[0])
 
 
 def chain_slopes(
     body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
 ) -> tuple[BalancedMotion, np.ndarray]:
     """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates)."""
-    library, arguments = (
-        native_kernel(body, friction),
-        (body, friction, angles, rates, delta, solved.anchor, solved.anchor_velocity),
-    )
+    library, at = native_kernel(body, friction), (angles, rates, delta, solved.anchor, solved.anchor_velocity)
     if library is None:
-        return _named(_numpy_values(*arguments)), _numpy_slopes(*arguments)
-    values, slopes = motion(library, *arguments, with_slopes=True)
-    assert slopes is not None
-    return _named(values), slopes
+        found = [_by_anchor(of, rows, body, friction, *at) for of, rows in ((_values, (7,)), (_slopes, (6, 2 * body.n_joint)))]
+    else:
+        found = list(compiled_motion(library, body, friction, *at, with_slopes=True))
+    return _named(found[0]), found[1]
 
 
 def _named(values: np.ndarray) -> BalancedMotion:
@@ -65,14 +56,6 @@ def _by_anchor(
         at = anchor == link
         result[..., at] = of_one(body, friction, angles[:, at], rates[:, at], delta, int(link), anchor_velocity[:, at])
     return result
-
-
-def _numpy_values(body: Links, *arguments) -> np.ndarray:
-    return _by_anchor(_values, (7,), body, *arguments)
-
-
-def _numpy_slopes(body: Links, *arguments) -> np.ndarray:
-    return _by_anchor(_slopes, (N_SLOPES, 2 * body.n_joint), body, *arguments)
 
 
 def _values(

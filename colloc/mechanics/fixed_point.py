@@ -20,11 +20,10 @@ import numpy as np
 
 from colloc.mechanics.balance import Instant, balance_jacobian, dissipation_potential, instant, net_force, secant_matrix
 from colloc.mechanics.balance_results import BalanceSolution
-from colloc.mechanics.compiled_balance import balance
 from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
-from colloc.mechanics.native_kernel import native_kernel
+from colloc.mechanics.native_kernel import compiled_balance, native_kernel
 from colloc.system.errors import ProblemError
 
 
@@ -158,7 +157,7 @@ def solve_balance(
     settings = float(tolerance), int(max_iterations), method
     library = native_kernel(body, friction)
 
-    solved = _numpy_balance if library is None else partial(balance, library)
+    solved = _numpy_balance if library is None else partial(compiled_balance, library)
     found = solved(body, friction, angles, rates, float(delta), start, *settings)
     for link in range(body.n_link if method == "auto" else 0):
         failed = np.flatnonzero(~(found[1] <= tolerance))
@@ -186,7 +185,7 @@ def _numpy_balance(
     max_iterations: int,
     method: str,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Arguments and results as those of `colloc.mechanics.compiled_balance.balance`, which it is the reference of."""
+    """Arguments and results as those of `colloc.mechanics.native_kernel.compiled_balance`, which it is the reference of."""
     n_time = angles.shape[1]
     # work in units of the largest rate, where the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
