@@ -8,6 +8,7 @@ import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant, link_stiffness, total_power
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
+from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.implicit_slopes import implicit_changes
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
@@ -52,9 +53,8 @@ def _by_anchor(
     anchor_velocity: np.ndarray,
 ) -> np.ndarray:
     result = np.empty((*rows, anchor.size))
-    for link in np.unique(anchor):
-        at = anchor == link
-        result[..., at] = of_one(body, friction, angles[:, at], rates[:, at], delta, int(link), anchor_velocity[:, at])
+    for link, at in groups(anchor):
+        result[..., at] = of_one(body, friction, angles[:, at], rates[:, at], delta, link, anchor_velocity[:, at])
     return result
 
 

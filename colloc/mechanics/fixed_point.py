@@ -20,7 +20,7 @@ import numpy as np
 
 from colloc.mechanics.balance import Instant, balance_jacobian, dissipation_potential, instant, net_force, secant_matrix
 from colloc.mechanics.balance_results import BalanceSolution
-from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
+from colloc.mechanics.damped_newton import METHODS, groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import compiled_balance, native_kernel
@@ -37,28 +37,17 @@ class _Batch:
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
         return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Links ``(7, n_link, n)`` (posture, then velocity), net force ``(3, n)`` and merit ``(n,)`` at z.
-
-        The merit is what a step has to reduce: the potential where there is one, else half the squared residual.
-        """
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Links ``(7, n_link, n)``, posture, then velocity, and net force ``(3, n)`` at z."""
         now = self.at(select, z, delta)
-        force = net_force(now.posture, now.force)
-        if self.friction.associated:
-            merit = dissipation_potential(self.body, self.friction, now.velocity, delta)
-        else:
-            merit = 0.5 * np.sum(force * force, axis=0)
-        return np.stack([*now.posture, *now.velocity]), force, merit
+        return np.stack([*now.posture, *now.velocity]), net_force(now.posture, now.force)
 
-    def step(self, links: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
-        """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``."""
-        step = np.empty_like(force)
-        for matrix, chosen in ((balance_jacobian, newton), (secant_matrix, ~newton)):
-            if chosen.any():
-                posture, velocity = Posture(*links[:4, :, chosen]), LinkVelocity(*links[4:, :, chosen])
-                left = matrix(self.body, self.friction, posture, velocity, delta[:, chosen])
-                step[:, chosen] = solve3(left, force[:, chosen])
-        return step
+    def potential(self, links: np.ndarray, delta: np.ndarray) -> np.ndarray:
+        return dissipation_potential(self.body, self.friction, LinkVelocity(*links[4:]), delta)
+
+    def matrix(self, links: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
+        matrix = balance_jacobian if newton else secant_matrix
+        return matrix(self.body, self.friction, Posture(*links[:4]), LinkVelocity(*links[4:]), delta)
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
@@ -204,8 +193,7 @@ def _numpy_balance(
     solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
 
     tail_z = np.empty((3, n_time))
-    for link in np.unique(state.anchor):
-        chosen = np.flatnonzero(state.anchor == link)
-        posture = body.posture(angles[:, chosen], int(link))
-        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], int(link))
+    for link, chosen in groups(state.anchor):
+        posture = body.posture(angles[:, chosen], link)
+        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], link)
     return tail_z * speed, state.residual, state.iterations, state.anchor, state.velocity * speed

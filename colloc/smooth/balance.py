@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
+from colloc.mechanics.damped_newton import groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, PanelGrid, bending_power, mean_velocity, node_velocity
@@ -183,7 +183,8 @@ def solve_smooth(
             # one cheap pass finds what rests, so that the anchor is right before anything is judged
             state = starting_state(anchor, velocity / speed)
             solve(state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
-            for members, batch in _groups(state.anchor, make):
+            for reference, members in groups(state.anchor):
+                batch = make(members, reference)
                 state.anchor[members], state.velocity[:, members] = batch.slowest(state.velocity[:, members], d[:, members])
             state = starting_state(state.anchor, state.velocity)
         else:
@@ -194,7 +195,8 @@ def solve_smooth(
         velocity = state.velocity * speed
 
         split = np.zeros((grid.n, active.size), dtype=bool)
-        for members, batch in _groups(state.anchor, make):
+        for reference, members in groups(state.anchor):
+            batch = make(members, reference)
             chosen, z = active[members], state.velocity[:, members]
             own, body = PanelGrid(edges[:, members], order), Curve(*batch.curve)
             vs, vn = node_velocity(body, z)
@@ -226,13 +228,6 @@ def solve_smooth(
         active, velocity, edges = active[more], velocity[:, more], _split(edges[:, more], split[:, more])
         anchor = np.argmax(edges == anchor_at, axis=0)
     return SmoothSolution(t, z_tail, **out, panels=n_panel, iterations=iterations, tolerance=tolerance)
-
-
-def _groups(anchor: np.ndarray, make):
-    """Instants by anchor, with their batch."""
-    for reference in np.unique(anchor):
-        members = np.flatnonzero(anchor == reference)
-        yield members, make(members, int(reference))
 
 
 def _panel_error(
