@@ -41,7 +41,7 @@ from benchmarks.reach import Test, load, save
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("colloc", "tests", "benchmarks", "problems", "studies", "scripts", "docs", "results", "pyproject.toml", "README.md")
-_NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "argument_names")
+_NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "arguments")
 """What no result rests on."""
 TESTS = {
     "bounds": ("tests/bounds",),

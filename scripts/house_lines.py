@@ -35,7 +35,7 @@ NEW = {
     "prescribed motions as problems": "gaits/prescribed smooth/prescribed_body search/prescribed",
     "the multipliers of a bound as a measure, bounds checked again": "bounds/measure bounds/recheck bounds/knots",
     "a problem file begun, archives opened, the Tab key": "commands/init commands/open commands/completion",
-    "commands as functions, for notebooks": "studies/calls system/late_binding system/argument_names",
+    "commands as functions, for notebooks": "studies/calls system/late_binding system/arguments",
     "grids on a cluster": "system/dask_pool",
     "Ctrl-C at any moment, folders of one's own": "system/early_interruption system/private_folder",
 }

@@ -16,7 +16,7 @@ from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_a
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction, imaged, reduced
 from colloc.numerics.arcs import advance, direction
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import check_positive, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _BESIDE = 1e-10
@@ -167,12 +167,10 @@ class FreePath(ClassOfGaits):
     of_arcs = True
 
     def __post_init__(self) -> None:
-        value = self.curvature
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
-            raise ProblemError(f"gait.curvature must be a positive finite number, not {value!r}.")
+        check_positive(self, "curvature", of="gait.")
         self._check_symmetry()
         if self.winding is not None:
-            if isinstance(self.winding, bool) or not isinstance(self.winding, (int, np.integer)):
+            if not is_whole(self.winding):
                 raise ProblemError(f"gait.winding must be a whole number, not {self.winding!r}.")
             if self.symmetry == ANTIPODAL and self.winding % 2 == 0:
                 raise ProblemError(f"gait.winding must be odd for an antipodal path, not {self.winding}.")

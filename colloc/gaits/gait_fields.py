@@ -30,7 +30,7 @@ from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
-from colloc.system.argument_names import STATED_IF_SET
+from colloc.system.arguments import STATED_IF_SET
 
 AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _COARSE = 16
@@ -151,7 +151,7 @@ class Harmonic(ClassOfGaits):
     moves_knots = True
 
     def __post_init__(self) -> None:
-        if not isinstance(self.harmonics, (int, np.integer)) or not 1 <= self.harmonics <= 64:
+        if not is_whole(self.harmonics, 1, 64):
             raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
         self._check_symmetry()
 

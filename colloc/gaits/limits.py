@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.bodies import Body
+from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 Limit = float | tuple[float, ...]
@@ -66,5 +67,4 @@ def checked_actuator_limit(name: str, limit: Any, n_joint: int) -> Limit | None:
 def _each(limit: Any) -> tuple[float, ...]:
     """The limits one by one; none if they are no numbers."""
     each = np.ravel(np.asarray(limit, dtype=object))
-    numbers = all(isinstance(a, (int, float, np.number)) and not isinstance(a, bool) for a in each)
-    return tuple(float(a) for a in each) if numbers else ()
+    return tuple(float(a) for a in each) if all(map(is_number, each)) else ()

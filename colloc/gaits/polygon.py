@@ -12,7 +12,7 @@ import numpy as np
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, both_halves, fraction, imaged, reduced
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _MOST_TOLD = 64
@@ -126,14 +126,14 @@ class Polygon(ClassOfGaits):
     delta_start = DELTA_START
 
     def __post_init__(self) -> None:
-        if isinstance(self.corners, bool) or not isinstance(self.corners, (int, np.integer)) or not 2 <= self.corners <= 64:
+        if not is_whole(self.corners, 2, 64):
             raise ProblemError(f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}.")
         self._check_symmetry()
         if self.axis not in ("corner", "side"):
             raise ProblemError(f"gait.axis must be 'corner' or 'side', not {self.axis!r}.")
         if self.symmetry == ANTIPODAL and self.corners % 2:
             raise ProblemError(f"an antipodal polygon has an even number of corners, not {self.corners}.")
-        if not isinstance(self.shortest_side, (int, float, np.number)) or not 0 < self.shortest_side < np.pi:
+        if not (is_number(self.shortest_side) and 0 < self.shortest_side < np.pi):
             raise ProblemError(f"gait.shortest_side must lie in (0, pi), not {self.shortest_side!r}.")
 
     def intervals(self, n_joint: int) -> int:

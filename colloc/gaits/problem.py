@@ -24,7 +24,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 SMALLEST_DELTA = 1e-14
@@ -170,7 +170,7 @@ class Problem:
     def _check_numbers(self) -> None:
         for field in ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+            if not is_number(value):
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
         if self.delta <= 0:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
@@ -189,7 +189,7 @@ class Problem:
         if self.formulation not in self.body.formulations:
             known = ", ".join(self.body.formulations)
             raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
-        if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
+        if not is_whole(self.intervals):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
         self._check_resolution()
         if self.intervals > 100_000:
@@ -198,7 +198,7 @@ class Problem:
     def _check_aims(self) -> None:
         object.__setattr__(self, "objective", objective_from(self.objective))
         object.__setattr__(self, "at_least", least_values(self.at_least))
-        if self.rotation is not None and (isinstance(self.rotation, bool) or not abs(self.rotation) < np.inf):
+        if self.rotation is not None and not is_number(self.rotation):
             raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
         if self.rotation == 0 and self.uses("rotation"):
             raise ProblemError("the objective speaks of the rotation, which is 0 unless rotation says otherwise (None: free).")

@@ -17,6 +17,7 @@ from colloc.gaits.gait import DELTA_START, ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, SYMMETRIES, fraction
+from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 
 _IDLE = 1e-9
@@ -161,7 +162,7 @@ class Mixture:
 
     def unmixed(self, repeats: int = 1, sense: int = 1) -> Mixture:
         """The directions of every piece one after the other, `repeats` times: pieces of one direction; see `realised`."""
-        if isinstance(repeats, bool) or not isinstance(repeats, (int, np.integer)) or repeats < 1:
+        if not is_whole(repeats, 1):
             raise ProblemError(f"a mixture is realised by a whole number of repeats, at least 1, not {repeats!r}.")
         least = _IDLE * self.durations.sum()
         sides: list[np.ndarray] = []
@@ -221,11 +222,7 @@ class Relaxed(ClassOfGaits):
     delta_start = DELTA_START
 
     def __post_init__(self) -> None:
-        if (
-            isinstance(self.directions, bool)
-            or not isinstance(self.directions, (int, np.integer))
-            or not 1 <= self.directions <= 9
-        ):
+        if not is_whole(self.directions, 1, 9):
             raise ProblemError(f"gait.directions must be a whole number from 1 to 9, not {self.directions!r}.")
         self._check_symmetry()
 

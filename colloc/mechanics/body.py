@@ -27,7 +27,7 @@ from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.numerics.arrays import Array, namespace
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import named_arguments
 
 
 @named_arguments

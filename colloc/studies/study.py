@@ -17,6 +17,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import stated_names
+from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 
 Index = tuple[int, ...]
@@ -124,14 +125,9 @@ class Study:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
         if not callable(self.problem):
             raise ProblemError("problem must be a function from coordinates to a Problem.")
-        for field, least in (
-            ("cold_starts", 0),
-            ("warm_starts", 1),
-            ("chunk", 1),
-            ("seed", 0),
-        ):
+        for field, least in (("cold_starts", 0), ("warm_starts", 1), ("chunk", 1), ("seed", 0)):
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            if not is_whole(value, least):
                 raise ProblemError(f"{field} must be a whole number, at least {least}, not {value!r}.")
         if not (self.time_limit > 0 and self.warm_delta_start > 0):
             raise ProblemError("time_limit and warm_delta_start must be positive.")
