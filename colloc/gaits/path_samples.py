@@ -36,9 +36,9 @@ class Gait(Protocol):
     def rates(self, t: np.ndarray) -> np.ndarray: ...
 
 
-def path_length(gait: Gait, count: int = _DENSE) -> float:
+def path_length(gait: Gait) -> float:
     """Length of the closed path of a gait [rad], which is its mean shape speed per period."""
-    points = gait.angles(np.linspace(0.0, 1.0, count + 1))
+    points = gait.angles(np.linspace(0.0, 1.0, _DENSE + 1))
     return float(np.linalg.norm(np.diff(points), axis=0).sum())
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from colloc.gaits.gait import DELTA_START, ClassOfGaits
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.polygon import Corners
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, SYMMETRIES, fraction
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, SYMMETRIES
 from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 
@@ -72,6 +72,11 @@ class Mixture:
         """Joint angles where pieces meet, ``(n_joint, n_piece + 1)``."""
         steps = np.einsum("nk,nkj->jn", self.durations, self.directions)
         return self.start[:, None] + np.concatenate([np.zeros((self.n_joint, 1)), np.cumsum(steps, axis=1)], axis=1)
+
+    @property
+    def shares(self) -> np.ndarray:
+        """Of the time of every piece, that its directions take ``(n_piece, n_direction)``."""
+        return self.durations / np.maximum(self.durations.sum(axis=1, keepdims=True), 1e-300)
 
     @cached_property
     def whole(self) -> Mixture:
@@ -133,8 +138,7 @@ class Mixture:
     def mixed_rates(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rates per period in each direction ``(n_direction, n_joint, n_time)``, and its share ``(n_direction, n_time)``."""
         whole, k = self.whole, self._piece(np.asarray(t))
-        shares = whole.durations / np.maximum(whole.durations.sum(axis=1, keepdims=True), 1e-300)
-        return self.length * whole.directions[k].transpose(1, 2, 0), shares[k].T
+        return self.length * whole.directions[k].transpose(1, 2, 0), whole.shares[k].T
 
     def rates(self, t: np.ndarray) -> np.ndarray:
         """Rates of the mean shape ``(n_joint, n_time)`` per period."""
@@ -260,8 +264,3 @@ def _turned(steps: np.ndarray, sense: int) -> np.ndarray:
     """Steps ``(n, n_joint)`` in the order of their angle in the plane in which they differ most."""
     plane = np.linalg.svd(steps - steps.mean(axis=0))[2][:2] if steps.shape[1] > 2 else np.eye(2)
     return steps[np.argsort(sense * np.arctan2(*(plane[::-1] @ steps.T)))]
-
-
-def corners_of(gait: Corners) -> int:
-    """Corners of a polygon over the whole period."""
-    return gait.corners.shape[1] if gait.symmetry == NONE else round((gait.corners.shape[1] - 1) / fraction(gait.symmetry))

@@ -8,8 +8,6 @@ hypercube over the harmonics, times a fraction of the largest amplitude that is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyClass, AnyGait
@@ -32,6 +30,7 @@ _FRACTIONS = (0.2, 0.95)
 _PHASES = 200
 _ATTEMPTS = 200
 _CLEARLY_MOVING = 1.5
+_SPREAD = 0.3
 _ON_FLOOR = 1e-4
 _SHORT = 1.002
 """An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
@@ -105,23 +104,21 @@ def _multiplied(problem: Problem, drawn: Fourier, fraction: float) -> Fourier:
     return Fourier(factor * gait.mean, factor * gait.cos, factor * gait.sin)
 
 
-def perturbed_gait(problem: Problem, optima: Sequence[AnyGait], seed: int, start: int, spread: float = 0.3) -> Fourier:
-    """Start number `start` near a known optimum: optima take turns, coefficients move by normals of `spread` [rad].
+def perturbed_gait(problem: Problem, seed: int, start: int) -> Fourier:
+    """Start number `start` near the problem's own guess, whose coefficients move by normals of 0.3 rad.
 
     Where that leaves the admissible region, the whole gait is shrunk back into it.
     """
-    if not optima:
-        raise ProblemError("perturbed starts need at least one known optimum.")
     rng = np.random.default_rng([seed, start])
-    near = fourier_through(optima[start % len(optima)], seed_class(problem)).resized(seed_class(problem).harmonics)
+    near = fourier_through(problem.guess, seed_class(problem)).resized(seed_class(problem).harmonics)
     for _ in range(_ATTEMPTS):
-        mean, cos, sin = (a + spread * rng.standard_normal(a.shape) for a in (near.mean, near.cos, near.sin))
+        mean, cos, sin = (a + _SPREAD * rng.standard_normal(a.shape) for a in (near.mean, near.cos, near.sin))
         drawn = Fourier(mean, cos, sin)
         member = seed_class(problem).fourier(seed_class(problem).parameters(drawn), problem.body.n_joint)
         gait = _multiplied(problem, member, min(1.0, 1.0 / largest_amplitude(problem, member)))
         if gait.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
-    raise ProblemError(f"found no admissible start within {spread:g} rad of the known optimum; change the spread.")
+    raise ProblemError(f"found no admissible start within {_SPREAD:g} rad of the guess.")
 
 
 def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> Fourier:
@@ -129,7 +126,7 @@ def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> Fourier
     if sampler not in SAMPLERS:
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {sampler!r}.")
     if sampler == PERTURBED:
-        return perturbed_gait(problem, [problem.guess], seed, start)
+        return perturbed_gait(problem, seed, start)
     return latin_hypercube_gait(problem, seed, start)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from colloc.gaits.polygon import Corners
-from colloc.gaits.relaxed import Mixture, corners_of
+from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import Certificate
 
 
@@ -33,7 +33,7 @@ class Realised:
     @property
     def corners(self) -> int:
         """Over the whole period."""
-        return corners_of(self.gait)
+        return self.gait.n_corner
 
     def line(self) -> str:
         """Repeats, what they lead to, and whether it is certified."""

@@ -19,7 +19,8 @@ from colloc.smooth.curve import Curve, PanelGrid, bending_power, mean_velocity, 
 from colloc.smooth.motion import Motion
 from colloc.system.errors import NotConvergedError, ProblemError
 
-_MOST_PANELS = 600
+_MOST_PANELS, _REFINEMENTS = 600, 40
+"""Of an instant, and halvings of a panel."""
 _ROUNDING = 1e-15
 
 
@@ -118,7 +119,6 @@ def solve_smooth(
     quadrature_tolerance: float = 1e-10,
     tolerance: float = 1e-11,
     max_iterations: int = 2000,
-    refinements: int = 40,
     regions: tuple[tuple[float, float], ...] = (),
     method: str = "auto",
     slide: np.ndarray | None = None,
@@ -140,8 +140,6 @@ def solve_smooth(
         Largest net force or torque over the largest coefficient at which an instant counts as converged.
     max_iterations : int
         As in `colloc.mechanics.fixed_point.solve_balance`.
-    refinements : int
-        Most halvings of a panel.
     regions : tuple of (float, float)
         Arcs whose power is reported separately; their ends should be breaks of the motion.
     method : {"auto", "newton", "fixed_point"}
@@ -166,7 +164,7 @@ def solve_smooth(
     if slide is not None:
         anchor, velocity = np.zeros(n, dtype=int), slide.copy()
         velocity[2] += motion.rate(np.zeros((1, n)), t)[0]
-    for level in range(refinements + 1):
+    for level in range(_REFINEMENTS + 1):
         grid = PanelGrid(edges, order)
         # work in units of the largest rate: the law is homogeneous once delta scales along
         unit = np.ones(active.size) if friction.degree is None else None
@@ -222,7 +220,7 @@ def solve_smooth(
         n_panel[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
 
         more = split.any(axis=0) & (n_panel[active] < _MOST_PANELS) & (state.residual <= tolerance)
-        if quadrature_tolerance == 0 or level == refinements or not more.any():
+        if quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
         active, velocity, edges = active[more], velocity[:, more], _split(edges[:, more], split[:, more])
