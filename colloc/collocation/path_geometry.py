@@ -9,7 +9,7 @@ from scipy import sparse
 
 from colloc.collocation.path_equations import Piece, arc, chord, excess_turn, placed_check, side, side_lengths, unit_norm
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.gaits.free_path import ArcPath, FreePath
+from colloc.gaits.free_path import ArcPath, FreePath, across_the_axis
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
@@ -72,13 +72,9 @@ def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndar
 def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
     n_cell = geometry.start.size
     for check in geometry.checks:
-        name = check.name
-        function = placed_check(check, geometry.piece)
         given = np.vstack([geometry.given(np.full(n_cell, 0.5)), np.full(n_cell, -1.0)])
-        geometry.blocks[name] = (function, geometry.shape, given)
-        lower, upper = (np.full(n_cell, bound) for bound in check.bounds(problem.joint_limit))
-        rows = sparse.csr_matrix((n_cell, n))
-        geometry.groups.append(Group(name, lower, upper, rows, {name: sparse.eye(n_cell, format="csr")}))
+        geometry.blocks[check.name] = (placed_check(check, geometry.piece), geometry.shape, given)
+        geometry.groups.append(check.group(problem.joint_limit, n_cell, n))
 
 
 def _nested(mesh: Mesh, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -138,7 +134,7 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
         winding = near.winding if gait.winding is None else gait.winding
         turned = 2 * np.pi * gait.fraction * float(winding or 0)
         if symmetry == BILATERAL:
-            first = np.pi * np.round((near.tangents[0, 0] - np.pi / 4) / np.pi) + np.pi / 4
+            first = across_the_axis(near.tangents[0, 0])
             for place, value in ((tangents[0, 0], first), (tangents[0, -1], first + turned)):
                 geometry.lower[place] = geometry.upper[place] = value
         else:

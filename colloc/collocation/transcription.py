@@ -34,7 +34,7 @@ from colloc.collocation.point_equations import (
     point_function,
 )
 from colloc.collocation.program import GaitProgram, Implicit, assembled
-from colloc.collocation.shape_checks import ShapeCheck, shape_checks
+from colloc.collocation.shape_checks import shape_checks
 from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
@@ -107,7 +107,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         *_orientation_groups(problem, mesh, layout),
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
         quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
-        *(_check_group(check, problem, mesh.n, layout.n) for check in checks),
+        *(check.group(problem.joint_limit, mesh.n, layout.n) for check in checks),
         Group(
             "shape speed",
             np.array([problem.smallest_shape_speed**2]),
@@ -160,8 +160,3 @@ def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Gr
         equalities("orientation", linear),
         *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n, problem.rotation),
     ]
-
-
-def _check_group(check: ShapeCheck, problem: Problem, n_cell: int, n: int) -> Group:
-    lower, upper = (np.full(n_cell, bound) for bound in check.bounds(problem.joint_limit))
-    return Group(check.name, lower, upper, sparse.csr_matrix((n_cell, n)), {check.name: sparse.eye(n_cell, format="csr")})

@@ -230,3 +230,8 @@ class FreePath(ClassOfGaits):
     def parameters(self, path: ArcPath) -> np.ndarray:
         """The parameter vector of a member."""
         return np.concatenate([[path.length / (2 * np.pi)], path.tangents.ravel(order="F"), path.shapes.ravel(order="F")])
+
+
+def across_the_axis(heading: float) -> float:
+    """The heading next to a given one [rad] at which a bilateral path of two joints crosses its axis, angle 1 = -angle 2."""
+    return float(np.pi * np.round((heading - np.pi / 4) / np.pi) + np.pi / 4)

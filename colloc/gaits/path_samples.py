@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.gaits.free_path import ArcPath, FreePath
+from colloc.gaits.free_path import ArcPath, FreePath, across_the_axis
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, fraction
@@ -131,7 +131,7 @@ def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> n
         winding += 1
     first = 0.0
     if target.symmetry == BILATERAL:
-        first = np.pi * np.round((headings[0, 0] - np.pi / 4) / np.pi) + np.pi / 4 - headings[0, 0]
+        first = across_the_axis(headings[0, 0]) - headings[0, 0]
     return first + at * (winding * unit - turned)
 
 

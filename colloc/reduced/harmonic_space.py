@@ -97,11 +97,9 @@ class HarmonicSpace:
             times = times + later * self.mesh.h[cells]
             values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
             self._placed.append((check, held_shares(check, gait, times), matrix))
-            excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.bounds(limit)
-            # of the two bounds on an angle the nearer one
-            below = values - lower < upper - values
-            low.append(np.where(below, lower, -np.inf))
-            high.append(np.where(below, np.inf, upper))
+            excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
+            low.append(lower)
+            high.append(upper)
         self.watched["shape speed"] = np.zeros(1, dtype=int)
         self.row_lower = np.concatenate([*low, [self.problem.smallest_shape_speed**2]])
         self.row_upper = np.concatenate([*high, [np.inf]])
