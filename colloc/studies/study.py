@@ -36,8 +36,6 @@ class Axis:
         In the order in which starts travel.
     label, units : str
         For figures and files; the name, and "1", by default.
-    logarithmic : bool
-        For figures.
     travels : bool
         Whether warm starts travel along this axis.
 
@@ -52,7 +50,6 @@ class Axis:
     values: tuple
     label: str = ""
     units: str = "1"
-    logarithmic: bool = False
     travels: bool = True
 
     def __post_init__(self) -> None:
