@@ -57,6 +57,17 @@ def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
     return gait.shape_speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
+def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndarray:
+    """Points ``(n, dimension)`` of the unit cube, one in every n-th of each coordinate (McKay, Beckman and Conover, 1979).
+
+    Those of `scipy.stats.qmc`, which takes half a second to load: a tenth of a whole search.
+    """
+    within, order = rng.uniform(size=(n, dimension)), np.tile(np.arange(1, n + 1), (dimension, 1))
+    for coordinate in order:
+        rng.shuffle(coordinate)
+    return (order.T - within) / n
+
+
 def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
     """Start number `start` of a Latin hypercube over the mean and the harmonics of the problem's class of gaits.
 
@@ -70,10 +81,8 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
     block, row = divmod(start, BLOCK)
     n_joint, harmonics = problem.body.n_joint, seed_class(problem).harmonics
     dimension = n_joint * (2 * harmonics + 1) + 1
-    rng = np.random.default_rng([seed, block])
-    from scipy.stats import qmc  # half a second to load, which a single solve need not wait for
-
-    unit = qmc.LatinHypercube(dimension, seed=rng).random(BLOCK)[row]
+    rng = np.random.default_rng([seed, block]).spawn(1)[0]  # as newer releases of SciPy do
+    unit = latin_hypercube(BLOCK, dimension, rng)[row]
     again = np.random.default_rng([seed, block, row + 1])
     for _ in range(_ATTEMPTS):
         gait = _scaled(problem, unit)

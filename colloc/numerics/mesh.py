@@ -7,6 +7,7 @@ stage is the left end share it with the neighbour. *Sites* carry a state: every 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -25,18 +26,18 @@ class Mesh:
     def n(self) -> int:
         return len(self.edges) - 1
 
-    @property
+    @cached_property
     def h(self) -> np.ndarray:
         """Interval lengths, ``(n,)``."""
         return np.diff(self.edges)
 
-    @property
+    @cached_property
     def points(self) -> np.ndarray:
         """``(n, s)``: index of each interval's stages among the points."""
         stride = self.scheme.s - self.scheme.left
         return np.arange(self.n)[:, None] * stride + np.arange(self.scheme.s)
 
-    @property
+    @cached_property
     def n_point(self) -> int:
         return int(self.points[-1, -1]) + 1
 

@@ -19,7 +19,7 @@ from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import Pairs
-from colloc.numerics.blocks import as_sparse, oracles
+from colloc.numerics.columns import ChosenRows, ColumnFunction
 from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import minimised, remembered
@@ -58,30 +58,29 @@ class PathSpace:
         stated = problem.with_(scheme=scheme or problem.scheme)
         self._fit = fit = transcribe_fit(stated, near, edges, far)
         self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
-        self._oracles = oracles(fit.assembly)
-        nlp = self._oracles.nlp
-        self._row_values = ca.Function("rows", [nlp["x"], nlp["p"]], [nlp["g"]])
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
         gait, n_joint = problem.gait, problem.body.n_joint
         self.shapes, self._arcs = np.arange(fit.lower.size), gait.of_arcs
         self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
+        self._side = 1.0 if gait.symmetry == NONE else -1.0
         self.own = np.arange(fit.lower.size)
         if self._arcs:
             speed, tangents, shapes = gait.split(self.own, n_joint)
-            self._tangents, self.shapes = tangents, shapes
+            self._speed, self._tangents, self.shapes = speed[0, 0], tangents, shapes
             last = tangents[:, : -1 if self._closed else None]
             self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
             self.own = self.own[free[self.own]]
-            self._chord, self._on_arcs, self._arc_h = self._geometry.blocks["chord"]
+            chord, self._on_arcs, arc_h = self._geometry.blocks["chord"]
+            self._chord, self._chord_slope = ColumnFunction(chord.value), ColumnFunction(chord.jacobian)
+            self._chord_entries, self._along = (chord.jac_row, chord.jac_col), (arc_h, np.zeros_like(arc_h))
         self.n = self.own.size
         self.lower, self.upper = fit.lower[self.own], fit.upper[self.own]
         dropped = _FOLLOWS[: 2 if gait.symmetry == BILATERAL else 3] if self._arcs else ()
         checked = [check.name for check in fit.checks]
         self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in fit.groups.items() if n not in (*dropped, *checked)}
-        self._kept = np.empty(0, dtype=int)
         self._place()
-        self._followed, self._framed = remembered(self._follow), remembered(self._frame)
+        self._followed, self._steep = remembered(self._follow), remembered(self._chord_jacobian)
         self.move_checks(self.laid(near))
 
     def _place(self) -> None:
@@ -90,7 +89,8 @@ class PathSpace:
         out = ca.vertcat(piece.angles, piece.direction, piece.speed)
         arguments = [piece.shape, piece.given]
         slope = ca.densify(ca.vec(ca.jacobian(out, piece.shape)))
-        self._value, self._slope = ca.Function("place", arguments, [out]), ca.Function("slope", arguments, [slope])
+        self._value = ColumnFunction(ca.Function("place", arguments, [out]))
+        self._slope = ColumnFunction(ca.Function("slope", arguments, [slope]))
         self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
         self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
         self._scatter = selector(self._gather.ravel(), self._fixed.size)
@@ -99,51 +99,57 @@ class PathSpace:
         """The parameters of `colloc.gaits.free_path`: shapes where arcs meet follow from the start."""
         return self._followed(v).copy()
 
-    def _follow(self, v: np.ndarray) -> np.ndarray:
+    def _raw(self, v: np.ndarray) -> np.ndarray:
+        """Full parameters with tangents of any length, and shapes only at the start."""
         p = self._fixed.copy()
         p[self.own] = v
+        if self._closed:
+            p[self._tangents[:, -1]] = self._side * p[self._tangents[:, 0]]
+        return p
+
+    def _follow(self, v: np.ndarray) -> np.ndarray:
+        p = self._raw(v)
         if self._arcs:
-            tangents = p[self._tangents]
-            if tangents.shape[0] > 1:
-                if self._closed:
-                    tangents[:, -1] = tangents[:, 0] * (1 if self.problem.gait.symmetry == NONE else -1)
-                p[self._tangents] = tangents / np.linalg.norm(tangents, axis=0)
-            step = self._chord.value(p[self._on_arcs], self._arc_h, 0.0).full()
+            if len(self._tangents) > 1:
+                p[self._tangents] /= np.linalg.norm(p[self._tangents], axis=0)
+            step = self._chord(p[self._on_arcs], *self._along)
             start = p[self.shapes[:, :1]]
             p[self.shapes] = np.concatenate([start, start + np.cumsum(step, axis=1)], axis=1)
         return p
 
-    def frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Full parameters ``(m,)`` and their derivatives ``(m, n)``."""
-        return self._framed(v)
-
-    def _frame(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        p, frame = self.full_parameters(v), np.zeros((self._fixed.size, self.n))
-        frame[self.own, np.arange(self.n)] = 1.0
+    def from_full(self, v: np.ndarray, on_full: np.ndarray) -> np.ndarray:
+        """Derivatives ``(k, n)`` along v of k numbers, from those along the full parameters, ``(k, m)``: one sweep back."""
         if not self._arcs:
-            return p, frame
-        if self._tangents.shape[0] > 1:
-            raw = self._fixed.copy()
-            raw[self.own] = v
-            for edge, rows in enumerate(self._tangents.T):
-                sign, source = 1.0, rows
-                if self._closed and edge == self._tangents.shape[1] - 1:
-                    sign, source = 1.0 if self.problem.gait.symmetry == NONE else -1.0, self._tangents[:, 0]
-                size = np.linalg.norm(raw[source])
-                unit = raw[source] / size
-                own = np.zeros((rows.size, self.n))
-                own[:, np.searchsorted(self.own, source)] = (np.eye(rows.size) - np.outer(unit, unit)) * sign / size
-                frame[rows] = own
-        local = self._on_arcs
-        f = self._chord
-        nonzeros = f.jacobian(p[local], self._arc_h, 0.0).full()
-        n_joint, n = self.shapes.shape[0], local.shape[1]
-        jacobian = np.zeros((n, n_joint, f.n_local))
-        jacobian[:, f.jac_row, f.jac_col] = nonzeros.T
-        # a chord does not depend on where the arc starts, so the frame of the shapes is not needed for it
-        step = np.einsum("kjs,ksn->kjn", jacobian, frame[local.T])
-        frame[self.shapes[:, 1:].T] = frame[self.shapes[:, 0]] + np.cumsum(step, axis=0)
-        return p, frame
+            return on_full[:, self.own]
+        on, shapes, tangents = on_full.copy(), self.shapes, self._tangents
+        on_shapes = on_full[:, shapes]
+        # a step moves all shapes after it; it does not depend on where it starts
+        later = np.cumsum(on_shapes[:, :, :0:-1], axis=2)[:, :, ::-1]
+        on_arcs = np.einsum("kja,ajs->ksa", later, self._steep(v))
+        on[:, shapes[:, 0]] = on_shapes.sum(axis=2)
+        on[:, self._speed] += on_arcs[:, -1].sum(axis=1)
+        rows = len(tangents)
+        on[:, tangents[:, :-1]] += on_arcs[:, len(shapes) : len(shapes) + rows]
+        on[:, tangents[:, 1:]] += on_arcs[:, len(shapes) + rows : -1]
+        if rows > 1:
+            if self._closed:
+                on[:, tangents[:, 0]] += self._side * on[:, tangents[:, -1]]
+            raw = self._raw(v)[tangents]
+            length = np.linalg.norm(raw, axis=0)
+            along, unit = on[:, tangents], raw / length
+            on[:, tangents] = (along - (along * unit).sum(axis=1, keepdims=True) * unit) / length
+        return on[:, self.own]
+
+    def _chord_jacobian(self, v: np.ndarray) -> np.ndarray:
+        """How far every arc leads, derived by its locals ``(n_arc, n_joint, n_local)``."""
+        local = self.full_parameters(v)[self._on_arcs]
+        jacobian = np.zeros((local.shape[1], len(self.shapes), len(local)))
+        jacobian[:, *self._chord_entries] = self._chord_slope(local, *self._along).T
+        return jacobian
+
+    def frame(self, v: np.ndarray) -> np.ndarray:
+        """Derivatives of the shapes where pieces meet, edge by edge, ``(n_joint n_edge, n)``."""
+        return self.from_full(v, np.eye(self._fixed.size)[self.shapes.ravel(order="F")])
 
     def member(self, v: np.ndarray) -> ArcPath | Corners:
         """The gait of parameters v."""
@@ -198,17 +204,17 @@ class PathSpace:
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
-        out = self._value(self.full_parameters(v)[self._gather], self._given).full()
+        out = self._value(self.full_parameters(v)[self._gather], self._given).copy()
         angles, rates = np.split(out[:-1], 2)
         return angles, rates, out[-1]
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         """See `colloc.reduced.motion.Shapes`."""
-        p, frame = self.frame(v)
         n_out, n_shape = on_shape.shape[2] + 1, self._gather.shape[0]
-        slope = self._slope(p[self._gather], self._given).full().T.reshape(-1, n_shape, n_out)
-        on_local = np.einsum("kto,tso->kst", np.concatenate([on_shape, on_pace[:, :, None]], axis=2), slope)
-        return (on_local.reshape(on_local.shape[0], -1) @ self._scatter) @ frame
+        slope = self._slope(self.full_parameters(v)[self._gather], self._given).T.reshape(-1, n_shape, n_out)
+        on_out = np.concatenate([on_shape, on_pace[:, :, None]], axis=2)
+        on_local = (slope @ on_out.transpose(1, 2, 0)).transpose(2, 1, 0)
+        return self.from_full(v, on_local.reshape(len(on_local), -1) @ self._scatter)
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
         """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad]."""
@@ -226,10 +232,9 @@ class PathSpace:
             given[check.name][:-1] = self._geometry.given(tau)
             given[check.name][-1, cells] = held_shares(check, gait, times)
             excess = max(excess, float(check.excess(values, limit).max()))
-        self._kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
-        self.row_lower, self.row_upper = fit.constraint_lower[self._kept], fit.constraint_upper[self._kept]
-        objective = fit.assembly.objective.parameters
-        self._moved = self._oracles.parameter_vector(1.0, [objective, *given.values()])
+        kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
+        self.row_lower, self.row_upper = fit.constraint_lower[kept], fit.constraint_upper[kept]
+        self._rows = ChosenRows(fit.assembly, kept, list(given.values()))
         return excess
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
@@ -240,19 +245,17 @@ class PathSpace:
         """
         if not self._arcs:
             return None
-        frame = self.frame(v)[1][self.shapes.ravel()]
+        frame = self.frame(v)
         metric = frame.T @ frame / len(self.shapes.T)
         return np.asarray(metric + _SOFT * metric.diagonal().max() * np.eye(self.n))
 
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""
-        return self._row_values(self.full_parameters(v), self._moved).full().ravel()[self._kept]
+        return self._rows.values(self.full_parameters(v))
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        p, frame = self.frame(v)
-        jacobian = self._oracles.options["jac_g"](p, self._moved)[1]
-        return np.asarray(as_sparse(jacobian)[self._kept] @ frame)
+        return self.from_full(v, self._rows.slopes(self.full_parameters(v)))
 
 
 class _Nearest:
@@ -266,15 +269,19 @@ class _Nearest:
 
     def objective(self, v: np.ndarray) -> float:
         """Half the sum of squared distances of the shapes."""
-        return 0.5 * float(np.sum((self.space.full_parameters(v) - self._target)[self._shapes] ** 2))
+        return 0.5 * float(np.sum(self._apart(v) ** 2))
 
     def gradient(self, v: np.ndarray) -> np.ndarray:
         """Of the objective."""
-        p, frame = self.space.frame(v)
-        return (p - self._target)[self._shapes] @ frame[self._shapes]
+        on_full = np.zeros((1, self._target.size))
+        on_full[0, self._shapes] = self._apart(v)
+        return self.space.from_full(v, on_full)[0]
+
+    def _apart(self, v: np.ndarray) -> np.ndarray:
+        return (self.space.full_parameters(v) - self._target)[self._shapes]
 
     def curvature(self, v: np.ndarray) -> np.ndarray:
         """Of the objective near the target (Gauss and Newton); lengths of tangents, which nothing depends on, keep a little."""
-        frame = self.space.frame(v)[1][self._shapes]
+        frame = self.space.frame(v)
         metric = frame.T @ frame
         return metric + _LEAST_CURVATURE * metric.diagonal().max() * np.eye(v.size)

@@ -23,13 +23,15 @@ from colloc.search.literal_search import literal_optimum
 from colloc.search.prescribed import measured
 from colloc.search.reduced_search import FACTOR, Found, descended, refined, searched
 from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
-from colloc.search.saddles import off_saddles
+from colloc.search.saddles import below_saddle
 from colloc.system.errors import NotConvergedError
 
 TRIVIAL_EFFICIENCY = 1e-4
 """Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
 TRIVIAL_ROTATION = 1e-3
 """Rotation a period [rad] from which a gait that goes nowhere turns."""
+_SADDLES = 3
+"""Saddles left one after another."""
 _DRIER = 2
 """Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous."""
 FINER = "a smaller mesh_tolerance"
@@ -85,17 +87,20 @@ def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[L
         report(level_found(found))
 
     if before:
-        done = Solution(problem, before)
-        stated = scaled.with_(body=done.resolved.body)
-        space, v = space_near(stated, done.gait, done.last.edges, done.last.scheme)
-        found, lacks = refined(descended(Found.at(space, v, done.last.delta), scaled, ended), ended)
+        found, lacks = refined(descended(_last_found(scaled, Solution(problem, before)), scaled, ended), ended)
     else:
         found, lacks = searched(scaled, scaled.guess, ended)
-    found, lacks = off_saddles(found, lacks, ended)
     level, fails = answer(found)
     report(level)
     message = " ".join(part for part in (fails, lacks) if part)
     return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)
+
+
+def _last_found(scaled: Problem, done: Solution) -> Found:
+    """The gait of the last level, for a search to go on from, of the problem in units of its friction."""
+    stated = scaled.with_(body=done.resolved.body)
+    space, v = space_near(stated, done.gait, done.last.edges, done.last.scheme)
+    return Found.at(space, v, done.last.delta)
 
 
 def maximise_efficiency(
@@ -135,18 +140,40 @@ def maximise_efficiency(
         )
     else:
         _certified(solution)
-        for _ in range(_DRIER if problem.gait.free and not literal else 0):
-            if not _is_small_and_viscous(solution):
-                break
-            solution = _at_smaller_delta(solution, problem.delta, on_level)
+        if problem.gait.free and not literal:
+            solution = _off_saddles(solution, on_level)
+            for _ in range(_DRIER):
+                if not _is_small_and_viscous(solution):
+                    break
+                solution = _at_smaller_delta(solution, problem.delta, on_level)
     solution.seconds = time.perf_counter() - begin
+    return solution
+
+
+def _failed(solution: Solution) -> list[str]:
+    """Names of the checks that do not hold."""
+    return [] if solution.certificate is None else [check.name for check in solution.certificate.failures]
+
+
+def _off_saddles(solution: Solution, on_level: Report | None) -> Solution:
+    """The solution itself, or, as long as its certificate calls it a saddle, the one below it, certified."""
+    problem = solution.problem
+    scaled, unit = in_friction_units(problem)
+    for _ in range(_SADDLES):
+        below = below_saddle(_last_found(scaled, solution)) if "second order" in _failed(solution) else None
+        if below is None:
+            break
+        beside = restated(level_found(below), unit, problem.objective)
+        if on_level is not None:
+            on_level(beside)
+        solution = optimum(problem, on_level, [*solution.levels, beside])
+        _certified(solution)
     return solution
 
 
 def _is_small_and_viscous(solution: Solution) -> bool:
     """Whether nothing fails but the influence of delta, at a gait that shrank to the bound on the shape speed."""
-    certificate = solution.certificate
-    failed = [] if certificate is None else [check.name for check in certificate.failures]
+    failed = _failed(solution)
     return failed == ["delta influence"] and on_speed_floor(solution.problem, solution.gait)
 
 

@@ -37,6 +37,8 @@ _ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
 _ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
 """Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
 _ADMISSIBLE, _ALIKE = 1e-8, 1e-3
+_SWINGS = 0.1
+"""Part of the way of a round that the gait does not come back in the next, where it only goes to and fro."""
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
 _MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
@@ -113,7 +115,7 @@ def settled(
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
     iterations = evaluations = 0
     program.place_rows(v)
-    violation = np.inf
+    violation, ends = np.inf, [v]
     for _ in range(rounds or _ROUNDS[accuracy]):
         before, worse = v, violation
         fresh = curvature is None
@@ -131,6 +133,9 @@ def settled(
         violation = conditions.violation
         if violation > STATIONARY[ROUGH] and abs(violation - worse) < _ALIKE * worse and not result.on_edge:
             break  # the rows contradict each other near here
+        ends.append(v)
+        if len(ends) > 2 and np.abs(v - ends[-3]).max() < _SWINGS * np.abs(v - before).max():
+            break  # between two worst instants of one cell, where only finer cells help
     counts = iterations, evaluations, time.perf_counter() - begin
     return Found(space, v, delta, result.objective, conditions, accuracy, *counts, curvature, program)
 

@@ -13,29 +13,22 @@ import numpy as np
 
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import Lagrangian, curvature
-from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, STATIONARY, Found, Report, refined, settled_apart
+from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, Found, settled_apart
 
 STEPS = (0.1, 0.03, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
 _FALLS = 1e-3
 """A curvature below minus this part of the objective [1/rad^2] is one to follow."""
-_TRIES, _GAIN = 3, 1e-7
-"""Saddles left one after another; the part of the objective that leaving one has to gain."""
+_GAIN = 1e-7
+"""The part of the objective that leaving a saddle has to gain."""
 
 
-def off_saddles(found: Found, lacks: str, report: Report) -> tuple[Found, str]:
-    """The gait itself if its curvature is not negative, else the optimum below; and what is missing there, or ""."""
-    for _ in range(_TRIES):
-        better = next(_better(found), None) if found.conditions.kkt_error < STATIONARY[ROUGH] else None
-        if better is None:
-            break
-        report(better)
-        found, lacks = refined(better, report)
-    return found, lacks
+def below_saddle(found: Found) -> Found | None:
+    """A better gait that the search comes to from beside a gait of negative curvature; None if there is none."""
+    return next(_better(found), None)
 
 
 def _better(found: Found) -> Iterator[Found]:
-    """Gaits that the search comes to from beside a saddle, and that are better."""
     program = ReducedProgram(found.space, found.delta)
     program.place_rows(found.v)
     here = curvature(program, found.v)

@@ -1,0 +1,98 @@
+"""CasADi functions of columns, evaluated at many columns straight from and into NumPy's memory.
+
+A search asks for the same small functions some ten thousand times. CasADi's own arrays go there and back through lists, which
+takes longer than the functions themselves.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from colloc.numerics.blocks import Assembly, LocalFunction
+
+
+class ColumnFunction:
+    """A function of dense columns with one dense output, for one thread.
+
+    Examples
+    --------
+    >>> x = ca.SX.sym("x", 2)
+    >>> ColumnFunction(ca.Function("f", [x], [ca.sumsqr(x)]))(np.array([[3.0, 1.0], [4.0, 0.0]]))
+    array([[25.,  1.]])
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = function
+        self._rows = [function.size1_in(k) for k in range(function.n_in())]
+        self._n = -1
+
+    def __call__(self, *arguments: np.ndarray) -> np.ndarray:
+        """The outputs ``(n_out, n)`` at arguments of n columns each; the array is overwritten by the next call."""
+        n = arguments[0].shape[1]
+        if n != self._n:
+            self._make_room(n)
+        for room, argument in zip(self._inputs, arguments, strict=True):
+            room[:] = argument.T
+        self._evaluate()
+        return self._output.T
+
+    def _make_room(self, n: int) -> None:
+        self._n, self._inputs = n, [np.empty((n, rows)) for rows in self._rows]
+        self._output = np.empty((n, self._function.size1_out(0)))
+        self._buffer, self._evaluate = self._function.map(n).buffer()
+        for k, room in enumerate(self._inputs):
+            self._buffer.set_arg(k, room.reshape(-1).data)
+        self._buffer.set_res(0, self._output.reshape(-1).data)
+
+
+class ChosenRows:
+    """Some of the constraint rows of an assembly, with its instance parameters as they are now.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Without implicit blocks.
+    kept : (n_row,) int
+    parameters : list of (n_given, n_instance)
+        Of every block.
+    """
+
+    def __init__(self, assembly: Assembly, kept: np.ndarray, parameters: list[np.ndarray]) -> None:
+        self._linear, self._parts = assembly.linear[kept], []
+        for block, given in zip(assembly.blocks, parameters, strict=True):
+            scatter, n_out = block.scatter[kept], block.function.n_out
+            used = np.unique(scatter.indices // n_out)
+            if used.size:
+                columns = (used[:, None] * n_out + np.arange(n_out)).ravel()
+                self._parts.append(_Part(block.function, block.gather[:, used], given[:, used], scatter[:, columns]))
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        """``(n_row,)`` at the variables x."""
+        return self._linear @ x + sum(part.values(x) for part in self._parts)
+
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives ``(n_row, n_variable)``."""
+        return np.asarray(sum((part.slopes(x) for part in self._parts), start=self._linear).toarray())
+
+
+class _Part:
+    """What the instances of a block that are asked for contribute to the rows."""
+
+    def __init__(self, function: LocalFunction, gather: np.ndarray, given: np.ndarray, scatter: sparse.csr_matrix) -> None:
+        self._given, self._no_delta, self._scatter = given, np.zeros((1, gather.shape[1])), scatter
+        self._gather, self._value, self._jacobian = gather, ColumnFunction(function.value), ColumnFunction(function.jacobian)
+        # where the Jacobian's nonzeros go: as compressed rows of the outputs, instance by instance
+        output = (function.n_out * np.arange(gather.shape[1]) + function.jac_row[:, None]).ravel()
+        self._order, n_output = np.argsort(output, kind="stable"), scatter.shape[1]
+        self._columns = gather[function.jac_col].ravel()[self._order]
+        self._ends = np.concatenate([[0], np.cumsum(np.bincount(output, minlength=n_output))])
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(self._scatter @ self._value(x[self._gather], self._given, self._no_delta).ravel(order="F"))
+
+    def slopes(self, x: np.ndarray) -> sparse.csr_matrix:
+        nonzeros = self._jacobian(x[self._gather], self._given, self._no_delta).ravel()[self._order]
+        outputs = sparse.csr_matrix((nonzeros, self._columns, self._ends), shape=(self._ends.size - 1, x.size))
+        return self._scatter @ outputs
