@@ -43,7 +43,8 @@ from benchmarks.faults import faults_of
 from benchmarks.reach import Test, load, save
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("colloc", "tests", "benchmarks", "problems", "studies", "scripts", "docs", "results", "pyproject.toml", "README.md")
+_LEFT_BEHIND = shutil.ignore_patterns(".*_cache", ".git", ".venv", ".hypothesis", "__pycache__", "reach-*.json")
+"""What the copy does without."""
 _NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "argument_names")
 """What no result rests on."""
 TESTS = {
@@ -275,10 +276,7 @@ def main() -> None:
     options.record.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         copy, cache = Path(folder) / "colloc", Path(folder) / "cache"
-        copy.mkdir()
-        for name in COPIED:
-            source = ROOT / name
-            (shutil.copytree if source.is_dir() else shutil.copy2)(source, copy / name)
+        shutil.copytree(ROOT, copy, ignore=_LEFT_BEHIND)
         cache.mkdir(mode=0o700)
         known = _recorded(copy, cache, options.record.parent)
         for index, mutant in enumerate(chosen):
