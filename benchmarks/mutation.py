@@ -63,6 +63,8 @@ _OF_CALLS = {
     "cell_link.h": "colloc/bounds/enclosure.py::",
     "loaded.h": "colloc/bounds/loaded_balance.py::",
     "motion.h": "colloc/mechanics/compiled_balance.py::",
+    "link_quadrature.h": "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source",
+    "dual.h": "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source",
 }
 """The Python that calls the C of a file; any call at all for the other files."""
 _MOST = 30.0
