@@ -64,6 +64,7 @@ def motions_inside(cells, count, seed):
     return weights, r, np.stack([q1, q2]), loaded_balance(BODY, np.stack([q1, q2]), r, np.zeros_like(rest), rest, 1e-10)
 
 
+@needs_kernel
 def test_loaded_balance_without_load_is_the_balance_of_the_body():
     rng = np.random.default_rng(31)
     q, s = rng.uniform(-3, 3, (2, 200)), rng.uniform(-1, 1, 200)
@@ -76,6 +77,7 @@ def test_loaded_balance_without_load_is_the_balance_of_the_body():
     assert free.residual.max() < 1e-7
 
 
+@needs_kernel
 def test_loaded_forces_bound_the_power_from_below():
     """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z for every motion z."""
     rng = np.random.default_rng(32)
@@ -95,6 +97,7 @@ def _rate_of_the_forces(q, r, state):
     return sum((state.forces[:, k] * part).sum(axis=0) for k, part in enumerate(held))
 
 
+@needs_kernel
 @pytest.mark.parametrize("steps", [0, 2, 40])
 def test_what_is_left_unbalanced_is_counted_however_early_the_solver_stops(steps):
     """Power of the forces on all links = their power with the middle link held + (load - leftover) . z, identically."""
@@ -346,6 +349,7 @@ def test_without_a_compiler_it_says_what_is_wanting(potential):
         cell_bounds(BODY, potential, cells, 0.5)
 
 
+@needs_kernel
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
 def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
     """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their power at most delta below.
