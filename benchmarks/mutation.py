@@ -7,7 +7,8 @@ a comparison, a constant, a sign, a condition or an `abs`, `min`, `max` is chang
 run of the default suite without any fault records which tests call which functions, also in the programs that they start
 (`benchmarks.reach`). A fault meets those that call its function, of the folder that mirrors its package first, until one fails;
 as many as fit in 30 s of processor time. What takes far longer than without a fault counts as caught (it hangs). Those that
-survive are printed with their line: they are a gap of the tests, or a change without consequences.
+survive are printed with their line: they are a gap of the tests, or a change without consequences. C that the compiler turns
+into the same library is no fault, and is named so.
 What the record has of the same sources is not done again, so that the same command goes on with a run that was ended; a sample
 of other sources has other mutants. Which tests call what is kept beside it.
 """
@@ -25,11 +26,13 @@ import re
 import resource
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -163,15 +166,41 @@ def drawn(found: list[Mutant], number: int, seed: int) -> list[Mutant]:
     return chosen
 
 
+_COMPILED = ("cc", "-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
+_OWN_LAW = "from colloc import OwnLaw; print(OwnLaw('-vs/speed', '-vn/speed*(1 + exp(-speed))').kernel_source)"
+
+
+@cache
+def _own_law(copy: Path) -> Path:
+    """A folder with the C of a law of one's own."""
+    (copy.parent / "law").mkdir()
+    made = subprocess.run([sys.executable, "-c", _OWN_LAW], cwd=copy, stdout=subprocess.PIPE, check=True).stdout
+    (copy.parent / "law" / "own_law.h").write_bytes(made)
+    return copy.parent / "law"
+
+
+def kernel_of(copy: Path) -> bytes:
+    """What the compiler makes of the C as it is, without a law of one's own and with one; empty if it refuses."""
+    library, source = copy.parent / "kernel.so", copy / "colloc/mechanics/native/kernel.c"
+    made = b""
+    for flags in ([], ["-DOWN_LAW", f"-I{_own_law(copy)}", f"-I{source.parent}"]):
+        if subprocess.run([*_COMPILED, *flags, source, "-o", library, "-lm"], capture_output=True).returncode:
+            return b""
+        made += library.read_bytes()
+    return made
+
+
 def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str], seconds: float) -> tuple[str, str]:
-    """ "caught", "survived", "hangs" or "not reached", and the test that failed; in a child of this process, which has the
-    libraries."""
+    """ "caught", "survived", "hangs", "not reached" or "same code", and the test that failed; in a child of this process, which
+    has the libraries."""
     if not tests:
         return "not reached", ""
     file = copy / mutant.file
-    text = file.read_text(encoding="utf-8")
+    text, known = file.read_text(encoding="utf-8"), kernel_of(copy) if file.suffix != ".py" else b""
     file.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding="utf-8")
     try:
+        if known and kernel_of(copy) == known:
+            return "same code", ""
         status = _in_child(copy, lambda: _tests_in(copy, cache, tests, int(1.5 * seconds) + 20))
     finally:
         file.write_text(text, encoding="utf-8")
