@@ -179,15 +179,18 @@ def _own_law(copy: Path) -> Path:
     return copy.parent / "law"
 
 
-def kernel_of(copy: Path) -> bytes:
+def kernels_of(copy: Path) -> Iterator[bytes]:
     """What the compiler makes of the C as it is, without a law of one's own and with one; empty if it refuses."""
     library, source = copy.parent / "kernel.so", copy / "colloc/mechanics/native/kernel.c"
-    made = b""
     for flags in ([], ["-DOWN_LAW", f"-I{_own_law(copy)}", f"-I{source.parent}"]):
-        if subprocess.run([*_COMPILED, *flags, source, "-o", library, "-lm"], capture_output=True).returncode:
-            return b""
-        made += library.read_bytes()
-    return made
+        done = subprocess.run([*_COMPILED, *flags, source, "-o", library, "-lm"], capture_output=True)
+        yield b"" if done.returncode else library.read_bytes()
+
+
+@cache
+def _faultless(copy: Path) -> tuple[bytes, ...]:
+    """The same before any fault is put in."""
+    return tuple(kernels_of(copy))
 
 
 def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str], seconds: float) -> tuple[str, str]:
@@ -196,10 +199,10 @@ def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str], seconds: 
     if not tests:
         return "not reached", ""
     file = copy / mutant.file
-    text, known = file.read_text(encoding="utf-8"), kernel_of(copy) if file.suffix != ".py" else b""
+    text, known = file.read_text(encoding="utf-8"), () if file.suffix == ".py" else _faultless(copy)
     file.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding="utf-8")
     try:
-        if known and kernel_of(copy) == known:
+        if known and all(made and made == before for made, before in zip(kernels_of(copy), known, strict=True)):
             return "same code", ""
         status = _in_child(copy, lambda: _tests_in(copy, cache, tests, int(1.5 * seconds) + 20))
     finally:
