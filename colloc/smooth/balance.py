@@ -204,7 +204,7 @@ def solve_smooth(
             out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * spent[members]
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
             inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
-            out["force"][:, chosen] = whole[:3].sum(axis=1)
+            out["force"][:, chosen] = whole[:3].sum(axis=1) * (spent / speed)[members]
             out["power"][chosen] = whole[3].sum(axis=0) * spent[members]
             out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * spent[members]
             out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]
