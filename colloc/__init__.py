@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.optimise import maximise_efficiency
+    from colloc.search.slope_search import climbing_gait
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.crawler_body import CrawlerBody
     from colloc.smooth.modal_body import ModalBody
@@ -53,7 +54,9 @@ if TYPE_CHECKING:
     from colloc.studies.pareto import pareto_front
     from colloc.studies.study import Axis, Study
     from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
+    from colloc.verification.heading_map import heading_map
     from colloc.verification.replay import replay
+    from colloc.verification.slope import slope_motion
 
 _HOME = {
     "gaits.problem": ("Problem",),
@@ -75,6 +78,7 @@ _HOME = {
     "gaits.polygon": ("Polygon", "Corners"),
     "gaits.relaxed": ("Relaxed",),
     "search.optimise": ("maximise_efficiency",),
+    "search.slope_search": ("climbing_gait",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
     "studies.pareto": ("pareto_front",),
@@ -82,6 +86,8 @@ _HOME = {
     "results.store": ("load", "save"),
     "results.certificate": ("certify",),
     "verification.replay": ("replay",),
+    "verification.slope": ("slope_motion",),
+    "verification.heading_map": ("heading_map",),
     "mechanics.fixed_point": ("solve_balance",),
     "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
 }
@@ -118,7 +124,9 @@ __all__ = [
     "Viscous",
     "Wave",
     "certify",
+    "climbing_gait",
     "ellipse",
+    "heading_map",
     "load",
     "load_problem",
     "maximise_efficiency",
@@ -126,6 +134,7 @@ __all__ = [
     "pareto_front",
     "replay",
     "save",
+    "slope_motion",
     "solve",
     "solve_balance",
     "sweep",

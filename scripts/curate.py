@@ -61,6 +61,8 @@ KEPT = {
     "small_polygons.md": "python -m scripts.small_polygons",
     "three_link_wheels.front.png": "python -m colloc pareto problems/three_link_wheels.py",
     "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
+    "slopes.md": "python -m scripts.slopes",
+    "slopes.png": "python -m scripts.slopes",
 }
 
 

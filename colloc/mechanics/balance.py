@@ -60,6 +60,19 @@ def net_force(posture: Posture, force: LinkForce) -> Array:
     return xp.stack([xp.sum_rows(fx), xp.sum_rows(fy), xp.sum_rows(torque)])
 
 
+def load_wrench(body: Links, posture: Posture, load: np.ndarray) -> np.ndarray:
+    """An outside force ``(2, n_time)``, in body-frame axes, that acts at the centre of mass: force and torque about the
+    reference, ``(3, n_time)``, to be added to `net_force`."""
+    x, y = body.centre_of_mass(posture)
+    return np.stack([load[0], load[1], (x * load[1] - y * load[0])[0]])
+
+
+def load_power(body: Links, posture: Posture, velocity: LinkVelocity, load: np.ndarray) -> np.ndarray:
+    """What that force does on the body, ``(n_time,)``."""
+    vx, vy = body.centre_velocity(posture, velocity)
+    return (load[0] * vx + load[1] * vy)[0]
+
+
 def total_power(velocity: LinkVelocity, force: LinkForce) -> Array:
     """Power dissipated by friction, ``(1, n_time)`` (integrand of the paper's eq. W)."""
     return namespace(velocity.vs, force.normal).sum_rows(power(*velocity, force))

@@ -9,32 +9,49 @@ import numpy as np
 from colloc.mechanics.balance import balance_jacobian, instant, link_stiffness, total_power
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.damped_newton import groups
-from colloc.mechanics.implicit_slopes import implicit_changes
+from colloc.mechanics.implicit_slopes import Load, implicit_changes
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
 from colloc.mechanics.native_kernel import compiled_motion, native_kernel
 
 
 def chain_motion(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    solved: BalanceSolution,
+    load: np.ndarray | None = None,
 ) -> BalancedMotion:
-    """The motion at instants that were solved for; arguments as for `colloc.mechanics.fixed_point.solve_balance`."""
-    library, at = native_kernel(body, friction), (angles, rates, delta, solved.anchor, solved.anchor_velocity)
+    """The motion at instants that were solved for; arguments as for `colloc.mechanics.fixed_point.solve_balance`.
+
+    Under a load the actuators' power is that of friction less the load's.
+    """
+    library, at = native_kernel(body, friction), (angles, rates, delta, load, solved.anchor, solved.anchor_velocity)
     if library is None:
         return _named(_by_anchor(_values, (7,), body, friction, *at))
     return _named(compiled_motion(library, body, friction, *at, with_slopes=False)[0])
 
 
 def chain_slopes(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    solved: BalanceSolution,
+    load: np.ndarray | None = None,
 ) -> tuple[BalancedMotion, np.ndarray]:
-    """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates)."""
-    library, at = native_kernel(body, friction), (angles, rates, delta, solved.anchor, solved.anchor_velocity)
-    if library is None:
-        found = [_by_anchor(of, rows, body, friction, *at) for of, rows in ((_values, (7,)), (_slopes, (6, 2 * body.n_joint)))]
-    else:
-        found = list(compiled_motion(library, body, friction, *at, with_slopes=True))
-    return _named(found[0]), found[1]
+    """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates); under a
+    load two columns more, with respect to its components."""
+    library, at = native_kernel(body, friction), (angles, rates, delta, load, solved.anchor, solved.anchor_velocity)
+    if library is not None:
+        values, slopes = compiled_motion(library, body, friction, *at, with_slopes=True)
+        return _named(values), slopes
+    slopes = _by_anchor(_slopes, (6, 2 * body.n_joint + 2), body, friction, *at)
+    values = _by_anchor(_values, (7,), body, friction, *at)
+    return _named(values), slopes[:, : 2 * body.n_joint] if load is None else slopes
 
 
 def _named(values: np.ndarray) -> BalancedMotion:
@@ -49,21 +66,32 @@ def _by_anchor(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    load: np.ndarray | None,
     anchor: np.ndarray,
     anchor_velocity: np.ndarray,
 ) -> np.ndarray:
-    result = np.empty((*rows, anchor.size))
+    held = np.zeros((2, anchor.size)) if load is None else load
+    found = np.empty((*rows, anchor.size))
     for link, at in groups(anchor):
-        result[..., at] = of_one(body, friction, angles[:, at], rates[:, at], delta, link, anchor_velocity[:, at])
-    return result
+        moving = angles[:, at], rates[:, at], delta, held[:, at], link, anchor_velocity[:, at]
+        found[..., at] = of_one(body, friction, *moving)
+    return found
 
 
 def _values(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, anchor: int, z: np.ndarray
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    load: np.ndarray,
+    anchor: int,
+    z: np.ndarray,
 ) -> np.ndarray:
     now = instant(body, friction, angles, rates, z, delta, anchor)
-    (c, s, x, y), force = now.posture, now.force
-    fx, fy = force.tangential * c - force.normal * s, force.tangential * s + force.normal * c
+    (c, s, x, y), force, weight = now.posture, now.force, body.weight_column()
+    fx = force.tangential * c - force.normal * s + weight * load[0]
+    fy = force.tangential * s + force.normal * c + weight * load[1]
     half = 0.5 * body.length_column()
     actuator = np.zeros(z.shape[1])
     for joint in range(body.n_joint):
@@ -76,14 +104,23 @@ def _values(
 
 
 def _slopes(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, anchor: int, z: np.ndarray
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    load: np.ndarray,
+    anchor: int,
+    z: np.ndarray,
 ) -> np.ndarray:
     now = instant(body, friction, angles, rates, z, delta, anchor)
     n_joint, n_time = angles.shape
     behind = np.tril(np.ones((body.n_link, n_joint)), -1)
-    none = np.zeros_like(behind)
-    dphi = np.concatenate([behind, none], axis=1)[:, :, None]
-    dw = np.concatenate([none, behind - behind[anchor]], axis=1)[:, :, None] * np.ones(n_time)
+    none, weight = np.zeros_like(behind), body.weight_column()[:, :, None]
+    still = np.zeros((body.n_link, 2))
+    dphi = np.concatenate([behind, none, still], axis=1)[:, :, None]
+    dw = np.concatenate([none, behind - behind[anchor], still], axis=1)[:, :, None] * np.ones(n_time)
+    along = np.concatenate([np.zeros((2 * n_joint, 2)), np.eye(2)])[None, :, :, None]
     path = body.weighted_path(anchor)
     d = implicit_changes(
         now.posture,
@@ -94,7 +131,7 @@ def _slopes(
         lambda a: np.einsum("ik,kjt->ijt", path, a),
         dphi,
         dw,
+        Load(weight * load[0], weight * load[1], weight * along[:, :, 0], weight * along[:, :, 1]),
     )
-    weight = body.weight_column()[:, :, None]
     tail = (d.vs[0], d.vn[0] - 0.5 * body.lengths[0] * d.w[0], d.w[0])
     return np.stack([*tail, (weight * d.vx).sum(axis=0), (weight * d.vy).sum(axis=0), d.power])

@@ -18,7 +18,16 @@ from functools import partial
 
 import numpy as np
 
-from colloc.mechanics.balance import Instant, balance_jacobian, dissipation_potential, instant, net_force, secant_matrix
+from colloc.mechanics.balance import (
+    Instant,
+    balance_jacobian,
+    dissipation_potential,
+    instant,
+    load_power,
+    load_wrench,
+    net_force,
+    secant_matrix,
+)
 from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.damped_newton import METHODS, groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
@@ -30,20 +39,27 @@ from colloc.system.errors import ProblemError
 class _Batch:
     """Instants that share a reference link: what an iteration evaluates on subsets of them."""
 
-    def __init__(self, body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, reference: int | None) -> None:
+    def __init__(
+        self, body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, reference: int | None
+    ) -> None:
         self.body, self.friction, self.reference = body, friction, reference
-        self.angles, self.rates = angles, rates
+        self.angles, self.rates, self.load = angles, rates, load
 
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
         return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Links ``(7, n_link, n)``, posture, then velocity, and net force ``(3, n)`` at z."""
-        now = self.at(select, z, delta)
-        return np.stack([*now.posture, *now.velocity]), net_force(now.posture, now.force)
-
-    def potential(self, links: np.ndarray, delta: np.ndarray) -> np.ndarray:
-        return dissipation_potential(self.body, self.friction, LinkVelocity(*links[4:]), delta)
+    def evaluate(
+        self, select: np.ndarray, z: np.ndarray, delta: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Links ``(7, n_link, n)``, posture, then velocity; net force and potential at z, those of the load with them."""
+        now, body = self.at(select, z, delta), self.body
+        force = net_force(now.posture, now.force)
+        potential = dissipation_potential(body, self.friction, now.velocity, delta) if self.friction.associated else None
+        if self.load is not None:
+            load = self.load[:, select]
+            force += load_wrench(body, now.posture, load)
+            potential = None if potential is None else potential - load_power(body, now.posture, now.velocity, load)
+        return np.stack([*now.posture, *now.velocity]), force, potential
 
     def matrix(self, links: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
         matrix = balance_jacobian if newton else secant_matrix
@@ -82,6 +98,7 @@ def solve_balance(
     rates: np.ndarray,
     delta: float,
     *,
+    load: np.ndarray | None = None,
     start: np.ndarray | None = None,
     tolerance: float = 1e-11,
     max_iterations: int = 2000,
@@ -97,6 +114,9 @@ def solve_balance(
         Joint angles [rad] and their rates [rad/time].
     delta : float
         Regularisation speed, > 0.
+    load : (2, n_time), optional
+        An outside force on the body in body-frame axes [weight], which its links share as they share the weight. Friction
+        may be too weak to hold it: then nothing is found.
     start : (3, n_time), optional
         Tail velocities to start from; by default the links' mean rotation is taken out of a body at rest.
     tolerance : float
@@ -143,11 +163,15 @@ def solve_balance(
         start = _real("start", start)
         if start.shape != (3, n_time) or not np.isfinite(start).all():
             raise ProblemError(f"start must be finite with shape (3, {n_time}).")
+    if load is not None:
+        load = _real("load", load)
+        if load.shape != (2, n_time) or not np.isfinite(load).all():
+            raise ProblemError(f"load must be finite with shape (2, {n_time}).")
     settings = float(tolerance), int(max_iterations), method
     library = native_kernel(body, friction)
 
     solved = _numpy_balance if library is None else partial(compiled_balance, library)
-    found = solved(body, friction, angles, rates, float(delta), start, *settings)
+    found = solved(body, friction, angles, rates, float(delta), load, start, *settings)
     for link in range(body.n_link if method == "auto" else 0):
         failed = np.flatnonzero(~(found[1] <= tolerance))
         if not failed.size:
@@ -155,7 +179,8 @@ def solve_balance(
         # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
         some, rates_there = angles[:, failed], rates[:, failed]
         at_rest = body.tail_velocity(body.posture(some, link), rates_there, np.zeros((3, failed.size)), link)
-        again = solved(body, friction, some, rates_there, float(delta), at_rest, *settings)
+        held = None if load is None else load[:, failed]
+        again = solved(body, friction, some, rates_there, float(delta), held, at_rest, *settings)
         better = again[1] <= tolerance
         for old, new in zip(found, again, strict=True):
             old[..., failed[better]] = new[..., better]
@@ -169,6 +194,7 @@ def _numpy_balance(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    load: np.ndarray | None,
     start: np.ndarray | None,
     tolerance: float,
     max_iterations: int,
@@ -178,17 +204,22 @@ def _numpy_balance(
     n_time = angles.shape[1]
     # work in units of the largest rate, where the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
+    if load is not None:
+        speed = np.maximum(speed, delta)  # at which a body creeps under a load, though its joints rest
     speed[(speed == 0) | (friction.degree is None)] = 1.0
+    if load is not None:
+        load = load / speed ** (friction.degree or 0.0)
     scaled_rates, scaled_delta = rates / speed, relative_delta(delta, speed)
     anchor = np.full(n_time, body.n_link // 2)
     velocity = np.zeros((3, n_time))
     if start is not None:
-        tail = _Batch(body, friction, angles, scaled_rates, TAIL)
+        tail = _Batch(body, friction, angles, scaled_rates, load, TAIL)
         velocity = tail.rereferenced(start / speed, scaled_delta, anchor)
     state = starting_state(anchor, velocity)
 
     def batch(members: np.ndarray, link: int) -> _Batch:
-        return _Batch(body, friction, angles[:, members], scaled_rates[:, members], link)
+        held = None if load is None else load[:, members]
+        return _Batch(body, friction, angles[:, members], scaled_rates[:, members], held, link)
 
     solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
 

@@ -23,8 +23,9 @@ Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Changes(NamedTuple):
-    """Derivatives along (shape, rates): of the anchor's velocity ``(3, n, n_time)``; of the parts' velocities in the body's
-    axes, along and across the part, and of their rotation rates, ``(n_part, n, n_time)``; of the power ``(n, n_time)``."""
+    """Derivatives along (shape, rates), or a load: of the anchor's velocity ``(3, n, n_time)``; of the parts' velocities in
+    the body's axes, along and across the part, and of their rotation rates, ``(n_part, n, n_time)``; of the power
+    ``(n, n_time)``."""
 
     anchor: np.ndarray
     vx: np.ndarray
@@ -33,6 +34,15 @@ class Changes(NamedTuple):
     vn: np.ndarray
     w: np.ndarray
     power: np.ndarray
+
+
+class Load(NamedTuple):
+    """Outside forces on the parts, in the body's axes, and their derivatives; broadcast to ``(n_part, n, n_time)``."""
+
+    x: np.ndarray
+    y: np.ndarray
+    dx: np.ndarray
+    dy: np.ndarray
 
 
 def implicit_changes(
@@ -44,6 +54,7 @@ def implicit_changes(
     along_path: Callable[[np.ndarray], np.ndarray],
     dphi: np.ndarray,
     dw: np.ndarray,
+    load: Load | None = None,
 ) -> Changes:
     """Changes of a body in balance; axes of all arrays: (part, shape coordinate or rate, time).
 
@@ -60,6 +71,8 @@ def implicit_changes(
         Sums ``(n_part, ...)`` along the body from the anchor to the parts, times length.
     dphi, dw : (n_part, n, n_time)
         Derivatives of the parts' angles, and of their rotation rates relative to the anchor.
+    load : Load, optional
+        Outside forces on the parts.
     """
     c, s, x, y = (a[:, None] for a in posture)
     vs, vn, w = (a[:, None] for a in velocity)
@@ -75,6 +88,8 @@ def implicit_changes(
     fx, fy = fs * c - fn * s, fs * s + fn * c
     dfs, dfn, dcouple = force_change(dvs, dvn, dw)
     dfx, dfy = dfs * c - dfn * s - fy * dphi, dfs * s + dfn * c + fx * dphi
+    if load is not None:
+        dfx, dfy, fx, fy = dfx + load.dx, dfy + load.dy, fx + load.x, fy + load.y
     torque = dx * fy - dy * fx + x * dfy - y * dfx + dcouple
     net = np.stack([dfx.sum(axis=0), dfy.sum(axis=0), torque.sum(axis=0)])
     dz = np.stack([solve3(left, net[:, j]) for j in range(net.shape[1])], axis=1)

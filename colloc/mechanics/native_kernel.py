@@ -36,10 +36,10 @@ _PIECE = 4000
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
 _BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
-    "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
+    "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_loaded": (*_BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
     "colloc_enclosure": (_ARRAY, _COUNT, _COUNT, *[_ARRAY] * 6, _REAL, _ARRAY),
-    "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 4),
+    "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
 }
 
 
@@ -123,6 +123,7 @@ def compiled_balance(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    load: np.ndarray | None,
     start: np.ndarray | None,
     tolerance: float,
     max_iterations: int,
@@ -130,13 +131,14 @@ def compiled_balance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3, n_time)``."""
     n_time = angles.shape[1]
-    given = [None if a is None else np.ascontiguousarray(a) for a in (angles, rates, start)]
-    q, dq, near = map(address, given)
+    angles, rates = np.ascontiguousarray(angles), np.ascontiguousarray(rates)
+    load, start = (None if a is None else np.ascontiguousarray(a) for a in (load, start))
     z, anchor_velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
     iterations, anchor = np.empty(n_time, dtype=np.int64), np.empty(n_time, dtype=np.int64)
     found = z, residual, iterations, anchor, anchor_velocity
+    before, after = map(address, (angles, rates)), map(address, (load, start))
     how = tolerance, max_iterations, METHODS.index(method)
-    _call(library.colloc_balance, body, friction, n_time, q, dq, delta, near, *how, *map(address, found))
+    _call(library.colloc_balance, body, friction, n_time, *before, delta, *after, *how, *map(address, found))
     return found
 
 
@@ -147,20 +149,22 @@ def compiled_motion(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    load: np.ndarray | None,
     anchor: np.ndarray,
     anchor_velocity: np.ndarray,
     *,
     with_slopes: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, 2 n_joint, n_time)`` if
-    asked for."""
+    """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, n, n_time)`` if asked
+    for."""
     n_time = angles.shape[1]
-    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity)]
-    q, dq, velocity = map(address, given)
+    angles, rates, anchor_velocity = (np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity))
+    load = None if load is None else np.ascontiguousarray(load, dtype=float)
     anchor = np.ascontiguousarray(anchor, dtype=np.int64)
-    values, slopes = np.empty((7, n_time)), np.empty((6 if with_slopes else 0, 2 * body.n_joint, n_time))
-    wanted = address(slopes) if with_slopes else None
-    _call(library.colloc_motion, body, friction, n_time, q, dq, delta, address(anchor), velocity, address(values), wanted)
+    columns = 2 * body.n_joint + (0 if load is None else 2)
+    values, slopes = np.empty((7, n_time)), np.empty((6 if with_slopes else 0, columns, n_time))
+    after = map(address, (load, anchor, anchor_velocity, values, slopes if with_slopes else None))
+    _call(library.colloc_motion, body, friction, n_time, *map(address, (angles, rates)), delta, *after)
     return values, slopes
 
 

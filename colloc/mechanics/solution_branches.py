@@ -29,7 +29,9 @@ _BETWEEN = (0.5, 0.2, 0.8, 0.05, 0.95, 0.02, 0.98, 0.005, 0.995)
 """The same from one solution to another, as parts of the way: the third often lies next to one of them."""
 
 
-def all_balanced_velocities(body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float) -> Branches:
+def all_balanced_velocities(
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, load: np.ndarray | None = None
+) -> Branches:
     """Every balanced velocity that can be found, the one of `solve_balance` first.
 
     Parameters
@@ -41,6 +43,8 @@ def all_balanced_velocities(body: Links, friction: Law, angles: np.ndarray, rate
         Joint angles [rad] and their rates [rad/time].
     delta : float
         Regularisation speed.
+    load : (2, n_time), optional
+        An outside force, as `colloc.mechanics.fixed_point.solve_balance` takes it.
 
     Raises
     ------
@@ -57,7 +61,7 @@ def all_balanced_velocities(body: Links, friction: Law, angles: np.ndarray, rate
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
     (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """
-    at = (body, friction, angles, rates, delta)
+    at = (body, friction, angles, rates, delta, load)
     if friction.associated:
         return Branches(*_solved(*at, np.zeros((1, 3, angles.shape[1]))))
     middle = body.n_link // 2
@@ -68,7 +72,7 @@ def all_balanced_velocities(body: Links, friction: Law, angles: np.ndarray, rate
     if not doubtful.size:
         return found
     # where a branch has just ended the solver may hang with a small residual; the solution then lies beside
-    part = (body, friction, angles[:, doubtful], rates[:, doubtful], delta)
+    part = (body, friction, angles[:, doubtful], rates[:, doubtful], delta, None if load is None else load[:, doubtful])
     known = Branches(z[:, :, doubtful], sign[:, doubtful])
     more = _solved(*part, _between_and_beside(*part, known.z))
     z, sign = (np.concatenate(pair) for pair in zip(known, more, strict=True))
@@ -91,14 +95,15 @@ def _solved(
     angles: np.ndarray,
     rates: np.ndarray,
     delta: float,
+    load: np.ndarray | None,
     starts: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where that is no solution."""
     count = starts.shape[0]
-    angles, rates = np.tile(angles, count), np.tile(rates, count)
+    angles, rates, load = np.tile(angles, count), np.tile(rates, count), None if load is None else np.tile(load, count)
     start = np.concatenate(list(starts), axis=1)
     at = (body, friction, angles, rates, delta)
-    solved = solve_balance(*at, start=start, tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
+    solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
     accepted = solved.residual <= _ACCEPTED
     sign = np.where(accepted, np.sign(_determinant(*at, solved)), 0.0)
     return np.stack(np.split(solved.z, count, axis=1)), sign.reshape(count, -1)
@@ -117,7 +122,7 @@ def _determinant(
 
 
 def _between_and_beside(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
+    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, load: np.ndarray | None, z: np.ndarray
 ) -> np.ndarray:
     """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest direction of each."""
     starts = [z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN]

@@ -10,12 +10,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.numerics.sqp import Stationarity, minimised, stationarity
+from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_near
@@ -102,17 +103,36 @@ class Found:
 Report = Callable[[Found], None]
 
 
-def settled(
-    space: SearchSpace,
+class Placed(NonlinearProgram, Protocol):
+    """A program whose rows depend on where the gait is worst."""
+
+    @property
+    def space(self) -> SearchSpace: ...
+
+    def place_rows(self, v: np.ndarray) -> float:
+        """Place them for v; how far it exceeds any bound there."""
+
+
+class Rested(NamedTuple):
+    """Where a program came to rest: parameters, objective, first-order conditions, counts, and what is known of curvature."""
+
+    v: np.ndarray
+    objective: float
+    conditions: Stationarity
+    iterations: int
+    evaluations: int
+    curvature: np.ndarray | None
+
+
+def at_rest(
+    program: Placed,
     v: np.ndarray,
-    delta: float,
     radius: float,
     accuracy: float,
     curvature: np.ndarray | None = None,
     rounds: int | None = None,
-) -> Found:
-    """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
-    begin, program = time.perf_counter(), ReducedProgram(space, delta)
+) -> Rested:
+    """Optimise from v until rows, box and gait rest, or for so many rounds."""
     iterations = evaluations = 0
     program.place_rows(v)
     violation, ends = np.inf, [v]
@@ -120,7 +140,7 @@ def settled(
         before, worse = v, violation
         fresh = curvature is None
         if fresh and accuracy < VERY_ROUGH:
-            curvature = space.metric(v)
+            curvature = program.space.metric(v)
         result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = program.place_rows(v) <= _ADMISSIBLE
@@ -136,8 +156,24 @@ def settled(
         ends.append(v)
         if len(ends) > 2 and np.abs(v - ends[-3]).max() < _SWINGS * np.abs(v - before).max():
             break  # between two worst instants of one cell, where only finer cells help
+    return Rested(v, result.objective, conditions, iterations, evaluations, curvature)
+
+
+def settled(
+    space: SearchSpace,
+    v: np.ndarray,
+    delta: float,
+    radius: float,
+    accuracy: float,
+    curvature: np.ndarray | None = None,
+    rounds: int | None = None,
+) -> Found:
+    """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
+    begin, program = time.perf_counter(), ReducedProgram(space, delta)
+    rested = at_rest(program, v, radius, accuracy, curvature, rounds)
+    v, objective, conditions, iterations, evaluations, curvature = rested
     counts = iterations, evaluations, time.perf_counter() - begin
-    return Found(space, v, delta, result.objective, conditions, accuracy, *counts, curvature, program)
+    return Found(space, v, delta, objective, conditions, accuracy, *counts, curvature, program)
 
 
 def settled_apart(

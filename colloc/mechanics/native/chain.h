@@ -16,9 +16,11 @@ typedef struct {
     double length, pressure, cos, sin; /* pressure: weight per length over the body's; direction in the body frame */
     double x, y;             /* midpoint, seen from that of the reference */
     double rate;             /* of the joint behind the link (0 at the tail) */
+    double load_x, load_y;   /* its share of an outside force on the body */
 } Link;
 
-/* Net force and torque, and what a step has to reduce: the potential, or half the squared residual without one. */
+/* Net force and torque, and what a step has to reduce: the potential less the load's power, or half the squared residual
+   without one. */
 typedef struct {
     double force[3], merit;
 } Total;
@@ -37,7 +39,24 @@ static inline void find_directions(
         link[i].cos = i > 0 ? cos(phi) : 1.0;
         link[i].sin = i > 0 ? sin(phi) : 0.0;
         link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
+        link[i].load_x = link[i].load_y = 0.0;
     }
+}
+
+/* An outside force on the body, in its axes, whose components lie `stride` apart: the links share it as they share the weight. */
+static inline void find_loads(const int n, Link *link, const double *load, ptrdiff_t stride)
+{
+    for (int i = 0; i < n; ++i) {
+        link[i].load_x = link[i].pressure * link[i].length * load[0];
+        link[i].load_y = link[i].pressure * link[i].length * load[stride];
+    }
+}
+
+/* Friction and load on a link, in the body's axes. */
+static inline void outer_force(const Link *link, const Sliding *k, double f[2])
+{
+    f[0] = k->fs * link->cos - k->fn * link->sin + link->load_x;
+    f[1] = k->fs * link->sin + k->fn * link->cos + link->load_y;
 }
 
 static inline void find_midpoints(const int n, Link *link, const int reference)
@@ -109,6 +128,15 @@ static inline void find_velocities_from_tail(const int n, const Link *link, Slid
     find_velocities(n, link, k, 0, z);
 }
 
+static inline double load_power(const Link *link, const Sliding *k)
+{
+    double v[3];
+    if (link->load_x == 0.0 && link->load_y == 0.0)
+        return 0.0;
+    link_velocity(link, k, v);
+    return link->load_x * v[0] + link->load_y * v[1];
+}
+
 /* Everything at velocity z of the reference. */
 static inline Total evaluate(
     const int n, const Link *link, Sliding *k, const int reference, const double z[3], const Law *law, double delta)
@@ -118,13 +146,13 @@ static inline Total evaluate(
     for (int i = 0; i < n; ++i) {
         find_roots(&k[i], law, link[i].length, delta);
         find_force(&k[i], law, link[i].length, link[i].pressure);
-        const double fx = k[i].fs * link[i].cos - k[i].fn * link[i].sin;
-        const double fy = k[i].fs * link[i].sin + k[i].fn * link[i].cos;
-        total.force[0] += fx;
-        total.force[1] += fy;
-        total.force[2] += link[i].x * fy - link[i].y * fx + k[i].couple;
+        double f[2];
+        outer_force(&link[i], &k[i], f);
+        total.force[0] += f[0];
+        total.force[1] += f[1];
+        total.force[2] += link[i].x * f[1] - link[i].y * f[0] + k[i].couple;
         if (law->associated)
-            total.merit += link[i].pressure * dissipation(&k[i], law, link[i].length);
+            total.merit += link[i].pressure * dissipation(&k[i], law, link[i].length) - load_power(&link[i], &k[i]);
     }
     if (!law->associated)
         total.merit = 0.5 * (total.force[0] * total.force[0] + total.force[1] * total.force[1] + total.force[2] * total.force[2]);

@@ -10,9 +10,10 @@
 #include "loaded.h"
 #include "motion.h"
 
-static inline double largest_rate_of(const int n, const double *rate, ptrdiff_t stride)
+/* Or `least`, if it is larger: under a load the body creeps at the speed delta, though its joints rest. */
+static inline double largest_rate_of(const int n, const double *rate, ptrdiff_t stride, double least)
 {
-    double speed = 0.0;
+    double speed = least;
     for (int j = 0; j < n - 1; ++j)
         speed = fmax(speed, fabs(rate[j * stride]));
     return speed > 0 ? speed : 1.0;
@@ -25,14 +26,16 @@ static inline double scaled_delta_of(double delta, double speed)
 
 static inline void balance_instants(
     const int n, State *s, const double *length, const double *pressure, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
-    const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
+    const double *rates, double delta, const double *load, const double *start, double tolerance, long long budget, int method, double *z,
     double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     for (ptrdiff_t t = first; t < last; ++t) {
-        const double largest = largest_rate_of(n, rates + t, n_time), speed = speed_unit_of(largest);
+        const double largest = largest_rate_of(n, rates + t, n_time, load ? delta : 0.0), speed = speed_unit_of(largest);
         double tail[3];
         s->largest_rate = largest;
         find_directions(n, s->link, length, pressure, angles + t, rates + t, speed, n_time);
+        if (load)
+            find_loads(n, s->link, load + t, n_time);
         s->anchor = n / 2;
         s->iterations = 0;
         if (start) {
@@ -55,19 +58,19 @@ static inline void balance_instants(
     }
 }
 
-/* Returns 0, or 1 without memory. */
+/* `load` (2, n_time), in the body's axes, or NULL. Returns 0, or 1 without memory. */
 int colloc_balance(
     int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
-    const double *angles, const double *rates, double delta, const double *start, double tolerance, long long budget, int method, double *z,
-    double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
+    const double *angles, const double *rates, double delta, const double *load, const double *start, double tolerance, long long budget,
+    int method, double *z, double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     Link *link = malloc((size_t)n * sizeof *link);
     Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
     if (link && sliding) {
         State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n};
         balance_instants(
-            n, &s, length, pressure, n_time, first, last, angles, rates, delta, start, tolerance, budget, method, z, residual, iterations,
-            anchor, anchor_velocity);
+            n, &s, length, pressure, n_time, first, last, angles, rates, delta, load, start, tolerance, budget, method, z, residual,
+            iterations, anchor, anchor_velocity);
     }
     free(link);
     free(sliding);
@@ -75,24 +78,28 @@ int colloc_balance(
 }
 
 /* Rows of `find_values`, (ROWS, n_time), for chains whose anchors move as given; and, unless `slopes` is NULL, the
-   derivatives of the first of them with respect to joint angles and rates, (DIFFERENTIATED_ROWS, 2 (n - 1), n_time). */
+   derivatives of the first of them with respect to joint angles and rates, and to the load if there is one,
+   (DIFFERENTIATED_ROWS, 2 (n - 1) (+ 2), n_time). */
 int colloc_motion(
     int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
-    const double *angles, const double *rates, double delta, const long long *anchor, const double *anchor_velocity, double *values, double *slopes)
+    const double *angles, const double *rates, double delta, const double *load, const long long *anchor, const double *anchor_velocity,
+    double *values, double *slopes)
 {
     const Law law = law_of(law_numbers);
-    const int n_joint = n - 1;
+    const int n_joint = n - 1, columns = 2 * n_joint + (load ? 2 : 0);
     Link *link = malloc((size_t)n * sizeof *link);
     Sliding *k = malloc((size_t)n * sizeof *k);
     Matrix3 *K = malloc((size_t)n * sizeof *K);
     Change *d = malloc((size_t)n * sizeof *d);
     for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
-        const double speed = speed_unit_of(largest_rate_of(n, rates + t, n_time)), own_delta = scaled_delta_of(delta, speed);
+        const double speed = speed_unit_of(largest_rate_of(n, rates + t, n_time, load ? delta : 0.0)), own_delta = scaled_delta_of(delta, speed);
         const int a = (int)anchor[t];
         double z[3], value[ROWS], net[3], dz[3], change[DIFFERENTIATED_ROWS];
         for (int i = 0; i < 3; ++i)
             z[i] = anchor_velocity[i * n_time + t] / speed;
         find_directions(n, link, length, pressure, angles + t, rates + t, speed, n_time);
+        if (load)
+            find_loads(n, link, load + t, n_time);
         find_midpoints(n, link, a);
         evaluate(n, link, k, a, z, &law, own_delta);
         find_values(n, link, k, value);
@@ -104,15 +111,19 @@ int colloc_motion(
         pull_back(n, link, k, &law, own_delta, true, left);
         for (int i = 0; i < n; ++i)
             find_slopes(&k[i], &law, link[i].length, link[i].pressure, own_delta, K[i]);
-        for (int column = 0; column < 2 * n_joint; ++column) {
-            const bool of_rate = column >= n_joint;
-            find_changes(n, link, k, a, of_rate ? column - n_joint : column, of_rate, d);
-            net_change(n, link, k, K, d, net);
+        for (int column = 0; column < columns; ++column) {
+            const bool of_load = column >= 2 * n_joint, of_rate = column >= n_joint && !of_load;
+            if (of_load)
+                load_change(n, link, column - 2 * n_joint, d, net);
+            else {
+                find_changes(n, link, k, a, of_rate ? column - n_joint : column, of_rate, d);
+                net_change(n, link, k, K, d, net);
+            }
             solve3(left, net, 0.0, dz);
             follow(n, link, d, dz);
             value_changes(n, link, k, K, d, change);
             for (int row = 0; row < DIFFERENTIATED_ROWS; ++row)
-                slopes[(row * 2 * n_joint + column) * n_time + t] = of_rate ? change[row] : change[row] * speed;
+                slopes[(row * columns + column) * n_time + t] = of_rate ? change[row] : change[row] * speed;
         }
     }
     const bool done = link && k && K && d;

@@ -13,14 +13,14 @@ typedef struct {
     double vx, vy, vs, vn, w, x, y, phi;
 } Change;
 
-/* Power of the joints' moments, which balance the friction on all links ahead of them. */
+/* Power of the joints' moments, which balance friction and load on all links ahead of them. */
 static inline double actuator_power(const int n, const Link *link, const Sliding *k)
 {
     double fx = 0.0, fy = 0.0, torque = 0.0, power = 0.0;
     for (int i = n - 1; i > 0; --i) {
-        const double own_x = k[i].fs * link[i].cos - k[i].fn * link[i].sin;
-        const double own_y = k[i].fs * link[i].sin + k[i].fn * link[i].cos;
-        fx += own_x, fy += own_y, torque += link[i].x * own_y - link[i].y * own_x + k[i].couple;
+        double own[2];
+        outer_force(&link[i], &k[i], own);
+        fx += own[0], fy += own[1], torque += link[i].x * own[1] - link[i].y * own[0] + k[i].couple;
         const double x = link[i].x - 0.5 * link[i].length * link[i].cos, y = link[i].y - 0.5 * link[i].length * link[i].sin;
         power -= (torque - x * fy + y * fx) * link[i].rate;
     }
@@ -92,8 +92,17 @@ static inline void net_change(
         const double dfx = df[0] * c - df[1] * s - d[i].phi * fy, dfy = df[0] * s + df[1] * c + d[i].phi * fx;
         net[0] += dfx;
         net[1] += dfy;
-        net[2] += d[i].x * fy - d[i].y * fx + x * dfy - y * dfx + df[2];
+        net[2] += d[i].x * (fy + link[i].load_y) - d[i].y * (fx + link[i].load_x) + x * dfy - y * dfx + df[2];
     }
+}
+
+/* The same with the load's component along x (side 0) or y (side 1), while the anchor keeps its velocity. */
+static inline void load_change(const int n, const Link *link, const int side, Change *d, double net[3])
+{
+    memset(d, 0, (size_t)n * sizeof *d);
+    net[0] = side == 0, net[1] = side == 1, net[2] = 0.0;
+    for (int i = 0; i < n; ++i)
+        net[2] += link[i].pressure * link[i].length * (side ? link[i].x : -link[i].y);
 }
 
 /* Let the anchor follow with dz, so that the body stays in balance. */

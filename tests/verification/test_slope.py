@@ -1,0 +1,190 @@
+"""Gaits on a slope: against a program of its own, the level, conservation of energy, and what symmetry demands."""
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+from shared.loaded_chain import left_over
+
+from colloc import Chain, CrawlerBody, Fourier, Friction, NotConvergedError, ProblemError, ellipse, replay
+from colloc.verification.heading_map import heading_map
+from colloc.verification.slope import slope_motion
+
+SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
+"""A gait without any symmetry."""
+ANTIPODAL = Fourier([0.0, 0.0], [[1.5], [0.0]], [[0.0], [1.0]])
+REVERSIBLE = ellipse(A0=0.4, A1=1.5, B1=1.0)
+LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
+
+
+def still(t):
+    """A bent body whose joints rest."""
+    return np.tile([[0.4], [-0.7]], np.size(t)), np.zeros((2, np.size(t)))
+
+
+def test_the_motion_is_that_of_a_program_of_its_own():
+    """Runge and Kutta's rule on balances by quadrature; delta is large, so that both are smooth and few steps do."""
+    mu, delta, grade, steps = (1.7, 1.0, 1.3), 0.3, 0.5, 20
+    ours = slope_motion(LOPSIDED, Friction(*mu), SKEW, delta, grade, heading=1.0)
+    near = np.zeros(3)
+
+    def rates(t, state):
+        nonlocal near
+        (angles, rates), turn = SKEW(np.array([t])), np.exp(1j * state[0])
+        pull = -grade * np.conj(turn)
+        at = LOPSIDED.lengths, LOPSIDED.weights, mu, angles[:, 0], rates[:, 0], (pull.real, pull.imag), delta
+        near = root(left_over, near, args=at, tol=1e-11).x
+        place, heading, centre, swing = 0j, 0.0, 0j, 0j
+        for i, (length, weight) in enumerate(zip(LOPSIDED.lengths, LOPSIDED.weights, strict=True)):
+            if i:
+                heading += angles[i - 1, 0]
+            along = length * np.exp(1j * heading)
+            spin = near[2] + rates[:i, 0].sum()
+            centre += weight * (complex(*near[:2]) + swing + 0.5j * spin * along)
+            place, swing = place + along, swing + 1j * spin * along
+        moved = turn * centre
+        return np.array([near[2], moved.real, moved.imag])
+
+    state, h = np.array([1.0 - ours.course, 0.0, 0.0]), 1 / steps
+    for step in range(steps):
+        t = step * h
+        k1 = rates(t, state)
+        k2 = rates(t + h / 2, state + h / 2 * k1)
+        k3 = rates(t + h / 2, state + h / 2 * k2)
+        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(t + h, state + h * k3))
+    np.testing.assert_allclose(ours.states[:3, -1], state, atol=1e-4)
+    assert abs(ours.turn) > 0.05
+
+
+def test_on_the_level_it_is_the_replay():
+    level = replay(LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-2)
+    ran = slope_motion(LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-2, 0.0, heading=0.7)
+    away = ran.climb[0] + 1j * ran.aside[0]
+    assert away == pytest.approx(level.distance * np.exp(0.7j), abs=1e-5)
+    assert ran.friction_work[0] == pytest.approx(level.work, abs=1e-5)
+    assert ran.turn == pytest.approx(level.rotation, abs=1e-5)
+    assert ran.steering[0] == 1.0
+
+
+def test_a_gentle_slope_changes_little_and_in_proportion():
+    gentle, level = (slope_motion(Chain(), Friction(), SKEW, 0.1, g, tolerance=1e-8) for g in (2e-4, 0.0))
+    twice = slope_motion(Chain(), Friction(), SKEW, 0.1, 4e-4, tolerance=1e-8)
+    assert twice.turn - level.turn == pytest.approx(2 * (gentle.turn - level.turn), rel=1e-2)
+    assert twice.climb[0] - level.climb[0] == pytest.approx(2 * (gentle.climb[0] - level.climb[0]), rel=1e-2)
+
+
+def test_joints_pay_for_friction_and_for_the_climb():
+    ran = slope_motion(LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-3, 0.4, heading=2.0, periods=3)
+    lifted = 0.4 * ran.climb
+    assert np.abs(lifted).min() > 1e-2
+    np.testing.assert_allclose(ran.joint_work, ran.friction_work + lifted, atol=1e-9)
+
+
+def test_a_mirrored_gait_drifts_to_the_other_side():
+    ran = slope_motion(Chain(), Friction(), SKEW, 1e-2, 0.3, heading=0.9)
+    mirrored = slope_motion(Chain(), Friction(), lambda t: tuple(-a for a in SKEW(t)), 1e-2, 0.3, heading=-0.9)
+    assert mirrored.climb == pytest.approx(ran.climb, abs=1e-5)
+    assert mirrored.aside == pytest.approx(-ran.aside, abs=1e-5)
+    assert mirrored.turn == pytest.approx(-ran.turn, abs=1e-5)
+
+
+def test_joints_at_rest_rest_on_any_slope_that_friction_holds():
+    """But for the creep of friction that is smoothed: delta g / sqrt(mu^2 - g^2)."""
+    for grade in (0.3, 0.99, 1.19):
+        ran = slope_motion(Chain(), Friction(1.2, 1.2, 1.2), still, 1e-6, grade)
+        assert ran.climb[0] == pytest.approx(-1e-6 * grade / np.sqrt(1.2**2 - grade**2), rel=1e-4)
+        assert abs(ran.turn) < 1e-9
+    with pytest.raises(ProblemError, match="slides down for ever"):
+        slope_motion(Chain(), Friction(1.2, 1.2, 1.2), still, 1e-6, 1.2)
+
+
+def test_skates_hold_across_the_slope_and_not_along():
+    def straight(t):
+        return np.zeros((2, np.size(t))), np.zeros((2, np.size(t)))
+
+    skates = Friction(10, 0.1, 0.1)
+    across = slope_motion(Chain(), skates, straight, 1e-6, 0.5, heading=np.pi / 2)
+    assert across.climb[0] == pytest.approx(-1e-6 * 0.5 / np.sqrt(10**2 - 0.5**2), rel=1e-4)
+    with pytest.raises(NotConvergedError, match="friction may be too weak"):
+        slope_motion(Chain(), skates, straight, 1e-6, 0.5, heading=0.0)
+
+
+@pytest.mark.parametrize("mu", [(1, 1, 1), (2, 1, 3)], ids=str)
+def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
+    """Backwards in time, and read from the other end, it is the same gait; the slope is turned over with the friction. So the
+    map of headings is its own inverse, and a monotone one that is must be none."""
+    found = heading_map(Chain(), Friction(*mu), REVERSIBLE, 1e-2, 0.3, count=4, tolerance=1e-5)
+    assert found.neutral
+    assert found.lasting == ()
+    np.testing.assert_allclose(found.turns, 0.0, atol=1e-4)
+    there = slope_motion(Chain(), Friction(*mu), REVERSIBLE, 1e-2, 0.3, heading=1.0, tolerance=1e-5)
+    assert there.steering[0] == pytest.approx(1.0, abs=1e-4)
+    # which is no matter of course: in between it does turn, otherwise than on the level
+    level = slope_motion(Chain(), Friction(*mu), REVERSIBLE, 1e-2, 0.0, heading=1.0, tolerance=1e-5)
+    half = [np.interp(0.5, ran.phases, ran.states[0]) for ran in (there, level)]
+    assert abs(half[0] - half[1]) > 1e-2
+
+
+def test_an_antipodal_gait_settles_along_the_fall_line():
+    found = heading_map(Chain(), Friction(), ANTIPODAL, 0.05, 0.1, count=4, tolerance=1e-4)
+    assert sorted(ran.stable for ran in found.lasting) == [False, True]
+    for ran in found.lasting:
+        assert abs(ran.turn) < 1e-3
+        assert abs(ran.aside[0]) < 1e-3  # its halves are mirror images
+        assert abs(ran.climb[0]) > 1e-2
+    (settled,) = (ran for ran in found.lasting if ran.stable)
+    run = slope_motion(Chain(), Friction(), ANTIPODAL, 0.05, 0.1, heading=settled.headings[0] + 0.3, periods=4, tolerance=1e-4)
+    left = run.headings - settled.headings[0]
+    np.testing.assert_allclose(left[1:] / left[:-1], settled.steering[0], atol=3e-3)
+    assert left[-1] < 0.9 * left[0]
+
+
+def test_a_body_that_turns_on_the_level_has_no_lasting_heading_on_a_gentle_slope():
+    found = heading_map(Chain(), Friction(), SKEW, 1e-2, 0.02, count=3, tolerance=1e-5)
+    assert not found.neutral
+    assert found.lasting == ()
+    assert (found.turns < 0).all() or (found.turns > 0).all()
+
+
+def test_the_steering_is_the_slope_of_the_map():
+    ends = [slope_motion(Chain(), Friction(), SKEW, 0.1, 0.4, heading=0.5 + s, tolerance=1e-7) for s in (-1e-3, 0.0, 1e-3)]
+    slope = (ends[2].headings[1] - ends[0].headings[1]) / 2e-3
+    assert ends[1].steering[0] == pytest.approx(slope, abs=1e-4)
+    assert abs(slope - 1.0) > 1e-2
+
+
+def test_the_stated_error_covers_the_true_one():
+    at = LOPSIDED, Friction(1.7, 1, 1.3), SKEW, 1e-3, 0.3
+    exact = slope_motion(*at, tolerance=1e-7).states[:5, -1]
+    for tolerance in (1e-3, 1e-4):
+        ran = slope_motion(*at, tolerance=tolerance)
+        assert np.abs(ran.states[:5, -1] - exact).max() < ran.error < 30 * tolerance
+
+
+def test_rates_may_jump_where_that_is_said():
+    def corners(t):
+        there = np.asarray(t) % 1.0
+        leg = np.minimum((4 * there).astype(int), 3)
+        start = np.array([[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
+        along = 4 * np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
+        return start[:, leg] + along[:, leg] * (there - leg / 4), along[:, leg]
+
+    told, untold = (
+        slope_motion(Chain(), Friction(), corners, 1e-2, 0.2, breaks=b, tolerance=1e-5) for b in ((0.25, 0.5, 0.75), ())
+    )
+    np.testing.assert_allclose(told.states[:5, -1], untold.states[:5, -1], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"body": CrawlerBody()}, "only chains of straight links"),
+        ({"grade": -0.1}, "grade must be a number that is not negative"),
+        ({"grade": np.nan}, "grade must be"),
+        ({"periods": 0}, "periods must be a whole number from 1"),
+        ({"gait": lambda t: (*SKEW(t), np.ones((1, np.size(t))))}, "a relaxed gait"),
+    ],
+)
+def test_what_cannot_be_is_named(changed, said):
+    given = {"body": Chain(), "friction": Friction(), "gait": SKEW, "delta": 1e-2, "grade": 0.1} | changed
+    with pytest.raises(ProblemError, match=said):
+        slope_motion(**given)
