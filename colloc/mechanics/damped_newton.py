@@ -36,17 +36,19 @@ _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
 METHODS = ("auto", "newton", "fixed_point")
 
 
+Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
+"""Body state ``(k, n_body, n)``, net force ``(3, n)`` and, of an associated law, the potential ``(n,)`` whose gradient is minus
+that force."""
+
+
 class Batch(Protocol):
     """Instants that share a reference: what the iteration evaluates on subsets of them."""
 
     @property
     def friction(self) -> Law: ...
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Body state ``(k, n_body, n)`` and net force ``(3, n)`` at z ``(3, n)`` of the selected instants."""
-
-    def potential(self, state: np.ndarray, delta: np.ndarray) -> np.ndarray:
-        """The dissipation potential ``(n,)`` of an associated law."""
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """What there is at z ``(3, n)`` of the selected instants."""
 
     def matrix(self, state: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
         """Minus the derivative of the net force, or the matrix of the paper's fixed point, ``(n, 3, 3)``."""
@@ -189,9 +191,8 @@ def iterate(
 
     def evaluated(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """With the merit ``(n,)`` that a step has to reduce: the potential if there is one, else half the squared residual."""
-        state, force = batch.evaluate(select, z, delta)
-        merit = batch.potential(state, delta) if batch.friction.associated else 0.5 * np.sum(force * force, axis=0)
-        return state, force, merit
+        state, force, potential = batch.evaluate(select, z, delta)
+        return state, force, 0.5 * np.sum(force * force, axis=0) if potential is None else potential
 
     n_time = z.shape[1]
     z = z.copy()

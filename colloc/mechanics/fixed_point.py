@@ -20,7 +20,7 @@ import numpy as np
 
 from colloc.mechanics.balance import Instant, balance_jacobian, dissipation_potential, instant, net_force, secant_matrix
 from colloc.mechanics.balance_results import BalanceSolution
-from colloc.mechanics.damped_newton import METHODS, groups, relative_delta, solve, starting_state
+from colloc.mechanics.damped_newton import METHODS, Evaluated, groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import compiled_balance, native_kernel
@@ -37,13 +37,11 @@ class _Batch:
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
         return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Links ``(7, n_link, n)``, posture, then velocity, and net force ``(3, n)`` at z."""
-        now = self.at(select, z, delta)
-        return np.stack([*now.posture, *now.velocity]), net_force(now.posture, now.force)
-
-    def potential(self, links: np.ndarray, delta: np.ndarray) -> np.ndarray:
-        return dissipation_potential(self.body, self.friction, LinkVelocity(*links[4:]), delta)
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """Links ``(7, n_link, n)``, posture, then velocity; net force and potential at z."""
+        now, body = self.at(select, z, delta), self.body
+        potential = dissipation_potential(body, self.friction, now.velocity, delta) if self.friction.associated else None
+        return np.stack([*now.posture, *now.velocity]), net_force(now.posture, now.force), potential
 
     def matrix(self, links: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
         matrix = balance_jacobian if newton else secant_matrix

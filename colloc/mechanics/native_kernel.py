@@ -130,13 +130,14 @@ def compiled_balance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3, n_time)``."""
     n_time = angles.shape[1]
-    given = [None if a is None else np.ascontiguousarray(a) for a in (angles, rates, start)]
-    q, dq, near = map(address, given)
+    angles, rates = np.ascontiguousarray(angles), np.ascontiguousarray(rates)
+    start = None if start is None else np.ascontiguousarray(start)
     z, anchor_velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
     iterations, anchor = np.empty(n_time, dtype=np.int64), np.empty(n_time, dtype=np.int64)
     found = z, residual, iterations, anchor, anchor_velocity
     how = tolerance, max_iterations, METHODS.index(method)
-    _call(library.colloc_balance, body, friction, n_time, q, dq, delta, near, *how, *map(address, found))
+    before = map(address, (angles, rates))
+    _call(library.colloc_balance, body, friction, n_time, *before, delta, address(start), *how, *map(address, found))
     return found
 
 
@@ -155,12 +156,11 @@ def compiled_motion(
     """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, 2 n_joint, n_time)`` if
     asked for."""
     n_time = angles.shape[1]
-    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity)]
-    q, dq, velocity = map(address, given)
+    angles, rates, anchor_velocity = (np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity))
     anchor = np.ascontiguousarray(anchor, dtype=np.int64)
     values, slopes = np.empty((7, n_time)), np.empty((6 if with_slopes else 0, 2 * body.n_joint, n_time))
-    wanted = address(slopes) if with_slopes else None
-    _call(library.colloc_motion, body, friction, n_time, q, dq, delta, address(anchor), velocity, address(values), wanted)
+    after = map(address, (anchor, anchor_velocity, values, slopes if with_slopes else None))
+    _call(library.colloc_motion, body, friction, n_time, *map(address, (angles, rates)), delta, *after)
     return values, slopes
 
 

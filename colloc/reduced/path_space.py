@@ -69,7 +69,7 @@ class PathSpace:
         self.own = np.arange(fit.lower.size)
         if self._arcs:
             speed, tangents, shapes = gait.split(self.own, n_joint)
-            self._tangents, self.shapes = tangents, shapes
+            self._speed, self._tangents, self.shapes = speed[0, 0], tangents, shapes
             last = tangents[:, : -1 if self._closed else None]
             self.own = np.concatenate([speed[0], last.ravel(order="F"), shapes[:, 0]])
             self.own = self.own[free[self.own]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from colloc.mechanics.damped_newton import Evaluated
 from colloc.mechanics.law import Law
 from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity, pulled_back, resultant
 
@@ -25,15 +26,13 @@ class PanelBatch:
         anchor_rate = self.edge_rate[reference : reference + 1]
         self.curve = np.stack(curve(self.panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes ``(9, n_node, n)``, curve, then velocity, and net force ``(3, n)`` at z."""
-        body = Curve(*self.curve[:, :, select])
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """Nodes ``(9, n_node, n)``, curve, then velocity; net force and potential at z."""
+        body, friction = Curve(*self.curve[:, :, select]), self.friction
         vs, vn = node_velocity(body, z)
-        return np.stack([*body, vs, vn]), resultant(body, *self.friction.density(vs, vn, delta))
-
-    def potential(self, nodes: np.ndarray, delta: np.ndarray) -> np.ndarray:
-        vs, vn = nodes[7:]
-        return np.sum(Curve(*nodes[:7]).weight * self.friction.density_potential(vs, vn, delta), axis=0)
+        force = resultant(body, *friction.density(vs, vn, delta))
+        potential = (body.weight * friction.density_potential(vs, vn, delta)).sum(axis=0) if friction.associated else None
+        return np.stack([*body, vs, vn]), force, potential
 
     def matrix(self, nodes: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
         vs, vn = nodes[7:]
