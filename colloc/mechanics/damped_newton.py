@@ -36,17 +36,19 @@ _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
 METHODS = ("auto", "newton", "fixed_point")
 
 
+Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
+"""Body state ``(k, n_body, n)``, net force ``(3, n)`` and, of an associated law, the potential ``(n,)`` whose gradient is minus
+that force."""
+
+
 class Batch(Protocol):
     """Instants that share a reference: what the iteration evaluates on subsets of them."""
 
     @property
     def friction(self) -> Law: ...
 
-    def evaluate(
-        self, select: np.ndarray, z: np.ndarray, delta: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        """Body state ``(k, n_body, n)``, net force ``(3, n)`` and, of an associated law, the potential ``(n,)`` whose gradient
-        is minus that force, at z ``(3, n)`` of the selected instants."""
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """What there is at z ``(3, n)`` of the selected instants."""
 
     def matrix(self, state: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
         """Minus the derivative of the net force, or the matrix of the paper's fixed point, ``(n, 3, 3)``."""

@@ -29,7 +29,7 @@ from colloc.mechanics.balance import (
     secant_matrix,
 )
 from colloc.mechanics.balance_results import BalanceSolution
-from colloc.mechanics.damped_newton import METHODS, groups, relative_delta, solve, starting_state
+from colloc.mechanics.damped_newton import METHODS, Evaluated, groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import compiled_balance, native_kernel
@@ -48,9 +48,7 @@ class _Batch:
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
         return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
 
-    def evaluate(
-        self, select: np.ndarray, z: np.ndarray, delta: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
         """Links ``(7, n_link, n)``, posture, then velocity; net force and potential at z, those of the load with them."""
         now, body = self.at(select, z, delta), self.body
         force = net_force(now.posture, now.force)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from colloc.mechanics.damped_newton import Evaluated
 from colloc.mechanics.law import Law
 from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity, pulled_back, resultant
 
@@ -25,9 +26,7 @@ class PanelBatch:
         anchor_rate = self.edge_rate[reference : reference + 1]
         self.curve = np.stack(curve(self.panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))
 
-    def evaluate(
-        self, select: np.ndarray, z: np.ndarray, delta: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
         """Nodes ``(9, n_node, n)``, curve, then velocity; net force and potential at z."""
         body, friction = Curve(*self.curve[:, :, select]), self.friction
         vs, vn = node_velocity(body, z)
