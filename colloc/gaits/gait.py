@@ -49,6 +49,10 @@ class GaitFunction:
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         raise NotImplementedError
 
+    def mapped(self, matrix: np.ndarray) -> Any:
+        """The gait, or a polygon near it, with shapes multiplied by a matrix ``(m, n_joint)``."""
+        raise NotImplementedError
+
     @property
     def delta_unit(self) -> float:
         """What the delta of the gait's class is multiplied by to get delta per period."""
