@@ -181,6 +181,11 @@ class FreePath(ClassOfGaits):
             if self.symmetry == ANTIPODAL and self.winding % 2 == 0:
                 raise ProblemError(f"gait.winding must be odd for an antipodal path, not {self.winding}.")
 
+    def check_joints(self, n_joint: int) -> None:
+        super().check_joints(n_joint)
+        if self.winding is not None and n_joint != 2:
+            raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
+
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants, each of which is an arc."""
         return round(self.fraction * min(_ARCS, self.most_arcs(n_joint)))

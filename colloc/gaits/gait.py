@@ -149,6 +149,11 @@ class ClassOfGaits:
         if self.symmetry not in self.symmetries:
             raise ProblemError(f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}.")
 
+    def check_joints(self, n_joint: int) -> None:
+        """A `ProblemError` if bodies with so many shape coordinates have no gaits of the class."""
+        if self.unit_speed and n_joint < 2:
+            raise ProblemError(f"the class {type(self).__name__} needs a body of at least three links, or two modes.")
+
     @property
     def fraction(self) -> float:
         """The part of the period that has to be solved; symmetry gives the rest."""
