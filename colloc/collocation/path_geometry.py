@@ -15,7 +15,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.blocks import LocalFunction
-from colloc.numerics.constraint_rows import Group, equalities, selector
+from colloc.numerics.constraint_rows import Group, block_group, equalities, selector
 from colloc.numerics.mesh import Mesh
 
 _FASTEST = 30.0
@@ -144,11 +144,9 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
         norms = tangents if symmetry == BILATERAL else tangents[:, :-1]
         geometry.blocks["norm"] = (unit_norm(n_joint), norms, np.empty((0, norms.shape[1])))
         geometry.blocks["turn"] = (excess_turn(n_joint, gait.curvature), arcs[n_joint:], h[None])
-        zero, one = np.zeros(n_arc), sparse.eye(n_arc, format="csr")
-        ones = sparse.eye(norms.shape[1], format="csr")
         geometry.groups += [
-            equalities("unit tangent", sparse.csr_matrix((norms.shape[1], n)), {"norm": ones}),
-            Group("curvature", np.full(n_arc, -np.inf), zero, sparse.csr_matrix((n_arc, n)), {"turn": one}),
+            block_group("unit tangent", 0.0, 0.0, norms.shape[1], n, "norm"),
+            block_group("curvature", -np.inf, 0.0, n_arc, n, "turn"),
             _ends("smooth closure", tangent_conditions(symmetry, n_joint), tangents, n),
         ]
     if symmetry != BILATERAL:
@@ -181,8 +179,6 @@ def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, 
     shortest = np.full(n_piece, gait.shortest_side)
     shortest[[0, -1]] *= np.where(gait.half_ends, 0.5, 1.0)
     least = np.append(shortest**2, 2 * np.pi * problem.smallest_shape_speed * gait.fraction)
-    unbounded = np.full(n_piece + 1, np.inf)
-    own = sparse.eye(n_piece + 1, format="csr")
-    geometry.groups.append(Group("sides", least, unbounded, sparse.csr_matrix((n_piece + 1, n)), {"sides": own}))
+    geometry.groups.append(block_group("sides", least, np.inf, n_piece + 1, n))
     _add_checks(geometry, problem, n)
     return geometry

@@ -7,12 +7,11 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from colloc.gaits.limits import Limit
 from colloc.mechanics.bodies import Body, Contact, Pairs
 from colloc.mechanics.contact import share_of_first, smooth_minimum, tangent_of_minimum
-from colloc.numerics.constraint_rows import Group
+from colloc.numerics.constraint_rows import Group, block_group
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +43,7 @@ class ShapeCheck:
 
     def group(self, limit: Limit, n_cell: int, n: int) -> Group:
         """The rows that keep it within its bounds in every mesh cell, by the block of its name, for n variables in all."""
-        lower, upper = (np.full(n_cell, bound) for bound in self.bounds(limit))
-        none, own = sparse.csr_matrix((n_cell, n)), sparse.eye(n_cell, format="csr")
-        return Group(self.name, lower, upper, none, {self.name: own})
+        return block_group(self.name, *self.bounds(limit), n_cell, n)
 
     def nearer_bounds(self, values: np.ndarray, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
         """Of the bounds on values ``(n,)``, lower and upper, the nearer one; infinite in the place of the other."""

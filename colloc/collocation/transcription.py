@@ -17,7 +17,6 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
@@ -40,6 +39,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
 from colloc.numerics.constraint_rows import (
     Group,
+    block_group,
     equalities,
     gait_group,
     output_group,
@@ -108,13 +108,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
         quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
         *(check.group(problem.joint_limit, mesh.n, layout.n) for check in checks),
-        Group(
-            "shape speed",
-            np.array([problem.smallest_shape_speed**2]),
-            np.array([np.inf]),
-            sparse.csr_matrix((1, layout.n)),
-            {"shape speed": sparse.eye(1, format="csr")},
-        ),
+        block_group("shape speed", problem.smallest_shape_speed**2, np.inf, 1, layout.n),
         *(group for _, group in besides.values()),
     ]
     velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)

@@ -14,13 +14,14 @@ import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
 from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction, imaged, reduced
 from colloc.numerics.arcs import advance, direction
 from colloc.system.arguments import check_positive, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _BESIDE = 1e-10
-_FINE_PHASES = 20000
+_FINE_PHASES, _CORNERS = 20000, 200
 _ARCS, _COARSE_ARCS, _PARAMETERS = 120, 24, 250
 """Arcs of a free path over a period, and at most so many parameters in them all."""
 JOINS, CURVATURE = 1e-8, 1e-6
@@ -128,6 +129,11 @@ class ArcPath(UnitSpeedGait):
         sharpest = np.abs(self.curvatures()).max()
         return [f"path of length {self.length:.4f} rad{turned}, largest curvature {sharpest:.3f} per rad"]
 
+    def mapped(self, matrix: np.ndarray) -> Corners:
+        """A polygon of many corners along the path whose shapes are these, multiplied by a matrix ``(m, n_joint)``."""
+        vertices = matrix @ self.angles(np.linspace(0.0, self.edges[-1], _CORNERS + 1))
+        return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
+
     def resampled(self, edges: np.ndarray) -> ArcPath:
         """The same path with other edges; exact if every old edge is a new one."""
         k, h, tau = self._at(edges)
@@ -174,6 +180,11 @@ class FreePath(ClassOfGaits):
                 raise ProblemError(f"gait.winding must be a whole number, not {self.winding!r}.")
             if self.symmetry == ANTIPODAL and self.winding % 2 == 0:
                 raise ProblemError(f"gait.winding must be odd for an antipodal path, not {self.winding}.")
+
+    def check_joints(self, n_joint: int) -> None:
+        super().check_joints(n_joint)
+        if self.winding is not None and n_joint != 2:
+            raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
 
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants, each of which is an arc."""

@@ -49,6 +49,10 @@ class GaitFunction:
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         raise NotImplementedError
 
+    def mapped(self, matrix: np.ndarray) -> Any:
+        """The gait, or a polygon near it, with shapes multiplied by a matrix ``(m, n_joint)``."""
+        raise NotImplementedError
+
     @property
     def delta_unit(self) -> float:
         """What the delta of the gait's class is multiplied by to get delta per period."""
@@ -144,6 +148,11 @@ class ClassOfGaits:
     def _check_symmetry(self) -> None:
         if self.symmetry not in self.symmetries:
             raise ProblemError(f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}.")
+
+    def check_joints(self, n_joint: int) -> None:
+        """A `ProblemError` if bodies with so many shape coordinates have no gaits of the class."""
+        if self.unit_speed and n_joint < 2:
+            raise ProblemError(f"the class {type(self).__name__} needs a body of at least three links, or two modes.")
 
     @property
     def fraction(self) -> float:

@@ -67,7 +67,7 @@ def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share:
     cos, sin = body.wave(waves)
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
     size = min(share * largest_factor(body, joint_limit, unit.angles(_PHASES)), _LARGEST)
-    return Fourier(unit.mean, size * unit.cos, size * unit.sin)
+    return unit.grown(size)
 
 
 def check_guess(body: Body, gait_class: Any, stated: Any, joint_limit: Limit, smallest_shape_speed: float) -> None:

@@ -94,6 +94,18 @@ class Fourier(GaitFunction):
             found.append(f"{coordinate} {j + 1}: " + " ".join(terms))
         return found
 
+    def mapped(self, matrix: np.ndarray) -> Fourier:
+        """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
+        return Fourier(matrix @ self.mean, matrix @ self.cos, matrix @ self.sin)
+
+    def scaled(self, factor: float) -> Fourier:
+        """The gait with all angles multiplied by a factor."""
+        return Fourier(factor * self.mean, factor * self.cos, factor * self.sin)
+
+    def grown(self, factor: float) -> Fourier:
+        """The gait with all angles multiplied by a factor about their mean."""
+        return Fourier(self.mean, factor * self.cos, factor * self.sin)
+
     def resized(self, n_harmonic: int) -> Fourier:
         """The same gait with harmonics added (zero) or cut."""
         keep = min(n_harmonic, self.n_harmonic)

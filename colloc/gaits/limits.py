@@ -39,6 +39,11 @@ def widest(limit: Limit) -> float:
     return float(np.max(limit))
 
 
+def of_each(limit: Limit | None, n_joint: int) -> tuple[float, ...]:
+    """The limits joint by joint; empty where there is none."""
+    return () if limit is None else tuple(np.broadcast_to(np.asarray(limit, dtype=float), n_joint).tolist())
+
+
 def under_one_limit(angles: np.ndarray, limit: Limit) -> tuple[np.ndarray, float]:
     """Shapes ``(n_joint, n)``, each joint stretched by what its limit is below the widest, and that: to be held against it."""
     if np.ndim(limit) == 0:

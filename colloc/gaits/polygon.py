@@ -84,6 +84,10 @@ class Corners(UnitSpeedGait):
         along = np.concatenate([[0.0], np.cumsum(self._lengths())])
         return fraction(self.symmetry) * along / along[-1]
 
+    def mapped(self, matrix: np.ndarray) -> Corners:
+        """The polygon with corners multiplied by a matrix ``(m, n_joint)``."""
+        return Corners(matrix @ self.corners, self.symmetry)
+
     def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         phase, image = reduced(self.symmetry, t)
         phases, vertices = self.phases, self.vertices

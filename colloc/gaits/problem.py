@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits import gait_fields
-from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import check_guess, travelling_wave
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit
+from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
@@ -224,11 +223,7 @@ class Problem:
     @property
     def actuator_limits(self) -> ActuatorLimits:
         """What the actuators can do, joint by joint."""
-        each = (
-            () if limit is None else np.broadcast_to(limit, self.body.n_joint)
-            for limit in (self.torque_limit, self.power_limit)
-        )
-        return ActuatorLimits(*(tuple(float(value) for value in limit) for limit in each))
+        return ActuatorLimits(*(of_each(limit, self.body.n_joint) for limit in (self.torque_limit, self.power_limit)))
 
     @property
     def paced_by(self) -> str:
@@ -268,10 +263,7 @@ class Problem:
             limit = getattr(self, name)
             if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
                 raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same {name}.")
-        if self.gait.unit_speed and self.body.n_joint < 2:
-            raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
-        if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
-            raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
+        self.gait.check_joints(self.body.n_joint)
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")

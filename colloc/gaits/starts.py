@@ -35,8 +35,6 @@ _ON_FLOOR = 1e-4
 _SHORT = 1.002
 """An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
 _PERIOD = np.linspace(0.0, 1.0, 1001)
-_CORNERS = 200
-"""Vertices by which a path of arcs is laid into a chain of other links."""
 _NEAR = 10.0
 """A search from a known optimum begins at so many times the final delta: friction more regularised than that prefers other
 gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 times the final delta 0.3998)."""
@@ -109,8 +107,7 @@ def _multiplied(problem: Problem, drawn: Fourier, fraction: float) -> Fourier:
     largest = largest_amplitude(problem, gait)
     if not np.isfinite(largest):
         return gait
-    factor = fraction * largest
-    return Fourier(factor * gait.mean, factor * gait.cos, factor * gait.sin)
+    return gait.scaled(fraction * largest)
 
 
 def perturbed_gait(problem: Problem, seed: int, start: int) -> Fourier:
@@ -148,13 +145,7 @@ def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = flo
     matrix = other.laid(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
     matrix = matrix * min(1.0, largest_factor(other, joint_limit, angles))
-    if isinstance(gait, Fourier):
-        return Fourier(matrix @ gait.mean, matrix @ gait.cos, matrix @ gait.sin)
-    if isinstance(gait, Corners):
-        return Corners(matrix @ gait.corners, gait.symmetry)
-    last = gait.edges[-1]
-    vertices = matrix @ gait.angles(np.linspace(0.0, last, _CORNERS + 1))
-    return Corners(vertices[:, :-1] if gait.symmetry == "none" else vertices, gait.symmetry)
+    return gait.mapped(matrix)
 
 
 def laid_into(
@@ -168,14 +159,13 @@ def laid_into(
     near = fourier_through(gait, gait_class) if isinstance(gait_class, Harmonic) else gait
     growth = 2 * np.pi * smallest_shape_speed / path_length(near)
     if growth > _SHORT and isinstance(near, Fourier):
-        near = Fourier(near.mean, growth * near.cos, growth * near.sin)
+        near = near.grown(growth)
     elif growth > _SHORT and isinstance(near, Corners):
         mean = near.angles(_PERIOD[:-1]).mean(axis=1, keepdims=True)
         near = Corners(mean + growth * (near.corners - mean), near.symmetry)
     if near is gait or not isinstance(near, Fourier):
         return near
-    factor = min(1.0, largest_factor(body, joint_limit, near.angles(_PERIOD)))
-    return Fourier(factor * near.mean, factor * near.cos, factor * near.sin)
+    return near.scaled(min(1.0, largest_factor(body, joint_limit, near.angles(_PERIOD))))
 
 
 def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float:

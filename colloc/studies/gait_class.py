@@ -117,7 +117,5 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     antipodal = np.linalg.norm(even) < close
     retraced = phase_distance(gait, reversed_in_time(gait)) < close
     turns = 0 if retraced else winding(gait)
-    bending = body.bending
-    bent = Fourier(bending @ gait.mean, bending @ gait.cos, bending @ gait.sin)
     ahead = headed_displacement(gait, body, friction)
-    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(bent), ahead)
+    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(gait.mapped(body.bending)), ahead)
