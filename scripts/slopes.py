@@ -19,7 +19,8 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.search.slope_search import ClimbingGait, climbing_gait
 from colloc.system.errors import NotConvergedError
-from colloc.verification.slope import SlopeMotion, slope_motion
+from colloc.verification.gait_on_slope import SlopeMotion
+from colloc.verification.slope import slope_motion
 
 SCENES = (
     ("equal friction", Friction(), 1, (0.0, 0.05, 0.1, 0.15, 0.2)),
@@ -41,7 +42,7 @@ def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], star
     found: list[ClimbingGait | None] = []
     for grade in grades:
         try:
-            best = climbing_gait(problem, grade, starts)
+            best = climbing_gait(problem, grade, starts=starts)
         except NotConvergedError:
             found.append(None)
             continue

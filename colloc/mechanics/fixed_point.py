@@ -145,6 +145,10 @@ def solve_balance(
     """
     angles, rates = _real("angles", angles), _real("rates", rates)
     n_time = angles.shape[1]
+    if body.n_joint != body.n_link - 1:
+        raise ProblemError(
+            f"the shape coordinates of {type(body).__name__} are not its {body.n_link - 1} joints: use its solve()."
+        )
     if angles.shape != (body.n_joint, n_time) or rates.shape != angles.shape:
         raise ProblemError(
             f"angles and rates must both have shape (n_joint, n_time) = ({body.n_joint}, n), "

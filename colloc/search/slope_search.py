@@ -15,6 +15,7 @@ import numpy as np
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.gaits.sampling import on_speed_floor
 from colloc.mechanics.body import Chain
 from colloc.numerics.sqp import Stationarity
 from colloc.reduced.closure import closed_gait
@@ -25,7 +26,8 @@ from colloc.search.far_contact import crossing_pairs, last_free
 from colloc.search.global_search import starting_gaits
 from colloc.search.reduced_search import FINE, FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, ROUGH, VERY_ROUGH, at_rest, deltas
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
-from colloc.verification.slope import SlopeMotion, checked_chain, slope_motion
+from colloc.verification.gait_on_slope import SlopeMotion
+from colloc.verification.slope import check_finite, checked_chain, slope_motion
 
 STARTS = 12
 _SCHEME = "gauss-3"
@@ -35,10 +37,12 @@ _DELTA = 0.2
 """Where starts are told apart, in units of the problem's first delta."""
 _FOLLOWED = 3
 _ADMISSIBLE, _TURN, _KKT, _VIOLATION, _CROSSING, _PHASES = 1e-6, 1e-4, 1e-6, 1e-8, 1e-8, 2000
-_DRIER, _SEVERAL = 0.1, 1e-3
+_MESH, _REPLAYED, _SEVERAL, _ASTRAY, _PAID = 1e-4, 1e-3, 1e-3, 1e-3, 1e-6
+"""What the checks allow, by their meanings below."""
+_DRIER = 0.1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ClimbingGait:
     """A gait for a slope, and how it was checked.
 
@@ -49,31 +53,41 @@ class ClimbingGait:
         Of a body that goes on in the same way period by period, as `colloc.slope_motion` counts it [rad].
     motion : SlopeMotion
         One period from there, by the replay.
-    value : float
-        Climb over work of the joints, by the replay.
+    way, value : float
+        Climb, or way in the direction that was asked for, and that over work of the joints; by the replay.
     checks : tuple of Check
     starts : int
         Tried in all.
+    smallest : bool
+        Whether it is as small as the problem's ``smallest_shape_speed`` allows: then that bound chose its size.
     """
 
     gait: Fourier
     heading: float
     motion: SlopeMotion
+    way: float
     value: float
     checks: tuple[Check, ...]
     starts: int
+    smallest: bool
 
     @property
     def passed(self) -> bool:
         """Whether all checks hold."""
         return all(check.passed for check in self.checks)
 
+    @property
+    def line(self) -> str:
+        """What it achieves."""
+        work, grade = self.motion.joint_work[0], self.motion.grade
+        return f"way {self.way:.6f}, work of the joints {work:.6f}, way/work {self.value:.6f} on a grade of {grade:g}"
+
+    def __repr__(self) -> str:
+        return f"<ClimbingGait: {self.line}; {'all checks hold' if self.passed else 'not all checks hold'}>"
+
     def __str__(self) -> str:
-        climb, work = self.motion.climb[0], self.motion.joint_work[0]
-        head = (
-            f"climb {climb:.6f}, work of the joints {work:.6f}, climb/work {self.value:.6f} on a grade of {self.motion.grade:g}"
-        )
-        return "\n".join([head, *(check.line() for check in self.checks)])
+        size = ["the gait shrank to the bound smallest_shape_speed"] * self.smallest
+        return "\n".join([self.line, *size, *(check.line() for check in self.checks)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,11 +100,12 @@ class _Found:
     conditions: Stationarity
 
 
-def climbing_gait(problem: Problem, grade: float, starts: int = STARTS) -> ClimbingGait:
+def climbing_gait(problem: Problem, grade: float, *, towards: float | None = None, starts: int = STARTS) -> ClimbingGait:
     """The gait of a class of harmonics that climbs a slope at the least work of the joints, of those that starts lead to.
 
     It is a local optimum of climb/work over the gait and the heading of the body, which a period must not turn; a stable
-    heading is not asked for (`SlopeMotion.stable` tells). On the level climb/work is the efficiency d/W.
+    heading is not asked for (`SlopeMotion.stable` tells). On the level climb/work is the efficiency d/W. Where a direction is
+    asked for, the body moves in that direction, and its way counts instead of its climb.
 
     Parameters
     ----------
@@ -99,6 +114,8 @@ def climbing_gait(problem: Problem, grade: float, starts: int = STARTS) -> Climb
         not for slopes.
     grade : float
         Tangent of the inclination, see `colloc.slope_motion`.
+    towards : float, optional
+        Direction of the way, from straight uphill, positive to the left [rad]; by default whichever climbs best.
     starts : int
 
     Raises
@@ -106,7 +123,7 @@ def climbing_gait(problem: Problem, grade: float, starts: int = STARTS) -> Climb
     ProblemError
         For a problem of another kind, or a slope that is too steep.
     NotConvergedError
-        If no start leads anywhere: no gait was found that climbs.
+        If no start leads anywhere: no gait was found that climbs, or goes that way.
 
     Examples
     --------
@@ -117,13 +134,15 @@ def climbing_gait(problem: Problem, grade: float, starts: int = STARTS) -> Climb
     (True, 0.09)
     """
     _check(problem, grade)
+    check_finite(towards=0.0 if towards is None else towards)
     if starts < 1:
         raise ProblemError(f"starts must be at least 1, not {starts}.")
     first = max(_DELTA * problem.delta_start, problem.delta)
     known: list[_Found] = []
     for gait in starting_gaits(problem, starts):
         with suppress(CollocError):
-            known.append(_settled(*_begun(problem, grade, closed_gait(problem, gait, first), first), FIRST_RADIUS, VERY_ROUGH))
+            begun = _begun(problem, grade, towards, closed_gait(problem, gait, first), first)
+            known.append(_settled(*begun, FIRST_RADIUS, VERY_ROUGH))
     ends = []
     for found in sorted(known, key=lambda one: one.objective)[:_FOLLOWED]:
         for delta in deltas(problem, first):
@@ -132,7 +151,8 @@ def climbing_gait(problem: Problem, grade: float, starts: int = STARTS) -> Climb
     best = min(ends, key=lambda one: one.objective, default=None)
     if best is None or not best.objective < 0:
         raise NotConvergedError(
-            f"no gait was found that climbs a grade of {grade:g}; try a gentler slope, more starts, or more harmonics."
+            f"no gait was found that climbs a grade of {grade:g}, or goes the way asked for; try a gentler slope, more starts, "
+            "or more harmonics."
         )
     return _refined(best, starts)
 
@@ -145,13 +165,15 @@ def _check(problem: Problem, grade: float) -> None:
     checked_chain(problem.body, problem.friction, grade)
 
 
-def _begun(problem: Problem, grade: float, gait: Fourier, delta: float) -> tuple[SlopeProgram, np.ndarray]:
-    """A program on a coarse mesh, and the gait pointed uphill."""
+def _begun(
+    problem: Problem, grade: float, towards: float | None, gait: Fourier, delta: float
+) -> tuple[SlopeProgram, np.ndarray]:
+    """A program on a coarse mesh, and the gait pointed uphill, or where it is to go."""
     space = HarmonicSpace(problem, np.linspace(0.0, 1.0, _COARSE + 1), _SCHEME)
     v = space.parameters(gait)
     level = SlopeProgram(space, 0.0, delta)
-    ahead, aside = (level.values(np.append(v, theta))[0] for theta in (0.0, -0.5 * np.pi))
-    program, u = SlopeProgram(space, grade, delta), np.append(v, -np.arctan2(aside, ahead))
+    ahead, _, _, aside = level.values(np.append(v, 0.0))
+    program, u = SlopeProgram(space, grade, delta, towards), np.append(v, (towards or 0.0) - np.arctan2(aside, ahead))
     if not np.isfinite(program.objective(u)):
         raise NotConvergedError("friction does not hold the body, or its joints brake it.")
     return program, u
@@ -159,7 +181,7 @@ def _begun(problem: Problem, grade: float, gait: Fourier, delta: float) -> tuple
 
 def _program(program: SlopeProgram, space: HarmonicSpace | None = None, delta: float | None = None) -> SlopeProgram:
     """The same on another mesh, or at another delta."""
-    return SlopeProgram(space or program.space, program.grade, program.delta if delta is None else delta)
+    return SlopeProgram(space or program.space, program.grade, program.delta if delta is None else delta, program.towards)
 
 
 def _settled(program: SlopeProgram, u: np.ndarray, radius: float, accuracy: float) -> _Found:
@@ -184,12 +206,21 @@ def _refined(found: _Found, starts: int) -> ClimbingGait:
         space = HarmonicSpace(space.problem, edges, _SCHEME, space.far)
         found = _settled(_program(found.program, space), found.u, radius, FINE)
         replayed = _replay(found)
-        value = float(replayed.climb[0] / replayed.joint_work[0])
+        value = _way(found, replayed).real / float(replayed.joint_work[0])
         apart = abs(value + found.objective) / abs(value)
         if apart < space.problem.mesh_tolerance or 2 * intervals > _MOST:
             gait = space.member(found.u[:-1])
-            heading = float(np.angle(np.exp(1j * replayed.headings[0])))
-            return ClimbingGait(gait, heading, replayed, value, _checks(found, replayed, apart), starts)
+            heading, way = float(np.angle(np.exp(1j * replayed.headings[0]))), _way(found, replayed).real
+            return ClimbingGait(
+                gait,
+                heading,
+                replayed,
+                way,
+                value,
+                _checks(found, replayed, apart),
+                starts,
+                on_speed_floor(space.problem, gait),
+            )
         intervals, radius = 2 * intervals, REMESH_RADIUS
 
 
@@ -207,11 +238,16 @@ def _replay(found: _Found, part: float = 1.0) -> SlopeMotion:
     return slope_motion(*at, theta=float(found.u[-1]))
 
 
+def _way(found: _Found, ran: SlopeMotion) -> complex:
+    """Way of a period in the direction that counts, and to the left of it."""
+    return complex(ran.climb[0], ran.aside[0]) * complex(np.exp(-1j * (found.program.towards or 0.0)))
+
+
 def _checks(found: _Found, replayed: SlopeMotion, apart: float) -> tuple[Check, ...]:
     space, conditions, body = found.program.space, found.conditions, found.program.space.problem.body
-    drier = _replay(found, _DRIER)
-    value = replayed.climb[0] / replayed.joint_work[0]
-    influence = abs(drier.climb[0] / drier.joint_work[0] - value) / abs(value)
+    drier, way = _replay(found, _DRIER), _way(found, replayed)
+    value, dry = way.real / replayed.joint_work[0], _way(found, drier).real / drier.joint_work[0]
+    influence, astray = abs(dry - value) / abs(value), 0.0 if found.program.towards is None else way.imag / way.real
     angles = space.member(found.u[:-1]).angles(np.arange(_PHASES) / _PHASES)
     crossing = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     stationary, usual = max(conditions.kkt_error, conditions.complementarity), body.usual
@@ -223,10 +259,11 @@ def _checks(found: _Found, replayed: SlopeMotion, apart: float) -> tuple[Check, 
             "admissible", max(found.program.place_rows(found.u), 0.0), _ADMISSIBLE, "excess over joint limits and contact [rad]"
         ),
         Check("crossing", crossing, _CROSSING, "depth to which links pass through each other"),
-        Check("replay", apart, 1e-4, "climb/work of the mesh against the replay, relative"),
-        Check("error of the replay", replayed.error / abs(replayed.climb[0]), 1e-3, "relative to the climb"),
+        Check("replay", apart, _MESH, "way/work of the mesh against the replay, relative"),
+        Check("error of the replay", replayed.error / abs(way.real), _REPLAYED, "relative to the way"),
+        Check("direction", astray, _ASTRAY, "of the way, off the one that was asked for [rad]"),
         Check("turn", replayed.turn, _TURN, "of the heading in a period, by the replay [rad]"),
         Check("one motion", replayed.several, _SEVERAL, "part of the period at which several motions are balanced"),
-        Check("work", paid, 1e-6, "work of the joints less that against friction and of the climb"),
-        Check("delta influence", influence, usual.delta_influence, "change of climb/work at a tenth of delta, relative"),
+        Check("work", paid, _PAID, "work of the joints less that against friction and of the climb"),
+        Check("delta influence", influence, usual.delta_influence, "change of way/work at a tenth of delta, relative"),
     )

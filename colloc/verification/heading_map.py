@@ -15,8 +15,9 @@ from scipy.optimize import brentq
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.replay import Path
-from colloc.verification.slope import SlopeMotion, gait_on_slope
+from colloc.verification.slope import check_finite, gait_on_slope
 
 _NEUTRAL = 10.0
 """Turns within so many times the tolerance are none."""
@@ -39,6 +40,11 @@ class HeadingMap(NamedTuple):
     turns: np.ndarray
     neutral: bool
     lasting: tuple[SlopeMotion, ...]
+
+    def __repr__(self) -> str:
+        kinds = (f"{ran.headings[0]:.4f} ({'stable' if ran.stable else 'unstable'})" for ran in self.lasting)
+        found = ", ".join(kinds) if self.lasting else "every one" if self.neutral else "none"
+        return f"<HeadingMap of {self.headings.size} headings; lasting: {found}>"
 
 
 def heading_map(
@@ -71,6 +77,7 @@ def heading_map(
     [(-3.13, True), (-0.01, False)]
     """
     on = gait_on_slope(body, friction, gait, delta, grade, breaks)
+    check_finite(positive=True, tolerance=tolerance, count=count)
     course = on.course(tolerance)
 
     def turn(heading: float) -> float:

@@ -1,188 +1,33 @@
-r"""A gait on a slope: the heading becomes an unknown of its own, because the weight pulls down the slope while the body turns.
-
-On a plane whose inclination has the tangent g, the *grade*, a body presses on the ground with a force of 1 and its weight pulls
-it down along the fall line with g. With theta the angle of the tail link from straight uphill, the pull in the body's axes is
-``-g e^(-i theta)``, and the balance at an instant gives velocities that depend on theta:
-
-    d theta/dt = omega(q, q', theta),      d x/dt = e^(i theta) c(q, q', theta),
-
-c being the velocity of the centre of mass in the body's axes, and x its place in the plane, its real part uphill. On the level
-theta is a sum; here this is an ordinary differential equation, and is solved as one. The joints work against friction and lift
-the body,
-
-    work of the joints = work against friction + g climb,
-
-which is measured on both sides: the left one from the moments in the joints.
-"""
+"""A gait followed on a slope, as people ask for it: what can be asked, and the error of the answer."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.body import Chain
-from colloc.mechanics.chain_motion import chain_slopes
-from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law, rate_independent
-from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.verification.adaptive_motion import fine_motion
+from colloc.system.errors import ProblemError
+from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion
 from colloc.verification.replay import Path
 
-_STEP = 1 / 100
-"""Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and then skip one unnoticed
-(Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams' takes short ones, and errs by 8 to 40 times a step."""
 _LOOSER = 30.0
-_UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
-"""Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
-_OMEGA, _LOAD = 2, slice(-2, None)
-_PANELS = 40
-_OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0, "driven_work": 0.0}
-"""Shares in the error of the motion on the level: its way alone is asked for."""
 
 
-@dataclass(frozen=True)
-class SlopeMotion:
-    """A gait on a slope, period by period.
-
-    Attributes
-    ----------
-    grade : float
-        Tangent of the inclination.
-    course : float
-        Direction in which the gait goes on the level, from that of the tail link at phase 0 [rad].
-    headings : (n_period + 1,)
-        At the start of every period and the end of the last: the direction in which the gait would go from there on the level,
-        from straight uphill, positive to the left [rad].
-    climb, aside : (n_period,)
-        Way of the centre of mass up the fall line, and to the left of it [body lengths along the slope].
-    friction_work, joint_work : (n_period,)
-        Work against friction, and of the joints by their moments [pressing force x body length].
-    steering : (n_period,)
-        Derivative of the heading at the end of a period with respect to that at its start; always positive.
-    error : float
-        Of headings, ways and works at the end: how much they change where steps are allowed 30 times the error.
-    several : float
-        Part of the time at which several motions are balanced, by the solver's steps; 0 for laws that leave one. One of them is
-        followed, and no error says what the others would change.
-    phases, states : (n,), (6, n)
-        Where the solver stepped, counted from the first start, and its unknowns: theta, way up and aside, work against
-        friction and of the joints, logarithm of the steering, all but theta from the first start.
-    """
-
-    grade: float
-    course: float
-    headings: np.ndarray
-    climb: np.ndarray
-    aside: np.ndarray
-    friction_work: np.ndarray
-    joint_work: np.ndarray
-    steering: np.ndarray
-    error: float
-    several: float
-    phases: np.ndarray = field(repr=False, compare=False)
-    states: np.ndarray = field(repr=False, compare=False)
-
-    @property
-    def turn(self) -> float:
-        """Of the heading, over all periods [rad]."""
-        return float(self.headings[-1] - self.headings[0])
-
-    @property
-    def stable(self) -> bool:
-        """Whether headings beside this one come closer to it."""
-        return bool(np.prod(self.steering) < 1.0)
-
-
-class GaitOnSlope(NamedTuple):
-    """A gait of a body, and the slope it is on."""
-
-    body: Chain
-    friction: Law
-    path: Path
-    delta: float
-    breaks: tuple[float, ...]
-    grade: float
-
-    def course(self, tolerance: float) -> float:
-        """Direction in which it goes on the level, from that of the tail link; 0 where it stays."""
-        edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), self.breaks)
-        way = fine_motion(self.body, self.friction, self.path, self.delta, edges, tolerance, lambda period: _OF_WAY).path[-1]
-        return float(np.angle(way)) if abs(way) > tolerance else 0.0
-
-    def followed(self, state: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Phases ``(n,)`` and unknowns ``(6, n)`` at the solver's steps through a period."""
-        near: np.ndarray | None = None
-
-        def slope(t: float, state: np.ndarray) -> np.ndarray:
-            nonlocal near
-            found, near = self._rates(t, state[0], near)
-            return found
-
-        phases, states = [], []
-        for first, last in pairwise([0.0, *self.breaks, 1.0]):
-            run = solve_ivp(slope, (first, last), state, method="LSODA", rtol=1e-13, atol=_STEP * tolerance * _UNKNOWNS)
-            if not run.success:
-                raise NotConvergedError(f"the motion on the slope could not be followed beyond phase {run.t[-1]:.4f}.")
-            state = run.y[:, -1]
-            phases.append(run.t)
-            states.append(run.y)
-        return np.concatenate(phases), np.concatenate(states, axis=1)
-
-    def pull(self, theta: np.ndarray) -> np.ndarray:
-        """Of the weight, in the body's axes, ``(2, n)``."""
-        pull = -self.grade * np.exp(-1j * theta)
-        return np.stack([pull.real, pull.imag])
-
-    def several(self, ran: SlopeMotion) -> float:
-        """Part of the time of a run at which several motions are balanced."""
-        if self.friction.associated:
-            return 0.0
-        angles, rates = self.path(ran.phases % 1.0)
-        load = self.pull(ran.states[0])
-        several = all_balanced_velocities(self.body, self.friction, angles, rates, self.delta, load).number > 1
-        return float(np.diff(ran.phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(ran.phases[-1])
-
-    def run(self, course: float, heading: float, periods: int, tolerance: float) -> SlopeMotion:
-        """The motion through periods from a heading, without its error."""
-        state = np.array([heading - course, 0.0, 0.0, 0.0, 0.0, 0.0])
-        ends, phases, states = [state], [], []
-        for period in range(periods):
-            t, through = self.followed(ends[-1], tolerance)
-            ends.append(through[:, -1])
-            phases.append(period + t)
-            states.append(through)
-        theta, *sums = np.stack(ends, axis=1)
-        climb, aside, friction_work, joint_work, steering = np.diff(sums)
-        unknown = np.concatenate(phases), np.concatenate(states, axis=1)
-        works = friction_work, joint_work
-        return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, np.nan, *unknown)
-
-    def _rates(self, t: float, theta: float, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
-        load = self.pull(np.array([theta]))
-        at = self.body, self.friction, *self.path(np.array([t])), self.delta
-        solved = solve_balance(*at, load=load, start=near)
-        if not solved.converged.all():
-            raise NotConvergedError(
-                f"no balance at phase {t:.4f} on a slope of grade {self.grade:g} (residual {solved.residual[0]:.1e}): friction "
-                "may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
-            )
-        now, slopes = chain_slopes(*at, solved, load)
-        moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
-        steering = slopes[_OMEGA, _LOAD, 0] @ [load[1, 0], -load[0, 0]]  # the pull turns against theta
-        return np.array([now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], steering]), solved.z
+def check_finite(positive: bool = False, **numbers: object) -> None:
+    """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
+    for name, value in numbers.items():
+        usable = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
+        if not usable or (positive and not value > 0):  # type: ignore[operator]
+            raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
 
 
 def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
     """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
-    if not isinstance(body, Chain):
-        raise ProblemError(f"only chains of straight links can be put on a slope, not {type(body).__name__}.")
+    if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
+        raise ProblemError(f"only a Chain, whose joints are its own, can be put on a slope, not {type(body).__name__}.")
     if isinstance(grade, bool) or not isinstance(grade, (int, float, np.number)) or not 0 <= grade < np.inf:
         raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
     if rate_independent(friction) and grade >= friction.largest:
@@ -200,7 +45,7 @@ def gait_on_slope(
     chain = checked_chain(body, friction, grade)
     if len(gait(np.zeros(1))) != 2:
         raise ProblemError("a relaxed gait cannot be put on a slope, where it matters how long each of its directions lasts.")
-    return GaitOnSlope(chain, friction, gait, delta, tuple(float(t) for t in breaks), float(grade))
+    return GaitOnSlope(chain, friction, gait, delta, tuple(sorted(float(t) for t in breaks)), float(grade))
 
 
 def slope_motion(
@@ -262,6 +107,8 @@ def slope_motion(
     [0.091] [1.048]
     """
     on = gait_on_slope(body, friction, gait, delta, grade, breaks)
+    check_finite(heading=heading, theta=0.0 if theta is None else theta)
+    check_finite(positive=True, tolerance=tolerance)
     if not isinstance(periods, (int, np.integer)) or periods < 1:
         raise ProblemError(f"periods must be a whole number from 1, not {periods!r}.")
     course = on.course(tolerance)

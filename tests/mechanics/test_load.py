@@ -131,3 +131,13 @@ def test_all_motions_under_a_load_are_balanced_and_counted_by_their_signs():
         at = np.flatnonzero(sign)
         stays = solve_balance(Chain(), law, angles[:, at], rates[:, at], 1e-4, load=load[:, at], start=z[:, at])
         np.testing.assert_allclose(stays.z, z[:, at], atol=1e-6)
+
+
+def test_a_body_with_shape_coordinates_of_its_own_is_not_taken_for_its_joints():
+    """The kernel would read joint angles that nobody gave."""
+
+    class Belt(Chain):
+        n_joint = 1
+
+    with pytest.raises(ProblemError, match="not its 2 joints"):
+        solve_balance(Belt(), Friction(), *random_instants(5, n_joint=1), 1e-3)

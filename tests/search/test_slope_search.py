@@ -52,6 +52,15 @@ def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     assert abs(found.motion.turn) < 1e-5
 
 
+def test_a_gait_goes_across_the_slope_if_it_is_asked_to():
+    across = climbing_gait(PROBLEM.with_(gait=Harmonic(2, "bilateral")), 0.1, towards=np.pi / 2, starts=1)
+    assert across.passed, str(across)
+    assert abs(across.motion.climb[0]) < 1e-3 * across.way
+    assert across.way == pytest.approx(across.motion.aside[0], rel=1e-6)
+    assert 0 < across.heading < np.pi / 2  # it points uphill of where it goes
+    assert across.motion.joint_work[0] == pytest.approx(across.motion.friction_work[0], abs=1e-4)
+
+
 @pytest.mark.parametrize(
     ("changed", "grade", "said"),
     [
@@ -65,6 +74,13 @@ def test_a_gait_without_symmetry_does_not_turn_in_a_period():
 def test_what_cannot_be_asked_is_named(changed, grade, said):
     with pytest.raises(ProblemError, match=said):
         climbing_gait(PROBLEM.with_(**changed), grade)
+
+
+def test_a_gait_that_shrinks_to_the_bound_says_so():
+    small = PROBLEM.with_(smallest_shape_speed=1.5, guess=ellipse(1.0, 0.9, 1.3))
+    found = climbing_gait(small, 0.0, starts=1)
+    assert found.smallest
+    assert "shrank to the bound smallest_shape_speed" in str(found)
 
 
 def test_a_slope_that_no_start_climbs_is_said_so():

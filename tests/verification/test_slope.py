@@ -16,6 +16,15 @@ REVERSIBLE = ellipse(A0=0.4, A1=1.5, B1=1.0)
 LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 
 
+class Belt(Chain):
+    """One motor for both joints: the kernel would read what is not there."""
+
+    n_joint = 1
+
+    def solve(self, *arguments, **settings):
+        raise NotImplementedError
+
+
 def still(t):
     """A bent body whose joints rest."""
     return np.tile([[0.4], [-0.7]], np.size(t)), np.zeros((2, np.size(t)))
@@ -140,6 +149,7 @@ def test_an_antipodal_gait_settles_along_the_fall_line():
 
 def test_a_body_that_turns_on_the_level_has_no_lasting_heading_on_a_gentle_slope():
     found = heading_map(Chain(), Friction(), SKEW, 1e-2, 0.02, count=3, tolerance=1e-5)
+    assert repr(found) == "<HeadingMap of 3 headings; lasting: none>"
     assert not found.neutral
     assert found.lasting == ()
     assert (found.turns < 0).all() or (found.turns > 0).all()
@@ -150,6 +160,7 @@ def test_the_steering_is_the_slope_of_the_map():
     slope = (ends[2].headings[1] - ends[0].headings[1]) / 2e-3
     assert ends[1].steering[0] == pytest.approx(slope, abs=1e-4)
     assert abs(slope - 1.0) > 1e-2
+    assert repr(ends[1]).startswith("<SlopeMotion of 1 period on a grade of 0.4: climb -0.")
 
 
 def test_the_stated_error_covers_the_true_one():
@@ -177,10 +188,15 @@ def test_rates_may_jump_where_that_is_said():
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"body": CrawlerBody()}, "only chains of straight links"),
+        ({"body": CrawlerBody()}, "only a Chain"),
+        ({"body": Belt()}, "only a Chain, whose joints are its own, can be put on a slope, not Belt"),
         ({"grade": -0.1}, "grade must be a number that is not negative"),
         ({"grade": np.nan}, "grade must be"),
         ({"periods": 0}, "periods must be a whole number from 1"),
+        ({"heading": np.nan}, "heading must be a finite number"),
+        ({"theta": "up"}, "theta must be a finite number"),
+        ({"tolerance": 0.0}, "tolerance must be a positive finite number"),
+        ({"delta": -1.0}, "delta must be a positive finite number"),
         ({"gait": lambda t: (*SKEW(t), np.ones((1, np.size(t))))}, "a relaxed gait"),
     ],
 )
