@@ -13,7 +13,7 @@ from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.results.checks import Certificate, Check
-from colloc.results.delta_limit import Limit, extrapolated_limit
+from colloc.results.delta_limit import PARTS_OF_DELTA, Limit, extrapolated_limit
 from colloc.results.level import REALISED
 from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
@@ -177,7 +177,7 @@ def measured(
     """
     replays: list[Replay] = []
     smoothed = friction.regularised or "driven_work" in objective.uses
-    for part in (1.0, 0.1, 0.01) if smoothed else (1.0,):
+    for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
         settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}

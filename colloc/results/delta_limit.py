@@ -14,7 +14,9 @@ class Limit:
     error: float
 
 
-_DECADE = 0.1
+PARTS_OF_DELTA = (1.0, 0.1, 0.01)
+"""At which a gait's value is to be known."""
+_DECADE = PARTS_OF_DELTA[1]
 _SLOWEST = 0.9
 
 
