@@ -314,6 +314,18 @@ def test_parts_share_the_cells_and_these_fill_the_domain(bound, monkeypatch):
         assert ((low <= [[1.0], [0.5], [s]]) & ([[1.0], [0.5], [s]] <= low + size)).all(axis=0).any()
 
 
+def test_cells_know_the_places_of_their_corners_and_share_each():
+    edges = np.array([0.0, 0.3, 1.0]), np.array([-1.0, -0.2, 0.5, 2.0]), np.array([-1.0, 0.0, 0.1, 0.4, 1.0])
+    for level in (0, 2):
+        counts = [(each.size - 1) << level for each in edges]
+        index = np.stack([a.ravel() for a in np.meshgrid(*map(np.arange, counts), indexing="ij")])
+        cells = guaranteed._Lattice(edges, level).cells(index)
+        places = cells.low[:, :, None] + cells.size[:, :, None] * CORNERS.T[:, None]
+        np.testing.assert_allclose(cells.points[:, cells.at], places, atol=1e-15)
+        assert cells.points.shape[1] == np.prod(np.array(counts) + 1)
+        assert np.prod(cells.size, axis=0).sum() == pytest.approx(1.0 * 3.0 * 2.0)
+
+
 def test_out_of_time_says_what_is_proved_so_far(bound):
     certificate = certify(*stated(bound), 0.5, seconds=0.0)
     assert certificate.open_cells > 0

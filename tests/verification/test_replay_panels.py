@@ -64,16 +64,6 @@ def test_corners_are_not_taken_for_kinks():
     assert stated_work(kept_in_view) > 1e-3
 
 
-def test_a_corner_at_the_end_of_the_period_is_not_taken_for_a_kink_by_the_wide_panel_before_a_narrow_one():
-    """Instants beside a panel are those of the next period as well, but not across a corner."""
-    panels = panels_of(lambda t: 1 + t, n=4)
-    last, others = panels.take(np.array([3])), panels.take(np.arange(3))
-    between = last.left[:, None] + last.width[:, None] * (np.arange(4) + 0.5) / 4
-    nothing, vectors, shares = np.zeros((1, 4)), np.zeros((1, 4, 3)), np.zeros((1, 4, 0))
-    new = (vectors, nothing.astype(complex), 1 + between, nothing, nothing, nothing, nothing, nothing, shares, vectors)
-    assert stated_work(others.joined(halves(last, new, np.zeros((1, 5))))) < 1e-14
-
-
 def test_halves_carry_on_and_know_what_halving_their_panel_changed():
     panels, n = panels_of(np.exp), 16
     changed = changes(panels)[0]
