@@ -48,6 +48,7 @@ from benchmarks.reach import Test, load, save
 ROOT = Path(__file__).resolve().parents[1]
 _LEFT_BEHIND = shutil.ignore_patterns(".*_cache", ".git", ".venv", ".hypothesis", "__pycache__", "reach-*.json")
 """What the copy does without."""
+MUTATED = ("bounds", "smooth", "mechanics", "results", "verification", "system")
 _NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "arguments")
 """What no result rests on."""
 TESTS = {
@@ -57,21 +58,23 @@ TESTS = {
     "results": ("tests/results",),
     "verification": ("tests/verification",),
     "system": ("tests/system",),
+    "laws": ("tests/laws",),
 }
 """What mirrors a package comes first; the rest of the suite is for those that survive it."""
 _OF_ALL_CALLS = "colloc/mechanics/native_kernel.py::address"
+_OF_OWN_LAWS = "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source"
 _OF_CALLS = {
     "enclosure.h": "colloc/bounds/enclosure.py::",
     "growth.h": "colloc/bounds/enclosure.py::",
     "cell_link.h": "colloc/bounds/enclosure.py::",
     "loaded.h": "colloc/bounds/loaded_balance.py::",
     "motion.h": "colloc/mechanics/native_kernel.py::compiled_motion",
-    "link_quadrature.h": "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source",
-    "dual.h": "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source",
+    "link_quadrature.h": _OF_OWN_LAWS,
+    "dual.h": _OF_OWN_LAWS,
 }
 """The Python that calls the C of a file; any call at all for the other files."""
 _MOST = 30.0
-"""Recorded processor seconds of the tests that one fault is met with; half of it for those that mirror its package."""
+"""Recorded processor seconds of the tests that one fault is met with; two thirds of it for those that mirror its package."""
 _LEAST_SHARE = 20
 """At least one mutant in so many is of each package."""
 
@@ -116,24 +119,27 @@ def _function_at(node: ast.AST, number: int, outer: str = "") -> str:
     return ""
 
 
+def _rank(test: Test) -> float:
+    """Cheap tests come first, and those that speak of little else."""
+    return test.seconds * len(test.calls)
+
+
 def tests_of(mutant: Mutant, texts: dict[str, str], known: dict[str, list[Test]]) -> tuple[list[str], float]:
-    """Names and processor seconds of the tests that call its function, or anything of its file where none does: the cheapest
-    files first."""
+    """Names and processor seconds of the tests that call its function, or anything of its file where none does."""
     function = mutant.function(texts)
     file = function.partition("::")[0] + "::"
     anywhere = any(function in test.calls for tests in known.values() for test in tests) and function != file
-    chosen, spent = [], 0.0
-    for folder in sorted(known, key=lambda folder: folder not in TESTS[mutant.package]):
-        mirrors = folder in TESTS[mutant.package]
+    mirroring, chosen, spent = TESTS[file.split("/")[1]], [], 0.0
+    for folder in sorted(known, key=lambda folder: folder not in mirroring):
         calling = [test for test in known[folder] if function in test.calls]
-        if not calling and (mirrors or not anywhere):
+        if not calling and (folder in mirroring or not anywhere):
             calling = [test for test in known[folder] if any(name.startswith(file) for name in test.calls)]
         by_file: dict[str, list[Test]] = {}
-        for test in sorted(calling, key=lambda test: test.seconds):
+        for test in sorted(calling, key=_rank):
             by_file.setdefault(test.name.partition("::")[0], []).append(test)
-        for tests in sorted(by_file.values(), key=lambda tests: sum(test.seconds for test in tests)):
+        for tests in sorted(by_file.values(), key=lambda tests: sum(map(_rank, tests))):
             for test in tests:
-                if spent + test.seconds < (_MOST / 2 if mirrors else _MOST):
+                if spent + test.seconds < (_MOST * 2 / 3 if folder in mirroring else _MOST):
                     chosen.append(test.name)
                     spent += test.seconds
     return chosen, spent
@@ -141,7 +147,7 @@ def tests_of(mutant: Mutant, texts: dict[str, str], known: dict[str, list[Test]]
 
 def sources() -> dict[str, str]:
     """Texts of the files that faults are put in."""
-    files = [path for package in TESTS for path in sorted((ROOT / "colloc" / package).rglob("*"))]
+    files = [path for package in MUTATED for path in sorted((ROOT / "colloc" / package).rglob("*"))]
     mutated = (path for path in files if path.suffix in (".py", ".c", ".h") and path.stem not in _NOT_MUTATED)
     return {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in mutated}
 
@@ -208,10 +214,16 @@ def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str], seconds: 
     finally:
         file.write_text(text, encoding="utf-8")
     said = (copy.parent / "said.txt").read_text(encoding="utf-8", errors="replace")
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", said, flags=re.MULTILINE)
+    failed = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", said, flags=re.MULTILINE)
     if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL, signal.SIGALRM):
         return "hangs", ""
     return "survived" if status == 0 else "caught", failed.group(1) if failed else ""
+
+
+@cache
+def sound(copy: Path, cache: Path, test: str) -> bool:
+    """Whether a test passes by itself without any fault: one that needs others before it says nothing of a fault."""
+    return _in_child(copy, lambda: _tests_in(copy, cache, [test], 200)) == 0
 
 
 def _in_child(copy: Path, work: Callable[[], int]) -> int:
@@ -319,6 +331,9 @@ def main() -> None:
             before = _processor_seconds()
             tests, seconds = tests_of(mutant, texts, known)
             what, failed = outcome(mutant, copy, cache, tests, seconds)
+            while what == "caught" and failed in tests and not sound(copy, cache, failed):
+                tests.remove(failed)
+                what, failed = outcome(mutant, copy, cache, tests, seconds)
             done[index], described = what, mutant.described(texts)
             line = {"sources": edition, "seed": options.seed, "sample": len(chosen), "index": index, "outcome": what}
             with options.record.open("a", encoding="utf-8") as record:

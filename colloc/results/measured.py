@@ -14,7 +14,9 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.verification.replay import MixedPath, Path, Replay, replay
 
-_DECADE = 0.1
+PARTS_OF_DELTA = (1.0, 0.1, 0.01)
+"""At which a gait's value is to be known."""
+_DECADE = PARTS_OF_DELTA[1]
 _SLOWEST = 0.9
 
 
@@ -80,7 +82,7 @@ def measured(
     """
     replays: list[Replay] = []
     smoothed = friction.regularised or "driven_work" in objective.uses
-    for part in (1.0, 0.1, 0.01) if smoothed else (1.0,):
+    for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
         near = replays[-1] if replays else None
         at = (body, friction, path, part * delta)
         settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}

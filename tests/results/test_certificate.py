@@ -10,11 +10,12 @@ from colloc.commands.verify import main as recheck
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
 from colloc.results import measured
-from colloc.results.certificate import certify
+from colloc.results.certificate import _one_motion, certify
 from colloc.results.checks import Check
 from colloc.results.measured import extrapolated_limit
 from colloc.results.solution import Solution
@@ -232,6 +233,22 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
     # the last value is moved by a ninth of the last change: so is what it may be wrong by
     errors = [7e-3, 9e-4, 2e-4]
     assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12)
+
+
+def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to_delta(three_link, replays, monkeypatch):
+    fine = replays[max(replays)]
+    monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(fine, distance=fine.distance * (1 + 3 * a[3])))
+    assert certify(three_link).efficiency_at_zero_delta == pytest.approx(fine.efficiency, rel=1e-12)
+
+
+def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(three_link, replays):
+    unequal, fine = three_link.problem.with_(friction=Friction(1.7, 1.0, 1.3)), replays[max(replays)]
+    for problem, several, said in (
+        (three_link.problem, 0.0, "leaves one balanced motion"),
+        (unequal, 0.0, "no other balanced motion was found"),
+        (unequal, 0.01, "several motions are balanced at 0.01 of the period"),
+    ):
+        assert said in _one_motion(problem, replace(fine, several=several)).meaning
 
 
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
