@@ -65,6 +65,6 @@ def summits_met(
 
 def largest_ratio(domain: Domain, space: PotentialSpace, free: np.ndarray, **settings: int) -> tuple[float, CoulombMotion]:
     """The largest ratio of gain to power that a lattice and climbs from its best meet, and the motion; see `summits_met`."""
-    reached, summit = summits_met(domain, space, free, **settings)  # type: ignore[arg-type]
+    reached, summit = summits_met(domain, space, free, **settings)
     best = int(np.argmax(reached))
     return float(reached[best]), summit.take(np.array([best]))
