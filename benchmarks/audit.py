@@ -27,8 +27,8 @@ import numpy as np
 
 from benchmarks.independent_replay import Crawler, Gait, Played, played_together
 from colloc import Chain, Friction, Harmonic, Problem, maximise_efficiency
-from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
-from colloc.results.certificate import measured
+from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
+from colloc.results.measured import measured
 from colloc.results.solution import SOLVED
 
 SEED = 1000

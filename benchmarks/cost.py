@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.tables import markdown_table
 from colloc.gaits.problem_file import read_problem_file
-from colloc.results.level import Level
+from colloc.results.steps import Level
 from colloc.search.reduced_search import Found
 
 PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")

@@ -17,9 +17,9 @@ import numpy as np
 
 from benchmarks.robustness import DELTA, TIME_LIMIT, case_problem
 from benchmarks.tables import markdown_table
-from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.bodies import FORMULATIONS
-from colloc.results.distinct_optima import Outcome
+from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import run_guess
 

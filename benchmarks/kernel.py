@@ -23,7 +23,7 @@ from colloc import Chain, Friction, solve_balance
 from colloc.bounds import cutting_plane, sampling
 from colloc.bounds.sampled import QUICK, compute_bound
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.results.solution import SOLVED
 from colloc.search.optimise import maximise_efficiency

@@ -2,31 +2,37 @@
 
     python -m benchmarks.mutation --mutants 200 [--seed 0] [--seconds 600]
 
-Faults are drawn from the packages that results rest on: an operator, a comparison, a constant, a sign, a condition or an
-`abs`, `min`, `max` is changed, in Python and in the C of the kernel. One run without any fault records which tests call which
-functions (`benchmarks.reach`). For a fault those that call its function run, of the folder that mirrors its package first,
-until one fails; as many as fit in 40 s of processor time. What takes far longer than without a fault counts as caught (it
-hangs). Those that survive are printed with their line: they are a gap of the tests, or a change without consequences.
+Faults are drawn from the packages that results rest on, as many of each as it has, but at least one in twenty: an operator,
+a comparison, a constant, a sign, a condition or an `abs`, `min`, `max` is changed, in Python and in the C of the kernel. One
+run of the default suite without any fault records which tests call which functions, also in the programs that they start
+(`benchmarks.reach`). A fault meets those that call its function, of the folder that mirrors its package first, until one fails;
+as many as fit in 30 s of processor time. What takes far longer than without a fault counts as caught (it hangs). Those that
+survive are printed with their line: they are a gap of the tests, or a change without consequences. C that the compiler turns
+into the same library is no fault, and is named so.
 What the record has of the same sources is not done again, so that the same command goes on with a run that was ended; a sample
-of other sources has other mutants. Which tests call what is kept
-beside it; remove that when tests change.
+of other sources has other mutants. Which tests call what is kept beside it.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import hashlib
 import json
 import os
 import random
+import re
 import resource
 import shutil
+import signal
+import subprocess
 import sys
 import tempfile
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -40,22 +46,37 @@ from benchmarks.faults import faults_of
 from benchmarks.reach import Test, load, save
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("colloc", "tests", "benchmarks", "problems", "studies", "scripts", "docs", "results", "pyproject.toml", "README.md")
-_NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "argument_names")
+_LEFT_BEHIND = shutil.ignore_patterns(".*_cache", ".git", ".venv", ".hypothesis", "__pycache__", "reach-*.json")
+"""What the copy does without."""
+MUTATED = ("bounds", "smooth", "mechanics", "results", "verification", "system")
+_NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "arguments")
 """What no result rests on."""
 TESTS = {
     "bounds": ("tests/bounds",),
     "smooth": ("tests/smooth",),
     "mechanics": ("tests/mechanics", "tests/hard"),
-    "results": ("tests/results", "tests/commands/test_verify_and_compare.py"),
-    "verification": ("tests/verification", "tests/results"),
-    "system": ("tests/system", "tests/results"),
+    "results": ("tests/results",),
+    "verification": ("tests/verification",),
+    "system": ("tests/system",),
+    "laws": ("tests/laws",),
 }
 """What mirrors a package comes first; the rest of the suite is for those that survive it."""
-_OF_THE_KERNEL = "colloc/mechanics/native_kernel.py::address"
-"""Called by whatever calls compiled code."""
-_MOST = 40.0
-"""Recorded processor seconds of the tests that one fault is met with."""
+_OF_ALL_CALLS = "colloc/mechanics/native_kernel.py::address"
+_OF_OWN_LAWS = "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source"
+_OF_CALLS = {
+    "enclosure.h": "colloc/bounds/enclosure.py::",
+    "growth.h": "colloc/bounds/enclosure.py::",
+    "cell_link.h": "colloc/bounds/enclosure.py::",
+    "loaded.h": "colloc/bounds/loaded_balance.py::",
+    "motion.h": "colloc/mechanics/native_kernel.py::compiled_motion",
+    "link_quadrature.h": _OF_OWN_LAWS,
+    "dual.h": _OF_OWN_LAWS,
+}
+"""The Python that calls the C of a file; any call at all for the other files."""
+_MOST = 30.0
+"""Recorded processor seconds of the tests that one fault is met with; two thirds of it for those that mirror its package."""
+_LEAST_SHARE = 20
+"""At least one mutant in so many is of each package."""
 
 
 class Mutant(NamedTuple):
@@ -70,17 +91,17 @@ class Mutant(NamedTuple):
     def package(self) -> str:
         return self.file.split("/")[1]
 
-    def described(self, copy: Path) -> str:
-        text = (copy / self.file).read_text(encoding="utf-8")
+    def described(self, texts: dict[str, str]) -> str:
+        text = texts[self.file]
         number = text.count("\n", 0, self.start) + 1
         line = text.splitlines()[number - 1].strip()
         return f"{self.file}:{number}: {text[self.start : self.end]!r} -> {self.new!r} in: {line}"
 
-    def function(self) -> str:
+    def function(self, texts: dict[str, str]) -> str:
         """``file::function`` it is in, as `benchmarks.reach` names it; ``file::`` outside all functions."""
         if not self.file.endswith(".py"):
-            return _OF_THE_KERNEL
-        text = (ROOT / self.file).read_text(encoding="utf-8")
+            return _OF_CALLS.get(Path(self.file).name, _OF_ALL_CALLS)
+        text = texts[self.file]
         number = text.count("\n", 0, self.start) + 1
         return f"{self.file}::{_function_at(ast.parse(text), number)}"
 
@@ -98,28 +119,35 @@ def _function_at(node: ast.AST, number: int, outer: str = "") -> str:
     return ""
 
 
-def tests_of(mutant: Mutant, known: dict[str, list[Test]]) -> list[str]:
-    """Names of the tests that call its function, or anything of its file where none does: file by file, the cheapest first."""
-    function = mutant.function()
-    chosen, spent = [], 0.0
-    for folder in dict.fromkeys((*TESTS[mutant.package], *known)):
+def _rank(test: Test) -> float:
+    """Cheap tests come first, and those that speak of little else."""
+    return test.seconds * len(test.calls)
+
+
+def tests_of(mutant: Mutant, texts: dict[str, str], known: dict[str, list[Test]]) -> tuple[list[str], float]:
+    """Names and processor seconds of the tests that call its function, or anything of its file where none does."""
+    function = mutant.function(texts)
+    file = function.partition("::")[0] + "::"
+    anywhere = any(function in test.calls for tests in known.values() for test in tests) and function != file
+    mirroring, chosen, spent = TESTS[file.split("/")[1]], [], 0.0
+    for folder in sorted(known, key=lambda folder: folder not in mirroring):
         calling = [test for test in known[folder] if function in test.calls]
-        if not calling and folder in TESTS[mutant.package]:
-            calling = [test for test in known[folder] if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
+        if not calling and (folder in mirroring or not anywhere):
+            calling = [test for test in known[folder] if any(name.startswith(file) for name in test.calls)]
         by_file: dict[str, list[Test]] = {}
-        for test in sorted(calling, key=lambda test: test.seconds):
+        for test in sorted(calling, key=_rank):
             by_file.setdefault(test.name.partition("::")[0], []).append(test)
-        for tests in sorted(by_file.values(), key=lambda tests: sum(test.seconds for test in tests)):
+        for tests in sorted(by_file.values(), key=lambda tests: sum(map(_rank, tests))):
             for test in tests:
-                if spent + test.seconds < _MOST:
+                if spent + test.seconds < (_MOST * 2 / 3 if folder in mirroring else _MOST):
                     chosen.append(test.name)
                     spent += test.seconds
-    return chosen
+    return chosen, spent
 
 
 def sources() -> dict[str, str]:
     """Texts of the files that faults are put in."""
-    files = [path for package in TESTS for path in sorted((ROOT / "colloc" / package).rglob("*"))]
+    files = [path for package in MUTATED for path in sorted((ROOT / "colloc" / package).rglob("*"))]
     mutated = (path for path in files if path.suffix in (".py", ".c", ".h") and path.stem not in _NOT_MUTATED)
     return {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in mutated}
 
@@ -131,20 +159,71 @@ def mutants(texts: dict[str, str]) -> Iterator[Mutant]:
             yield Mutant(file, start, end, new)
 
 
-def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str]) -> str:
-    """ "caught", "survived", "hangs" or "not reached"; the tests in a child of this process: libraries are imported once."""
+def drawn(found: list[Mutant], number: int, seed: int) -> list[Mutant]:
+    """A sample: of each package as many as it has of all, but at least one in `_LEAST_SHARE`."""
+    packages = Counter(mutant.package for mutant in found)
+    room = {name: max(number // _LEAST_SHARE, number * packages[name] // len(found)) for name in packages}
+    room[max(room, key=lambda name: room[name])] += number - sum(room.values())
+    chosen = []
+    for mutant in random.Random(seed).sample(found, len(found)):
+        if room[mutant.package] > 0:
+            room[mutant.package] -= 1
+            chosen.append(mutant)
+    return chosen
+
+
+_COMPILED = ("cc", "-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
+_OWN_LAW = "from colloc import OwnLaw; print(OwnLaw('-vs/speed', '-vn/speed*(1 + exp(-speed))').kernel_source)"
+
+
+@cache
+def _own_law(copy: Path) -> Path:
+    """A folder with the C of a law of one's own."""
+    (copy.parent / "law").mkdir()
+    made = subprocess.run([sys.executable, "-c", _OWN_LAW], cwd=copy, stdout=subprocess.PIPE, check=True).stdout
+    (copy.parent / "law" / "own_law.h").write_bytes(made)
+    return copy.parent / "law"
+
+
+def kernels_of(copy: Path) -> Iterator[bytes]:
+    """What the compiler makes of the C as it is, without a law of one's own and with one; empty if it refuses."""
+    library, source = copy.parent / "kernel.so", copy / "colloc/mechanics/native/kernel.c"
+    for flags in ([], ["-DOWN_LAW", f"-I{_own_law(copy)}", f"-I{source.parent}"]):
+        done = subprocess.run([*_COMPILED, *flags, source, "-o", library, "-lm"], capture_output=True)
+        yield b"" if done.returncode else library.read_bytes()
+
+
+@cache
+def _faultless(copy: Path) -> tuple[bytes, ...]:
+    """The same before any fault is put in."""
+    return tuple(kernels_of(copy))
+
+
+def outcome(mutant: Mutant, copy: Path, cache: Path, tests: list[str], seconds: float) -> tuple[str, str]:
+    """ "caught", "survived", "hangs", "not reached" or "same code", and the test that failed; in a child of this process, which
+    has the libraries."""
     if not tests:
-        return "not reached"
+        return "not reached", ""
     file = copy / mutant.file
-    text = file.read_text(encoding="utf-8")
+    text, known = file.read_text(encoding="utf-8"), () if file.suffix == ".py" else _faultless(copy)
     file.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding="utf-8")
     try:
-        status = _in_child(copy, lambda: _tests_in(copy, cache, tests))
+        if known and all(made and made == before for made, before in zip(kernels_of(copy), known, strict=True)):
+            return "same code", ""
+        status = _in_child(copy, lambda: _tests_in(copy, cache, tests, int(1.5 * seconds) + 20))
     finally:
         file.write_text(text, encoding="utf-8")
-    if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (24, 9):
-        return "hangs"
-    return "survived" if status == 0 else "caught"
+    said = (copy.parent / "said.txt").read_text(encoding="utf-8", errors="replace")
+    failed = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", said, flags=re.MULTILINE)
+    if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL, signal.SIGALRM):
+        return "hangs", ""
+    return "survived" if status == 0 else "caught", failed.group(1) if failed else ""
+
+
+@cache
+def sound(copy: Path, cache: Path, test: str) -> bool:
+    """Whether a test passes by itself without any fault: one that needs others before it says nothing of a fault."""
+    return _in_child(copy, lambda: _tests_in(copy, cache, [test], 200)) == 0
 
 
 def _in_child(copy: Path, work: Callable[[], int]) -> int:
@@ -153,6 +232,7 @@ def _in_child(copy: Path, work: Callable[[], int]) -> int:
     if child == 0:
         code = 1
         try:
+            os.setpgid(0, 0)
             os.chdir(copy)
             sys.path = [str(copy), *(entry for entry in sys.path if Path(entry or ".").resolve() != ROOT)]
             for name in [name for name in sys.modules if name.split(".")[0] == "benchmarks"]:
@@ -165,13 +245,16 @@ def _in_child(copy: Path, work: Callable[[], int]) -> int:
             traceback.print_exc()
         finally:  # never back into the parent's program
             os._exit(code)
-    return os.waitpid(child, 0)[1]
+    status = os.waitpid(child, 0)[1]
+    with contextlib.suppress(ProcessLookupError):  # what a fault left running
+        os.killpg(child, signal.SIGKILL)
+    return status
 
 
-def _tests_in(copy: Path, cache: Path, tests: list[str]) -> int:
+def _tests_in(copy: Path, cache: Path, tests: list[str], seconds: int) -> int:
     """Exit code of pytest, told to stop at the first failure."""
-    seconds = int(3 * _MOST)
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+    signal.setitimer(signal.ITIMER_REAL, 5 * seconds + 60)
     os.environ |= {"PYTHONPATH": str(copy), "COLLOC_CODE": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
     sys.dont_write_bytecode = True
     return int(pytest.main(["-x", "-n", "0", "-p", "no:cacheprovider", *tests]))
@@ -203,49 +286,58 @@ def _processor_seconds() -> float:
     return used.ru_utime + used.ru_stime
 
 
+def _recorded(copy: Path, cache: Path, beside: Path) -> dict[str, list[Test]]:
+    """What the tests of every folder call, kept beside the record under a name made of the tests' text."""
+    known = {}
+    places = [path for path in sorted((copy / "tests").iterdir()) if any(path.glob("test_*.py")) or path.match("test_*.py")]
+    for place in places:
+        files = sorted(place.rglob("*.py")) if place.is_dir() else [place]
+        name = str(place.relative_to(copy))
+        edition = hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:8]
+        kept = beside / f"reach-{name.replace('/', '-').removesuffix('.py')}-{edition}.json"
+        if not kept.exists():
+            before = _processor_seconds()
+            save(_reached(copy, cache, name), kept)
+            print(f"{name} without a fault: {_processor_seconds() - before:.0f} s", flush=True)
+        known[name] = load(kept)
+    return known
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--mutants", type=int, default=200, metavar="N")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
-    parser.add_argument("--again", action="store_true", help="those that survived meet the tests of all folders")
     parser.add_argument("--only", default="", metavar="TEXT", help="of the sample those in files whose path holds this")
     options = parser.parse_args()
     texts = sources()
     found, edition = list(mutants(texts)), hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:12]
-    chosen = random.Random(options.seed).sample(found, min(options.mutants, len(found)))
-    done, again = dict[int, str](), set[int]()
+    chosen = drawn(found, min(options.mutants, len(found)), options.seed)
+    done = dict[int, str]()
     if options.record.exists():
         rows = map(json.loads, options.record.read_text(encoding="utf-8").splitlines())
-        done = {row["index"]: row["outcome"] for row in rows if (row["seed"], row.get("sources")) == (options.seed, edition)}
-        again = {index for index, what in done.items() if options.again and what in ("survived", "not reached")}
+        same = {"sources": edition, "seed": options.seed, "sample": len(chosen)}
+        done = {row["index"]: row["outcome"] for row in rows if same.items() <= row.items()}
     options.record.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         copy, cache = Path(folder) / "colloc", Path(folder) / "cache"
-        copy.mkdir()
-        for name in COPIED:
-            source = ROOT / name
-            (shutil.copytree if source.is_dir() else shutil.copy2)(source, copy / name)
+        shutil.copytree(ROOT, copy, ignore=_LEFT_BEHIND)
         cache.mkdir(mode=0o700)
-        known: dict[str, list[Test]] = {}
-        for index, mutant in sorted(enumerate(chosen), key=lambda each: list(TESTS).index(each[1].package)):
-            left_out = (index in done) != (index in again) or options.only not in mutant.file
-            if left_out or _processor_seconds() > options.seconds:
+        known = _recorded(copy, cache, options.record.parent)
+        for index, mutant in enumerate(chosen):
+            if index in done or options.only not in mutant.file or _processor_seconds() > options.seconds:
                 continue
-            for tests_folder in dict.fromkeys(folder for folders in TESTS.values() for folder in folders):
-                kept = options.record.with_name(f"reach-{tests_folder.replace('/', '-')}.json")
-                if not kept.exists() and tests_folder in TESTS[mutant.package]:
-                    save(_reached(copy, cache, tests_folder), kept)
-                    print(f"{tests_folder} without a fault: {_processor_seconds():.0f} s", flush=True)
-                if tests_folder not in known and kept.exists():
-                    known[tests_folder] = load(kept)
-            before, tests = _processor_seconds(), tests_of(mutant, known)
-            what, described = outcome(mutant, copy, cache, tests), mutant.described(copy)
-            done[index] = what
+            before = _processor_seconds()
+            tests, seconds = tests_of(mutant, texts, known)
+            what, failed = outcome(mutant, copy, cache, tests, seconds)
+            while what == "caught" and failed in tests and not sound(copy, cache, failed):
+                tests.remove(failed)
+                what, failed = outcome(mutant, copy, cache, tests, seconds)
+            done[index], described = what, mutant.described(texts)
+            line = {"sources": edition, "seed": options.seed, "sample": len(chosen), "index": index, "outcome": what}
             with options.record.open("a", encoding="utf-8") as record:
-                line = {"sources": edition, "seed": options.seed, "index": index, "outcome": what, "tests": len(tests)}
-                record.write(json.dumps(line | {"mutant": described}) + "\n")
+                record.write(json.dumps(line | {"tests": len(tests), "failed": failed, "mutant": described}) + "\n")
             print(f"{index:4d} {what:11s} {_processor_seconds() - before:6.1f} s  {described}", flush=True)
     print(f"{len(done)} of {len(chosen)} mutants: {dict(Counter(done.values()))}")
 

@@ -3,6 +3,7 @@
     python -m benchmarks.reach results/reach.json tests/mechanics tests/bounds ...
 
 A fixture of a module or session is set up in its first test only; what it calls is ascribed to every test that asks for it.
+Python programs that a test starts write down their calls themselves (`traced_children`).
 """
 
 from __future__ import annotations
@@ -11,16 +12,18 @@ import argparse
 import json
 import os
 import sys
-import time
+import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
+from types import CodeType, FrameType
 from typing import Any, NamedTuple
 
 import pytest
 
-_INSIDE = f"{os.sep}colloc{os.sep}"
+_LIBRARY = f"{Path(__file__).resolve().parents[1] / 'colloc'}{os.sep}"
+_TRACED_CHILDREN = str(Path(__file__).with_name("traced_children"))
 
 
 class Test(NamedTuple):
@@ -31,10 +34,15 @@ class Test(NamedTuple):
     calls: frozenset[str]
 
 
-def _named(frame: FrameType) -> str | None:
-    """``colloc/bounds/guaranteed.py::certify`` of a frame; None outside the library."""
-    head, inside, file = frame.f_code.co_filename.rpartition(_INSIDE)
-    return f"colloc/{file}::{frame.f_code.co_qualname}" if inside and head.endswith(str(Path.cwd())) else None
+def _named(code: CodeType) -> str | None:
+    """``colloc/bounds/guaranteed.py::certify`` of a function; None outside the library."""
+    file = code.co_filename
+    return f"colloc/{file.removeprefix(_LIBRARY)}::{code.co_qualname}" if file.startswith(_LIBRARY) else None
+
+
+def _seconds() -> float:
+    """Processor time of this process and its children so far."""
+    return sum(os.times()[:4])
 
 
 class Recorder:
@@ -44,28 +52,28 @@ class Recorder:
         self.tests: list[Test] = []
         self.failed: set[str] = set()
         self._by_fixture: dict[Any, set[str]] = {}
-        self._names: dict[Any, str | None] = {}
 
     @contextmanager
     def _calls(self) -> Iterator[set[str]]:
         """The set of what is called in the block, complete at its end."""
-        codes: set[Any] = set()
+        codes: set[CodeType] = set()
+        found: set[str] = set()
 
         def called(frame: FrameType, event: str, argument: Any) -> None:
-            code = frame.f_code
-            if code not in codes:
-                codes.add(code)
-                if code not in self._names:
-                    self._names[code] = _named(frame)
+            codes.add(frame.f_code)
 
-        found: set[str] = set()
-        before = sys.gettrace()
-        sys.settrace(called)
-        try:
-            yield found
-        finally:
-            sys.settrace(before)
-            found |= {name for code in codes if (name := self._names[code])}
+        before, outer = sys.gettrace(), os.environ.get("COLLOC_REACH", "")
+        with tempfile.NamedTemporaryFile("r", encoding="utf-8") as of_children:
+            os.environ["COLLOC_REACH"] = of_children.name
+            threading.settrace(called)
+            sys.settrace(called)
+            try:
+                yield found
+            finally:
+                sys.settrace(before)
+                threading.settrace(before)
+                os.environ["COLLOC_REACH"] = outer
+                found |= {name for code in codes if (name := _named(code))} | set(of_children.read().splitlines())
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_fixture_setup(self, fixturedef: Any, request: Any) -> Iterator[None]:
@@ -75,12 +83,12 @@ class Recorder:
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_protocol(self, item: Any, nextitem: Any) -> Iterator[None]:
-        begin = time.process_time()
+        begin = _seconds()
         with self._calls() as calls:
             yield
         for fixtures in item._fixtureinfo.name2fixturedefs.values():
             calls |= self._by_fixture.get(fixtures[-1], set())
-        self.tests.append(Test(item.nodeid, time.process_time() - begin, frozenset(calls)))
+        self.tests.append(Test(item.nodeid, _seconds() - begin, frozenset(calls)))
 
     def pytest_runtest_logreport(self, report: Any) -> None:
         if report.failed:
@@ -90,6 +98,8 @@ class Recorder:
 def recorded(folders: tuple[str, ...]) -> tuple[list[Test], int]:
     """The default tests of some folders, run once, and pytest's exit code; without those that fail when they are traced."""
     recorder = Recorder()
+    paths = (_TRACED_CHILDREN, os.environ.get("PYTHONPATH", ""))
+    os.environ |= {"PYTHONPATH": os.pathsep.join(filter(None, paths)), "COLLOC_REACH_IN": _LIBRARY, "COLLOC_REACH": ""}
     # Dask ends a process that is traced, and signals that are sent to traced code come too late
     options = ["-n", "0", "-p", "no:cacheprovider", "-k", "not dask", "--ignore=tests/system/test_interruption.py"]
     code = pytest.main([*options, *folders], plugins=[recorder])

@@ -33,9 +33,10 @@ import numpy as np
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.gait_fields import law_fields
 from colloc.gaits.harmonic import shifted
-from colloc.gaits.sampling import LATIN_HYPERCUBE, on_speed_floor
+from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
-from colloc.results.distinct_optima import Outcome, basins, counts
+from colloc.results.distinct_optima import basins
+from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED, versions
 from colloc.studies.campaign import process_pool, run_starts
 from colloc.verification.replay import replay

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from colloc import Friction, Harmonic, Problem, ellipse
-from colloc.results.distinct_optima import Outcome
+from colloc.results.outcome import Outcome
 from colloc.studies import run as study_run
 from colloc.studies.cell import Attempt, Visit, Work, run_chunk, start_key
 from colloc.studies.run import StudyRun

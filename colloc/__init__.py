@@ -26,10 +26,10 @@ from typing import TYPE_CHECKING
 from colloc.system.late_binding import bind
 
 if TYPE_CHECKING:
+    from colloc.gaits.free_path import ArcPath, FreePath
     from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
     from colloc.gaits.objective import Objective
-    from colloc.gaits.path_classes import FreePath, Polygon
-    from colloc.gaits.paths import ArcPath, Corners
+    from colloc.gaits.polygon import Corners, Polygon
     from colloc.gaits.problem import Problem
     from colloc.gaits.problem_file import Reference, load_problem
     from colloc.gaits.relaxed import Relaxed
@@ -74,9 +74,9 @@ _HOME = {
     "laws.power_law": ("PowerLaw",),
     "laws.own_law": ("OwnLaw",),
     "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
-    "gaits.path_classes": ("FreePath", "Polygon"),
+    "gaits.free_path": ("FreePath", "ArcPath"),
+    "gaits.polygon": ("Polygon", "Corners"),
     "gaits.relaxed": ("Relaxed",),
-    "gaits.paths": ("ArcPath", "Corners"),
     "search.optimise": ("maximise_efficiency",),
     "search.slope_search": ("climbing_gait",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
@@ -143,6 +143,7 @@ __all__ = [
 # what a solution offers and packages above it do
 bind(
     {
+        "card": "colloc.pictures.solution_card:solution_card",
         "plot": "colloc.pictures.solution_figure:solution_figure",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",

@@ -14,12 +14,12 @@ import numpy as np
 
 from colloc import Chain, Friction
 from colloc.bounds.infinitesimal import small_gait
-from colloc.bounds.sampled import QUICK, known_bound
 from colloc.gaits.gait_fields import gait_from
 from colloc.pictures.style import save
-from scripts.bound_table import BUDGET
 from scripts.class_rows import equal_links, known_small_gait
 from scripts.figures_classes import GaitPanel, gait_figure
+from scripts.frontier import Row, smallest_bound
+from scripts.frontier import read as frontier
 from scripts.link_gaps import LYING, gaps
 
 CURATED = Path("results/curated")
@@ -107,10 +107,9 @@ def smaller_delta(row: str, found: dict) -> bool:
 
 def bound_line(friction: Friction) -> str:
     """What no gait can exceed, as far as it is known here, and what the smallest gaits reach."""
-    cache = Path("results/bounds.sqlite")
-    budgets = (BUDGET, QUICK) if cache.exists() else ()
-    bounds = [bound.sampled for budget in budgets if (bound := known_bound(Chain(), friction, budget=budget, cache=cache))]
-    upper = f"{min(bounds):.4f} (sampled; scripts.bound_table)" if bounds else f"{1 / friction.smallest:.4g} = 1/min(mu)"
+    mu = (friction.mu_t, friction.mu_f, friction.mu_b)
+    least = smallest_bound(Row(mu, float(np.pi), 3, 0.0), frontier())
+    upper = f"{least:.4f} (sampled; scripts.frontier)" if np.isfinite(least) else f"{1 / friction.smallest:.4g} = 1/min(mu)"
     places = {"(2.2, -2.2)": (2.2, -2.2), "the fold (pi, 0)": (3.1415, 0.0)}
     at = {name: small_gait(Chain(), friction, np.array(shape)).efficiency for name, shape in places.items()}
     reached = ", ".join(f"{value:.4f} at {name}" for name, value in at.items())

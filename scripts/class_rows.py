@@ -11,7 +11,7 @@ import numpy as np
 from colloc import Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.bounds.infinitesimal import SmallGait, small_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.contact import crossing_depth
 from colloc.system.row_file import cached, hash_of
 

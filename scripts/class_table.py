@@ -18,8 +18,8 @@ import numpy as np
 
 from colloc import Friction, Problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from
-from colloc.gaits.laid_gaits import delta_in, laid_into, over_links, prolonged
 from colloc.gaits.path_samples import path_length
+from colloc.gaits.starts import delta_in, laid_into, over_links, prolonged
 from colloc.results.solution import Solution
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError

@@ -7,9 +7,9 @@ import numpy as np
 
 from colloc import Harmonic, Problem, ellipse
 from colloc.pictures.publication import mesh_errors
-from colloc.results.delta_limit import Limit
-from colloc.results.level import Level
+from colloc.results.measured import Limit
 from colloc.results.solution import Solution
+from colloc.results.steps import Level
 from colloc.search.optimise import optimum
 
 RESOLVED = 1e-4

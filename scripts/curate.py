@@ -46,7 +46,6 @@ KEPT = {
     "robustness.json": "python -m benchmarks.robustness --starts 35",
     "crawlers.md": "python -m scripts.optimise_crawlers",
     "sweep_scaling.md": "python -m benchmarks.sweep_scaling --cells 24 --tasks 500 --dask",
-    "bound_table.md": "python -m scripts.bound_table",
     "three_link_relaxed.png": "python -m colloc.solve problems/three_link_relaxed.py",
     "measure.png": "python -m scripts.measure_to_gait",
     "frontier.md": "python -m scripts.frontier",

@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from colloc.gaits.mixture import Mixture
 from colloc.gaits.problem import Problem
-from colloc.gaits.relaxed import Relaxed
+from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution

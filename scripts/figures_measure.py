@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from colloc.bounds.measure import Measure
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.pictures.figure import draw_allowed
 from colloc.pictures.style import BLUE, GREY, PHASE, styled

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
 from colloc.pictures.style import BLUE, GREEN, VERMILION, save, styled, subplots
 from colloc.smooth.crawler_body import CrawlerBody
 

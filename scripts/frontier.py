@@ -6,7 +6,7 @@ One row for every law of friction, limit of the joint angles, number of links an
 done is kept: numbers in `results/curated/frontier.json`, gaits in `results/frontier/`. A run takes up what is missing, and
 writes `results/curated/frontier.md` from all there is. `--seconds` begins no other part after so much processor time.
 
-- gait: the best relaxed gait that travels through shapes, and the best certified finite gait near it;
+- gait: the best relaxed gait that travels through shapes, of either symmetry, and the best certified finite gait near it;
 - few: the best certified polygon with 60 corners near it;
 - small: the best gait of no size at one shape (three links);
 - loop: the best certified polygon of a short path near that shape;
@@ -20,6 +20,8 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,47 +32,53 @@ from colloc.bounds.infinitesimal import best_small_gait, small_gait
 from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.gaits.guesses import largest_factor
-from colloc.gaits.path_classes import Polygon
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.mechanics.body import Chain
+from colloc.mechanics.contact import gap
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.width import gap
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
-from colloc.search.relaxed_search import best_relaxed_gait
-from colloc.system.errors import CollocError
+from colloc.search.relaxed_search import certified, relaxed_gaits
+from colloc.system.errors import CollocError, NotConvergedError
 from colloc.system.replaced_file import replaced_file
-from scripts.bound_table import COEFFICIENTS
 from scripts.check_potential import potentials
 from scripts.few_corners import polygon_near
 
+COEFFICIENTS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
+"""(mu_t, mu_f, mu_b)"""
 DELTA, LEAST_EXTENT, FEW = 1e-5, 0.3, 60
 """At unit shape speed; range of the mean angles of what counts as a gait that travels [rad]; corners of a simple one."""
+REPEATS, LIMITS = (1, 2, 4), (2.5, float(np.pi), 2.0)
+"""Of the directions of a relaxed gait in the finite ones; of joint angles, those first that are most wanted."""
 PARTS = ("gait", "few", "small", "loop", "bound")
 SPEED, LOOP_DELTA = 0.02, 2e-5
 """Of small loops: least path over 2 pi [rad], and delta at unit shape speed."""
-BUDGET = Budget(intervals=16, tolerance=3e-4)
+SYMMETRIES = ("both", "bilateral")
+"""Of relaxed gaits: loops about the straight body have both; those to one side of it (10, 1, 1 and 3, 1, 1) have one."""
+BUDGET, DIRECTED = Budget(intervals=8, starts=150, tolerance=2e-3), (0, 1, 2)
+"""Of bounds; where mu_b differs from mu_f these headings, as the second is worth 5 % at (0.5, 1, 5)."""
 STORE, GAITS, TABLE = Path("results/curated/frontier.json"), Path("results/frontier"), Path("results/curated/frontier.md")
 HEAD = """# The best gaits from both sides
 
 `python -m scripts.frontier`, taken up again and again. Joints within the limit; links of the width do not overlap,
 links of none do not cross. *Gait*: the best certified finite gait that travels through shapes (its mean angles range
-over at least 0.3 rad), with its corners, its distance a period and the largest joint angle; delta = 1e-5 at unit shape
-speed. *60 corners*: the best certified polygon with 60. *Relaxed*: what finite gaits near it tend to, for delta -> 0.
-*Small gait*: the best gait of no size at one shape, for delta -> 0. *Small loop*: the best certified polygon near it,
-of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one, with the number of its unknowns: it holds but for what
-lies between the samples; in brackets the program's value, if the climbs still found more than 0.0005 above. *Gap*: from
-the better of relaxed and small gait to the smallest bound that is valid for the row, relative. CPU seconds on a loaded
-machine. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty place has not
-been computed. What was found is a lower end: other starts may find better gaits.
+over at least 0.3 rad), with its corners, its distance a period, the largest joint angle and how far its links stay
+*apart* [body lengths], so how wide they may be; delta = 1e-5 at unit shape speed. What was found for a smaller limit
+counts for a larger one too. *60 corners*: the best certified polygon with at most 60. *Relaxed*: what finite gaits near
+it tend to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0. *Small loop*: the best
+certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one, with the number of its
+unknowns: it holds but for what lies between the samples; in brackets the program's value, if climbs still found more
+than is tolerated above. *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for the row,
+relative. CPU seconds on a loaded machine. A star: the relaxed gait's own certificate fails a check, so its value is not
+sharp. An empty place has not been computed. What was found is a lower end: other starts may find better gaits.
 
 """
 COLUMNS = (
-    "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "60 corners", "relaxed",
+    "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "apart", "60 corners", "relaxed",
     "small gait", "small loop", "bound", "unknowns", "gap", "CPU s",
 )  # fmt: skip
 
@@ -102,7 +110,7 @@ def relaxation(path: Path) -> Relaxation:
     return found
 
 
-def finite(solution: Solution, seconds: float) -> dict[str, Any]:
+def finite(body: Chain, solution: Solution, seconds: float) -> dict[str, Any]:
     """What the table says of a solution."""
     assert solution.relaxed is not None
     best, relaxed = solution.relaxed.best, solution.relaxed.certificate
@@ -112,6 +120,7 @@ def finite(solution: Solution, seconds: float) -> dict[str, Any]:
         "corners": best.corners,
         "distance": best.certificate.distance,
         "angle": float(np.abs(best.gait.corners).max()),
+        "apart": float(gap(body, best.gait.angles(np.linspace(0.0, 1.0, 20001))).min()),
         "relaxed": relaxed.efficiency_at_zero_delta,
         "sharp": relaxed.passed,
         "seconds": seconds,
@@ -119,16 +128,24 @@ def finite(solution: Solution, seconds: float) -> dict[str, Any]:
 
 
 def gait(row: Row, starts: int) -> dict[str, Any]:
-    """The best relaxed gait that travels, begun also from that for equal coefficients."""
-    begin, even = time.process_time(), row._replace(mu=(1.0, 1.0, 1.0)).file("gait")
-    first = (relaxation(even).gait.mean.realised(),) if even.exists() else ()
-    problem = Problem(
-        f"frontier-{row.name}", body=row.body, friction=Friction(*row.mu), gait=Relaxed(row.links, "both"), delta=DELTA,
-        joint_limit=row.limit,
-    )  # fmt: skip
-    solution = best_relaxed_gait(problem, starts, first=first, least_extent=LEAST_EXTENT)
+    """The best relaxed gait that travels, begun also from those for equal coefficients and for other limits."""
+    begin = time.process_time()
+    others = [row._replace(limit=limit, mu=mu) for limit in (row.limit, *LIMITS) for mu in (row.mu, COEFFICIENTS[0])]
+    first = [relaxation(other.file("gait")).gait.mean.realised() for other in others if other.file("gait").exists()][:2]
+    ends = []
+    for symmetry in SYMMETRIES:
+        problem = Problem(
+            f"frontier-{row.name}", body=row.body, friction=Friction(*row.mu), gait=Relaxed(row.links, symmetry), delta=DELTA,
+            joint_limit=row.limit,
+        )  # fmt: skip
+        with suppress(NotConvergedError):
+            ends.append(relaxed_gaits(problem, starts, first=tuple(first), least_extent=LEAST_EXTENT)[0][0])
+    travel = [end for end in ends if end.gait.extent >= LEAST_EXTENT]
+    if not travel:
+        raise NotConvergedError("no start led to a gait that travels.")
+    solution = certified(min(travel, key=lambda end: end.objective), REPEATS)
     save(solution, row.file("gait"))
-    return finite(solution, time.process_time() - begin)
+    return finite(row.body, solution, time.process_time() - begin)
 
 
 def few(row: Row, starts: int) -> dict[str, Any]:
@@ -136,7 +153,7 @@ def few(row: Row, starts: int) -> dict[str, Any]:
     begin, near = time.process_time(), row.file("gait")
     solution = polygon_near(load(near).problem, relaxation(near).gait, FEW)
     save(solution, row.file("few"))
-    return finite(solution, time.process_time() - begin)
+    return finite(row.body, solution, time.process_time() - begin)
 
 
 def small(row: Row, starts: int) -> dict[str, Any]:
@@ -174,7 +191,9 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
             top = largest_ratio(domain, space, free)[0]
             seconds = time.process_time() - begin
             return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
-    found = efficiency_bound(row.body, Friction(*row.mu), row.limit, budget=BUDGET)
+    friction = Friction(*row.mu)
+    budget = BUDGET if friction.reversible else replace(BUDGET, harmonics=DIRECTED)
+    found = efficiency_bound(row.body, friction, row.limit, budget=budget)
     return {
         "sampled": found.sampled, "floor": found.floor, "converged": found.converged, "unknowns": len(found.coefficients),
         "seconds": found.seconds,
@@ -201,6 +220,13 @@ def put(key: str, value: dict[str, Any]) -> None:
         Path(temporary).write_text(json.dumps(read() | {key: value}, indent=1, sort_keys=True) + "\n")
 
 
+def row_of(key: str) -> tuple[Row, str]:
+    """The row and the part that a number is kept under."""
+    name, part = key.split()
+    *mu, limit, links, width = (float(x) for x in name.split("-"))
+    return Row(tuple(mu), limit, int(links), width), part
+
+
 def asked(options: argparse.Namespace) -> Iterator[Row]:
     """The rows, those first that are most wanted."""
     laws = [COEFFICIENTS[k - 1] for k in options.laws]
@@ -217,14 +243,29 @@ def wanted(row: Row, part: str, known: dict) -> bool:
     return f"{row.name} {part}" not in known and possible[part]
 
 
+def largest_angle(of: dict) -> float:
+    """Of a gait that is kept."""
+    return of["angle"] if "angle" in of else float(np.abs(of["shape"]).max())
+
+
+def best_held(row: Row, part: str, known: dict) -> dict:
+    """Of the gaits that hold for a row the best: of its law and links, within its limit and apart by its width."""
+    holds = [known.get(f"{row.name} {part}", {})]
+    for key, value in known.items():
+        other, kind = row_of(key)
+        same = (kind, other.mu, other.links) == (part, row.mu, row.links)
+        if same and largest_angle(value) <= row.limit + 1e-4 and value.get("apart", 0.0) >= row.width:
+            holds.append(value)
+    return max(holds, key=lambda value: value.get("efficiency", -np.inf))
+
+
 def smallest_bound(row: Row, known: dict) -> float:
     """Of the bounds that hold for a row: those for its limit or a larger one, its width or a smaller one."""
     holds = [np.inf]
     for key, value in known.items():
-        name, part = key.split()
-        numbers = [float(x) for x in name.split("-")]
-        of_row = part == "bound" and tuple(numbers[:3]) == row.mu and numbers[4] == row.links
-        if of_row and numbers[3] >= round(row.limit, 4) and numbers[5] <= row.width:
+        other, part = row_of(key)
+        of_row = part == "bound" and (other.mu, other.links) == (row.mu, row.links)
+        if of_row and other.limit >= round(row.limit, 4) and other.width <= row.width:
             holds.append(value["sampled"])
     return min(holds)
 
@@ -232,7 +273,8 @@ def smallest_bound(row: Row, known: dict) -> float:
 def line(row: Row, known: dict) -> str:
     """A row of the table."""
     parts = {part: known.get(f"{row.name} {part}", {}) for part in PARTS}
-    travels, simple, still, loops, above = (parts[part] for part in PARTS)
+    travels, simple, still = (best_held(row, part, known) for part in ("gait", "few", "small"))
+    loops, above = parts["loop"], parts["bound"]
 
     def value(of: dict, key: str, form: str = ".4f", mark: str = "") -> str:
         return f"{of[key]:{form}}{mark}" if key in of else ""
@@ -245,7 +287,7 @@ def line(row: Row, known: dict) -> str:
     cells = [
         ", ".join(f"{m:g}" for m in row.mu), f"{row.limit:.4g}", str(row.links), f"{row.width:g}",
         value(travels, "efficiency", mark="" if travels.get("passed") else refused), value(travels, "corners", "d"),
-        value(travels, "distance", ".3f"), value(travels, "angle", ".3f"),
+        value(travels, "distance", ".3f"), value(travels, "angle", ".3f"), value(travels, "apart", ".3f"),
         value(simple, "efficiency", mark="" if simple.get("passed") else refused),
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
         value(loops, "efficiency", mark="" if loops.get("passed") else refused),
@@ -257,18 +299,14 @@ def line(row: Row, known: dict) -> str:
 
 def rows_of(known: dict) -> list[Row]:
     """The rows of which something is known, in the order of the table."""
-    found = set()
-    for key in known:
-        *mu, limit, links, width = (float(x) for x in key.split()[0].split("-"))
-        found.add(Row(tuple(mu), limit, int(links), width))
     order = {tuple(map(float, mu)): k for k, mu in enumerate(COEFFICIENTS)}
-    return sorted(found, key=lambda r: (r.links, r.width, r.limit, order[r.mu]))
+    return sorted({row_of(key)[0] for key in known}, key=lambda r: (r.links, r.width, r.limit, order[r.mu]))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--laws", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6], choices=range(1, 7), metavar="N")
-    parser.add_argument("--limits", type=float, nargs="+", default=[2.5, float(np.pi), 2.0])
+    parser.add_argument("--limits", type=float, nargs="+", default=LIMITS)
     parser.add_argument("--links", type=int, nargs="+", default=[3, 4, 5])
     parser.add_argument("--widths", type=float, nargs="+", default=[0.0, 0.01, 0.03])
     parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)

@@ -24,19 +24,18 @@ NEW = {
         "mechanics/actuators reduced/actuator_slopes reduced/actuator_rows"
     ),
     "relaxed gaits and the finite ones near them": (
-        "gaits/mixture gaits/relaxed reduced/mixture_space search/relaxed_search results/relaxation results/realisation "
+        "gaits/relaxed reduced/mixture_space search/relaxed_search results/relaxation results/realisation "
         "pictures/relaxed_figure"
     ),
-    "the best of many starts, and of hops from the best": "search/global_search results/search_step results/alternative",
+    "the best of many starts, and of hops from the best": "search/global_search",
     "optima and saddles told apart": "reduced/second_order search/saddles",
     "IPOPT's word on every answer": "search/full_program",
     "instants with several balanced motions": "mechanics/solution_branches verification/followed_motion",
-    "the balance compiled, with exact slopes": "mechanics/native_kernel mechanics/compiled_balance mechanics/chain_motion",
+    "the balance compiled, with exact slopes": "mechanics/native_kernel mechanics/chain_motion",
     "prescribed motions as problems": "gaits/prescribed smooth/prescribed_body search/prescribed",
-    "links of a width": "mechanics/width",
     "the multipliers of a bound as a measure, bounds checked again": "bounds/measure bounds/recheck bounds/knots",
     "a problem file begun, archives opened, the Tab key": "commands/init commands/open commands/completion",
-    "commands as functions, for notebooks": "studies/calls system/late_binding system/argument_names",
+    "commands as functions, for notebooks": "studies/calls system/late_binding system/arguments",
     "grids on a cluster": "system/dask_pool",
     "Ctrl-C at any moment, folders of one's own": "system/early_interruption system/private_folder",
 }

@@ -6,7 +6,7 @@ import numpy as np
 
 from colloc import Chain
 from colloc.gaits.gait_fields import AnyGait
-from colloc.mechanics.width import gap
+from colloc.mechanics.contact import gap
 
 LYING = 0.01
 """Body lengths: links with a smaller gap count as lying on each other."""

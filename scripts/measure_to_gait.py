@@ -1,7 +1,7 @@
 """From the bound to the gait: the multipliers of the bound's program as a measure, drawn, and a start for a relaxed gait.
 
 python -m scripts.measure_to_gait [--out results] [--friction 1 1 1] [--limit 2.5] [--intervals 8] [--first 8] [--no-gait]
-    [--keep]
+    [--harmonics 1 3] [--keep]
 
 Writes measure.png, and prints what the program says and what the search makes of it, with no other start. With `--no-gait` it
 prints only what the program says, its unknowns and its knots; with `--keep` the potential joins those kept.
@@ -34,13 +34,14 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=2.5)
     parser.add_argument("--intervals", type=int, default=8, help="knot intervals of the potential")
     parser.add_argument("--first", type=int, default=8, help="even ones to begin with; the rest goes where it is wanted")
+    parser.add_argument("--harmonics", type=int, nargs="+", help="in the heading; 1 3, or 0 1 where mu_b differs from mu_f")
     parser.add_argument("--tolerance", type=float, default=2e-3, help="of the climbs above the program")
     parser.add_argument("--no-gait", action="store_true", help="the bound only")
     parser.add_argument("--keep", action="store_true", help="add the potential to results/curated/potentials.json")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     body, friction = Chain(), Friction(*options.friction)
-    harmonics = (1, 3) if friction.reversible else (0, 1)
+    harmonics = tuple(options.harmonics or ((1, 3) if friction.reversible else (0, 1)))
     space = PotentialSpace(TensorSpline(2, options.limit, min(options.first, options.intervals)), harmonics, True)
     domain = Domain(body, friction, options.limit)
     lattice = {"shapes": 20, "directions": 48, "rounds": 60, "starts": 150}

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
 from colloc.mechanics.friction import Friction
 from colloc.reduced.spaces import space_near
 from colloc.search.reduced_search import FIRST_RADIUS, ROUGH, settled

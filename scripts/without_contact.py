@@ -1,7 +1,7 @@
 """The best gaits known, and whether links touch in them: python -m scripts.without_contact [--only WORD] [--table]
 
 Links have no thickness in the model, so the most efficient gaits fold the body and slide links along each other. This table
-puts beside them the best gaits found whose links keep apart: the gap (`mechanics.width.gap`: between links that are not
+puts beside them the best gaits found whose links keep apart: the gap (`mechanics.contact.gap`: between links that are not
 neighbours, and from the free end of a link to its neighbour) is at least 0.05 body lengths all the way. Joints are limited to
 pi - arcsin(0.05/l), which keeps neighbours of length l that far apart; what is left is measured. Isotropic friction, equal
 links. Resumable: gaits are kept in results/without_contact.json. Writes results/curated/without_contact.md.
@@ -20,8 +20,8 @@ import numpy as np
 from colloc import Corners, FreePath, Friction, Harmonic, Polygon, Problem
 from colloc.bounds.infinitesimal import small_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait, fields, gait_from
-from colloc.gaits.laid_gaits import delta_in, laid_into, prolonged
 from colloc.gaits.path_samples import path_length
+from colloc.gaits.starts import delta_in, laid_into, prolonged
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import CollocError

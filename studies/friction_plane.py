@@ -25,8 +25,8 @@ def problem(mu_t, mu_b, symmetry):
 STUDY = Study(
     name="friction_plane",
     axes=(
-        Axis("mu_t", np.geomspace(0.1, 10.0, 15), "mu_t / mu_f", logarithmic=True),
-        Axis("mu_b", np.geomspace(1.0, 10.0, 15), "mu_b / mu_f", logarithmic=True),
+        Axis("mu_t", np.geomspace(0.1, 10.0, 15), "mu_t / mu_f"),
+        Axis("mu_b", np.geomspace(1.0, 10.0, 15), "mu_b / mu_f"),
         Axis("symmetry", ("bilateral", "none"), "class of gaits that was searched"),
     ),
     problem=problem,

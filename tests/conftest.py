@@ -47,8 +47,8 @@ def unsolved():
 def guess_in_balance(problem):
     from colloc.collocation.transcription import transcribe
     from colloc.collocation.warm_start import feasible_point
-    from colloc.results.level import Level
     from colloc.results.solution import Solution
+    from colloc.results.steps import Level
     from colloc.verification.replay import replay
 
     transcription = transcribe(problem)

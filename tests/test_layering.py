@@ -10,7 +10,7 @@ PACKAGES = tuple(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
 """The packages of the library as the page lists them, lower ones first: a module imports its own package and lower ones."""
 BESIDE = {"__init__", "__main__", "solve"}
 """What lies beside the packages: the face, ``python -m colloc`` and ``python -m colloc.solve``."""
-MOST_FILES, MOST_LINES = 18, 350
+MOST_FILES, MOST_LINES = 16, 350
 ONLY = {
     "matplotlib": {"pictures"},
     "jinja2": {"pictures"},

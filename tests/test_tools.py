@@ -58,33 +58,37 @@ def starts_itself(path):
 PROGRAMS = [path for path in MODULES if starts_itself(path) and path.stem not in EXAMPLES]
 
 
+@pytest.fixture
+def ended(tmp_path, monkeypatch, capfd):
+    """A function from a program and an option to its exit code and what it prints, out and as errors; it writes nothing."""
+
+    def run(path, option):
+        needed(path)
+        module = importlib.import_module(name_of(path))
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", [str(path), option])
+        with pytest.raises(SystemExit) as ended:
+            module.main()
+        assert not list(tmp_path.iterdir())
+        return ended.value.code, *capfd.readouterr()
+
+    return run
+
+
 @pytest.mark.parametrize("path", PROGRAMS, ids=name_of)
-def test_a_program_answers_help_before_it_does_anything(path, tmp_path, monkeypatch, capfd):
-    needed(path)
-    module = importlib.import_module(name_of(path))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(path), "--help"])
-    with pytest.raises(SystemExit) as ended:
-        module.main()
-    assert ended.value.code == 0
-    said, complaints = capfd.readouterr()
+def test_a_program_answers_help_before_it_does_anything(path, ended):
+    code, said, complaints = ended(path, "--help")
+    assert code == 0
     assert said.startswith("usage:")
     assert len(said.split()) > 10, "says nothing but its usage"
     assert complaints == ""
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("path", PROGRAMS, ids=name_of)
-def test_a_program_refuses_what_it_does_not_understand(path, tmp_path, monkeypatch, capfd):
-    needed(path)
-    module = importlib.import_module(name_of(path))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(path), "--no-such-option"])
-    with pytest.raises(SystemExit) as ended:
-        module.main()
-    assert ended.value.code == 2
-    assert capfd.readouterr().err.startswith("usage:")
-    assert not list(tmp_path.iterdir())
+def test_a_program_refuses_what_it_does_not_understand(path, ended):
+    code, _, complaints = ended(path, "--no-such-option")
+    assert code == 2
+    assert complaints.startswith("usage:")
 
 
 def test_nothing_that_can_be_started_is_left_out():

@@ -13,11 +13,10 @@ import numpy as np
 
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.body import Chain
-from colloc.mechanics.contact import crossing_bounds
+from colloc.mechanics.contact import crossing_bounds, gap
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.mechanics.width import gap
 
 DELTA = 1e-9
 """Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
@@ -25,6 +24,8 @@ DELTA = 1e-9
 
 _MAX_ITERATIONS = 300
 """Steps of an attempt: the few motions that need more are left out, as the samples are many."""
+_BISECTIONS = 30
+"""Of the way from an admissible shape to where links touch."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,17 @@ def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarr
         return np.ones(angles.shape[1], dtype=bool)
     uncrossed = (bounds <= np.pi + margin).all(axis=0)
     return uncrossed & (gap(body, angles) >= body.width - margin) if body.width else uncrossed
+
+
+def drawn_in(body: Chain, shapes: np.ndarray, towards: np.ndarray, margin: float = 0.0) -> np.ndarray:
+    """Shapes ``(n_joint, n)``, those that are not admissible moved towards ones that are, until they are."""
+    inside, beyond = np.zeros(shapes.shape[1]), np.ones(shapes.shape[1])
+    inside[admissible(body, shapes, margin)] = 1.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (inside + beyond)
+        keeps = admissible(body, towards + middle * (shapes - towards), margin)
+        inside, beyond = np.where(keeps, middle, inside), np.where(keeps, beyond, middle)
+    return towards + inside * (shapes - towards)
 
 
 def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.bounds.knots import with_more_knots
 from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
-from colloc.bounds.recheck import near_the_top
+from colloc.bounds.recheck import near_the_top, summits_met
 from colloc.bounds.sampling import Domain
 from colloc.numerics.minimax_program import Minimax, smallest_maximum
 
@@ -42,8 +42,8 @@ class Optimum(NamedTuple):
 
     free: its coefficients. floor: value of the program, which no potential of the space undercuts by more than the smoothing
     on the samples held. top, summit: the largest ratio met anywhere, and its motion. samples: motions evaluated. rounds: used.
-    converged: whether the last climbs stayed within the tolerance. measure: the multipliers of the last program. space: the
-    potentials of the last program.
+    converged: whether the last climbs stayed within the tolerance, and those of a check that knows nothing of the samples
+    (`colloc.bounds.recheck`) within twice of it. measure: the multipliers of the last program. space: its potentials.
     """
 
     space: PotentialSpace
@@ -183,12 +183,20 @@ def exchanged_optimum(
         surprise = top - program.best.value
         quiet = quiet + 1 if top <= program.best.value + tolerance else 0
         coarse = space.spline.intervals < intervals
-        if (quiet == 2 and not coarse) or count == rounds:
-            break
+        best = summit.take(np.array([int(np.argmax(reached))]))
         program.add(summit.take(np.flatnonzero(reached > program.best.value + 0.25 * tolerance)))
+        if (quiet == 2 and not coarse) or count == rounds:
+            # what a check finds is no more than a sample that was missing
+            level, check = program.best.value, {"shapes": 3 * shapes, "directions": 2 * directions, "starts": 2 * starts}
+            checked, motion = summits_met(domain, space, free, seed=seed + count, level=level, **check)
+            if checked.max() > top:
+                top, best = float(checked.max()), motion.take(np.array([int(np.argmax(checked))]))
+            quiet = quiet if top <= level + 2 * tolerance else 0
+            if quiet or count == rounds:
+                break
+            program.add(motion.take(np.flatnonzero(checked > level + tolerance)))
         if coarse and surprise < max(_RIPE, tolerance):
             space, quiet = with_more_knots(space, program.measure(), intervals), 0
             program = program.moved_to(space)
-    best = summit.take(np.array([int(np.argmax(reached))]))
     assert held <= top
     return Optimum(space, free, program.best.value, top, best, seen, count, quiet == 2, program.measure())

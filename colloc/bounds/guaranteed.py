@@ -109,13 +109,11 @@ def cell_bounds(body: Chain, potential: PotentialRange, cells: Cells, goal: floa
     return value
 
 
-def _touches(body: Chain, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Mask of cells from `low` to `high` that may hold a shape where links 1 and 3 do not cross."""
+def _touches(body: Chain, low: np.ndarray) -> np.ndarray:
+    """Mask of cells above `low`, where angle 1 is positive, that may hold a shape where links 1 and 3 do not cross."""
     if len(set(body.lengths)) > 1:
         return np.ones(low.shape[1], dtype=bool)
-    crossed = np.minimum(2 * low[0] + low[1], low[0] + 2 * low[1]) > 2 * np.pi + 1e-9
-    mirrored = np.maximum(2 * high[0] + high[1], high[0] + 2 * high[1]) < -2 * np.pi - 1e-9
-    return ~(crossed | mirrored)
+    return np.minimum(2 * low[0] + low[1], low[0] + 2 * low[1]) <= 2 * np.pi + 1e-9
 
 
 def _first_edges(knots: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -178,8 +176,7 @@ def certify(
     with ThreadPoolExecutor(available_threads()) as pool:
         while True:
             lattice = _Lattice(edges, level)
-            low, high = (np.stack([lattice.coordinate(axis, index[axis] + up) for axis in (0, 1)]) for up in (0, 1))
-            kept = _touches(body, low, high)
+            kept = _touches(body, np.stack([lattice.coordinate(axis, index[axis]) for axis in (0, 1)]))
             index, values = index[:, kept], parents[kept]
 
             def bounds(first: int, lattice: _Lattice = lattice, index: np.ndarray = index) -> np.ndarray | None:

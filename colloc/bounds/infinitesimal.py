@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion, fundamental, unit_directions
+from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion, drawn_in, fundamental, unit_directions
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError
 
-_EDGE, _BISECTIONS = 1e-9, 30
+_EDGE = 1e-9
 _FINE = 1e-3
 """Steps of the search for the best shape at which it ends [rad]: a width of links or a limit binds somewhere between."""
 
@@ -137,17 +137,6 @@ def small_gait(
     return SmallGait(float(value), heading, motion.rates[:, used], weights[used])
 
 
-def _drawn_in(body: Chain, shapes: np.ndarray) -> np.ndarray:
-    """Shapes ``(n_joint, n)``, those that are not admissible moved towards the straight body until they are."""
-    inside, beyond = np.zeros(shapes.shape[1]), np.ones(shapes.shape[1])
-    inside[admissible(body, shapes, _EDGE)] = 1.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (inside + beyond)
-        keeps = admissible(body, middle * shapes, _EDGE)
-        inside, beyond = np.where(keeps, middle, inside), np.where(keeps, beyond, middle)
-    return inside * shapes
-
-
 def best_small_gait(
     body: Chain, friction: Friction, joint_limit: float = np.pi, steps: int = 10, refined: int = 3
 ) -> tuple[SmallGait, np.ndarray]:
@@ -157,7 +146,8 @@ def best_small_gait(
     """
     axis = np.linspace(-joint_limit, joint_limit, steps + 1)
     shapes = np.stack([a.ravel() for a in np.meshgrid(*[axis] * body.n_joint, indexing="ij")])
-    shapes = _drawn_in(body, shapes[:, fundamental(body, shapes)])
+    shapes = shapes[:, fundamental(body, shapes)]
+    shapes = drawn_in(body, shapes, np.zeros_like(shapes), _EDGE)
 
     def rough(shape: np.ndarray) -> float:
         return small_gait(body, friction, shape, 180, 4, 0).efficiency

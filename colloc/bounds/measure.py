@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.bounds.coulomb_motion import CoulombMotion
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import BILATERAL
 from colloc.system.errors import ProblemError
 

@@ -6,7 +6,7 @@ import warnings
 from pathlib import Path
 
 from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
-from colloc.gaits.guesses import widest
+from colloc.gaits.limits import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.body import Chain

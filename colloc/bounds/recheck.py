@@ -25,7 +25,7 @@ def near_the_top(motion: CoulombMotion, ratio: np.ndarray, level: float, spacing
     return near[np.sort(first)][:count]
 
 
-def largest_ratio(
+def summits_met(
     domain: Domain,
     space: PotentialSpace,
     free: np.ndarray,
@@ -34,8 +34,9 @@ def largest_ratio(
     directions: int = 120,
     starts: int = 1000,
     seed: int = 0,
-) -> tuple[float, CoulombMotion]:
-    """The largest ratio of gain to power that a lattice and climbs from its best meet, and the motion.
+    level: float = np.inf,
+) -> tuple[np.ndarray, CoulombMotion]:
+    """Ratios of gain to power ``(n,)`` where climbs from the best of a lattice end, and the motions.
 
     Parameters
     ----------
@@ -47,6 +48,8 @@ def largest_ratio(
         Of the lattice, and climbs.
     seed : int
         Of the climbs; it also moves the lattice.
+    level : float
+        Climbs begin near it and above, or near the largest ratio on the lattice if that is less.
     """
     rng = np.random.default_rng(seed)
 
@@ -55,8 +58,13 @@ def largest_ratio(
 
     lattice = domain.lattice(shapes, directions, float(rng.uniform(0.1, 0.9)))
     values, spacing = ratio(lattice), 2.0 * domain.joint_limit / shapes
-    chosen = near_the_top(lattice, values, float(values.max()), spacing, starts)
+    chosen = near_the_top(lattice, values, min(level, float(values.max())), spacing, starts)
     summit = domain.summits(ratio, lattice.take(chosen), 0.5 * spacing, 0.5 * np.pi / directions, _STEPS, rng)
-    reached = ratio(summit)
+    return ratio(summit), summit
+
+
+def largest_ratio(domain: Domain, space: PotentialSpace, free: np.ndarray, **settings: int) -> tuple[float, CoulombMotion]:
+    """The largest ratio of gain to power that a lattice and climbs from its best meet, and the motion; see `summits_met`."""
+    reached, summit = summits_met(domain, space, free, **settings)
     best = int(np.argmax(reached))
     return float(reached[best]), summit.take(np.array([best]))

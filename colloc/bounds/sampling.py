@@ -11,6 +11,7 @@ from colloc.bounds.coulomb_motion import (
     CoulombMotion,
     admissible,
     all_motions,
+    drawn_in,
     fundamental,
     one_joint,
     unit_directions,
@@ -68,11 +69,26 @@ class Domain:
         alone = one_joint(self.body.n_joint, self.friction.reversible)
         return self._at_all(shapes, shift, rates).joined(self._at_all(_FINER * shapes, shift, alone))
 
+    def _shapes(self, steps: int, shift: float) -> np.ndarray:
+        """Shapes ``(n_joint, n)`` of a lattice, with those where a joint is at its limit, and where on its lines links touch.
+
+        The ratio has peaks in corners between limit and contact, which a potential sees only if they are sampled.
+        """
+        n_joint, limit = self.body.n_joint, self.joint_limit
+        axis = np.clip(limit * (2.0 * (np.arange(-1, steps + 1) + shift) / steps - 1.0), -limit, limit)
+        grid = np.stack(np.meshgrid(*[np.unique(axis)] * n_joint, indexing="ij"))
+        held = self.holds(grid.reshape(n_joint, -1)).reshape(grid.shape[1:])
+        found = [grid[:, held]]
+        for joint in range(n_joint):
+            one, other = (np.delete(grid, end, axis=joint + 1) for end in (-1, 0))
+            of_one, of_other = (np.delete(held, end, axis=joint) for end in (-1, 0))
+            for inside, outside, touches in ((one, other, of_one & ~of_other), (other, one, of_other & ~of_one)):
+                found.append(drawn_in(self.body, outside[:, touches], inside[:, touches], _EDGE))
+        return np.concatenate(found, axis=1)
+
     def _at_all(self, shapes: int, shift: float, rates: np.ndarray) -> CoulombMotion:
-        steps = (np.arange(shapes + (shift == 0)) + shift) / shapes
-        axis = self.joint_limit * (2.0 * steps - 1.0)
-        angles = np.stack([a.ravel() for a in np.meshgrid(*[axis] * self.body.n_joint, indexing="ij")])
-        angles = angles[:, self.holds(angles) & fundamental(self.body, angles)]
+        angles = self._shapes(shapes, shift)
+        angles = angles[:, fundamental(self.body, angles)]
         return self.solved(np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1]))[0]
 
     def summits(

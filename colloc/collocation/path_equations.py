@@ -16,9 +16,9 @@ import numpy as np
 
 from colloc.collocation.point_equations import forward
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits import arcs
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.numerics import arcs
 from colloc.numerics.blocks import LocalFunction, implicit_function, local_function
 
 OMEGA, ADVANCE, POWER = range(3)
@@ -84,8 +84,8 @@ def path_point(body: Body, friction: Law, kind: Callable[[int], Piece]) -> Local
 
 @lru_cache(maxsize=32)
 def full_path_point(body: Body, friction: Law, kind: Callable[[int], Piece]) -> LocalFunction:
-    """The same with everything as a variable. Outputs: the place of the point and its direction, then
-    those of `colloc.mechanics.bodies.Lifted`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
+    """The same with everything as a variable. Outputs: the place of the point and its direction, then those of
+    `colloc.mechanics.balance_results.Lifted`, which all vanish; then those of `path_point`. Locals: theta, angles, rates, z,
     link forces, shape."""
     piece, n_joint = kind(body.n_joint), body.n_joint
     theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("z", 3)

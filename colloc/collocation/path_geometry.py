@@ -9,13 +9,13 @@ from scipy import sparse
 
 from colloc.collocation.path_equations import Piece, arc, chord, excess_turn, placed_check, side, side_lengths, unit_norm
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.free_path import ArcPath, FreePath, across_the_axis
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.blocks import LocalFunction
-from colloc.numerics.constraint_rows import Group, equalities, selector
+from colloc.numerics.constraint_rows import Group, block_group, equalities, selector
 from colloc.numerics.mesh import Mesh
 
 _FASTEST = 30.0
@@ -72,13 +72,9 @@ def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndar
 def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
     n_cell = geometry.start.size
     for check in geometry.checks:
-        name = check.name
-        function = placed_check(check, geometry.piece)
         given = np.vstack([geometry.given(np.full(n_cell, 0.5)), np.full(n_cell, -1.0)])
-        geometry.blocks[name] = (function, geometry.shape, given)
-        lower, upper = (np.full(n_cell, bound) for bound in check.bounds(problem.joint_limit))
-        rows = sparse.csr_matrix((n_cell, n))
-        geometry.groups.append(Group(name, lower, upper, rows, {name: sparse.eye(n_cell, format="csr")}))
+        geometry.blocks[check.name] = (placed_check(check, geometry.piece), geometry.shape, given)
+        geometry.groups.append(check.group(problem.joint_limit, n_cell, n))
 
 
 def _nested(mesh: Mesh, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -138,7 +134,7 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
         winding = near.winding if gait.winding is None else gait.winding
         turned = 2 * np.pi * gait.fraction * float(winding or 0)
         if symmetry == BILATERAL:
-            first = np.pi * np.round((near.tangents[0, 0] - np.pi / 4) / np.pi) + np.pi / 4
+            first = across_the_axis(near.tangents[0, 0])
             for place, value in ((tangents[0, 0], first), (tangents[0, -1], first + turned)):
                 geometry.lower[place] = geometry.upper[place] = value
         else:
@@ -148,11 +144,9 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
         norms = tangents if symmetry == BILATERAL else tangents[:, :-1]
         geometry.blocks["norm"] = (unit_norm(n_joint), norms, np.empty((0, norms.shape[1])))
         geometry.blocks["turn"] = (excess_turn(n_joint, gait.curvature), arcs[n_joint:], h[None])
-        zero, one = np.zeros(n_arc), sparse.eye(n_arc, format="csr")
-        ones = sparse.eye(norms.shape[1], format="csr")
         geometry.groups += [
-            equalities("unit tangent", sparse.csr_matrix((norms.shape[1], n)), {"norm": ones}),
-            Group("curvature", np.full(n_arc, -np.inf), zero, sparse.csr_matrix((n_arc, n)), {"turn": one}),
+            block_group("unit tangent", 0.0, 0.0, norms.shape[1], n, "norm"),
+            block_group("curvature", -np.inf, 0.0, n_arc, n, "turn"),
             _ends("smooth closure", tangent_conditions(symmetry, n_joint), tangents, n),
         ]
     if symmetry != BILATERAL:
@@ -185,8 +179,6 @@ def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, 
     shortest = np.full(n_piece, gait.shortest_side)
     shortest[[0, -1]] *= np.where(gait.half_ends, 0.5, 1.0)
     least = np.append(shortest**2, 2 * np.pi * problem.smallest_shape_speed * gait.fraction)
-    unbounded = np.full(n_piece + 1, np.inf)
-    own = sparse.eye(n_piece + 1, format="csr")
-    geometry.groups.append(Group("sides", least, unbounded, sparse.csr_matrix((n_piece + 1, n)), {"sides": own}))
+    geometry.groups.append(block_group("sides", least, np.inf, n_piece + 1, n))
     _add_checks(geometry, problem, n)
     return geometry

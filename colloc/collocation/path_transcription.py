@@ -1,6 +1,6 @@
 """Direct collocation of gaits given by their path: arcs of bounded curvature, or polygons.
 
-Decision variables: the path's parameters (see `gaits.path_classes`); the tail's orientation theta at every site; distance x
+Decision variables: the path's parameters (see their classes in `gaits`); the tail's orientation theta at every site; distance x
 and work W at every edge; in the formulation "full" also joint angles, rates, tail velocity and link forces at every point.
 Rates are unit tangents and delta is measured at unit shape speed. As in `collocation.transcription`, x is the displacement of
 the centre of mass along a fixed direction and the first orientation is free.
@@ -30,9 +30,9 @@ from colloc.collocation.path_equations import (
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
 from colloc.collocation.point_equations import BlockParts, actuator_rows, driven_point, objective_block, period_rows
 from colloc.collocation.program import GaitProgram, Implicit, assembled
-from colloc.gaits.path_classes import FreePath
+from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.blocks import Block

@@ -29,7 +29,7 @@ from colloc.mechanics.actuators import driven_power
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, local_function, total_function
-from colloc.numerics.constraint_rows import Group, least_group, total_group
+from colloc.numerics.constraint_rows import Group, block_group, total_group
 from colloc.numerics.mesh import Mesh
 
 ACTUATORS = "actuators"
@@ -149,9 +149,7 @@ def actuator_rows(problem: Problem, layout: Layout, friction: Law, unit: float) 
     shares = limits.shares(problem.body, friction, angles, unit * rates, forces, delta)
     function = local_function(ACTUATORS, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, shares)
     gather, n_point = np.concatenate([layout.angles, layout.rates, layout.forces]), layout.angles.shape[1]
-    rows = n_point * len(limits.names)
-    own = {ACTUATORS: sparse.eye(rows, format="csr")}
-    group = Group(ACTUATORS, np.tile(limits.least, n_point), np.ones(rows), sparse.csr_matrix((rows, layout.n)), own)
+    group = block_group(ACTUATORS, np.tile(limits.least, n_point), 1.0, n_point * len(limits.names), layout.n)
     return {ACTUATORS: ((function, gather, np.empty((0, n_point))), group)}
 
 
@@ -189,5 +187,5 @@ def period_rows(
     if problem.at_least:
         aims, least = zip(*problem.at_least, strict=True)
         parts = period_block(aims, 1.0, layout, problem.gait.fraction)
-        found["at least"] = parts, least_group("at least", least, layout.n)
+        found["at least"] = parts, block_group("at least", np.array(least), np.inf, len(least), layout.n)
     return found

@@ -8,9 +8,10 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from colloc.gaits.guesses import Limit
+from colloc.gaits.limits import Limit
 from colloc.mechanics.bodies import Body, Contact, Pairs
 from colloc.mechanics.contact import share_of_first, smooth_minimum, tangent_of_minimum
+from colloc.numerics.constraint_rows import Group, block_group
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,16 @@ class ShapeCheck:
         """The least and the largest value allowed, for a limit on the body's angles, or one on each."""
         own = limit[self.place] if isinstance(limit, tuple) else limit
         return (-np.inf, 0.0) if self.row is None else (-own, own)
+
+    def group(self, limit: Limit, n_cell: int, n: int) -> Group:
+        """The rows that keep it within its bounds in every mesh cell, by the block of its name, for n variables in all."""
+        return block_group(self.name, *self.bounds(limit), n_cell, n)
+
+    def nearer_bounds(self, values: np.ndarray, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
+        """Of the bounds on values ``(n,)``, lower and upper, the nearer one; infinite in the place of the other."""
+        lower, upper = self.bounds(limit)
+        below = values - lower < upper - values
+        return np.where(below, lower, -np.inf), np.where(below, np.inf, upper)
 
     def excess(self, values: np.ndarray, limit: Limit) -> np.ndarray:
         """How far values are beyond their bounds; negative where they are not."""

@@ -17,7 +17,6 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
@@ -34,12 +33,13 @@ from colloc.collocation.point_equations import (
     point_function,
 )
 from colloc.collocation.program import GaitProgram, Implicit, assembled
-from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.gaits.guesses import widest
+from colloc.collocation.shape_checks import shape_checks
+from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
 from colloc.numerics.constraint_rows import (
     Group,
+    block_group,
     equalities,
     gait_group,
     output_group,
@@ -107,14 +107,8 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         *_orientation_groups(problem, mesh, layout),
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
         quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
-        *(_check_group(check, problem, mesh.n, layout.n) for check in checks),
-        Group(
-            "shape speed",
-            np.array([problem.smallest_shape_speed**2]),
-            np.array([np.inf]),
-            sparse.csr_matrix((1, layout.n)),
-            {"shape speed": sparse.eye(1, format="csr")},
-        ),
+        *(check.group(problem.joint_limit, mesh.n, layout.n) for check in checks),
+        block_group("shape speed", problem.smallest_shape_speed**2, np.inf, 1, layout.n),
         *(group for _, group in besides.values()),
     ]
     velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)
@@ -160,8 +154,3 @@ def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Gr
         equalities("orientation", linear),
         *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n, problem.rotation),
     ]
-
-
-def _check_group(check: ShapeCheck, problem: Problem, n_cell: int, n: int) -> Group:
-    lower, upper = (np.full(n_cell, bound) for bound in check.bounds(problem.joint_limit))
-    return Group(check.name, lower, upper, sparse.csr_matrix((n_cell, n)), {check.name: sparse.eye(n_cell, format="csr")})

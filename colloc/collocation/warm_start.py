@@ -15,9 +15,7 @@ from colloc.numerics.mesh import Mesh
 _TOLERANCE = 1e-11
 
 
-def feasible_point(
-    transcription: GaitProgram, parameters: np.ndarray, delta: float, start: np.ndarray | None = None
-) -> np.ndarray:
+def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: float) -> np.ndarray:
     """Variables that satisfy every equation of the transcription but net rotation, for a gait and delta.
 
     Parameters
@@ -27,8 +25,6 @@ def feasible_point(
         Gait parameters.
     delta : float
         Regularisation speed, in the units of the problem's class of gaits.
-    start : (3, n_point), optional
-        Tail velocities near by, per radian of phase; they only save steps.
 
     Returns
     -------
@@ -36,7 +32,7 @@ def feasible_point(
     """
     gait = transcription.member(parameters)
     mesh = transcription.phase_mesh(gait)
-    return balanced_variables(transcription.problem, transcription.layout, mesh, gait, parameters, delta, start)
+    return balanced_variables(transcription.problem, transcription.layout, mesh, gait, parameters, delta)
 
 
 def balanced_variables(
@@ -46,7 +42,6 @@ def balanced_variables(
     gait: AnyGait,
     parameters: np.ndarray,
     delta: float,
-    start: np.ndarray | None = None,
 ) -> np.ndarray:
     """The same for a layout of variables, a mesh in phases of the gait, and the gait's parameters in that layout."""
     x = np.zeros(layout.n)
@@ -55,7 +50,7 @@ def balanced_variables(
     slow = delta * gait.delta_unit / unit
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
     body, friction = problem.body, problem.friction.in_speeds_of(unit)
-    solved = body.solve(friction, angles, rates, slow, start=start, tolerance=_TOLERANCE)
+    solved = body.solve(friction, angles, rates, slow, tolerance=_TOLERANCE)
     now, z = body.motion(friction, angles, rates, slow, solved), solved.z
 
     state, rate = mesh.integration()
@@ -65,16 +60,15 @@ def balanced_variables(
     site_of_point = np.empty(mesh.n_point, dtype=int)
     site_of_point[mesh.points] = mesh.sites
     cx, cy = now.centre
+    _, quadrature = mesh.quadrature()
 
     if problem.gait.symmetry == "antipodal":
         theta -= 0.5 * theta[-1]
     else:  # turn the motion into +x
         c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
-        _, quadrature = mesh.quadrature()
         dx, dy = quadrature @ (c * cx - s * cy), quadrature @ (s * cx + c * cy)
         theta -= np.arctan2(dy.sum(), dx.sum())
     c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
-    _, quadrature = mesh.quadrature()
     distance = np.cumsum(unit * (quadrature @ (c * cx - s * cy)))
     if distance[-1] < 0:  # an antipodal gait that travels the other way along its axis
         theta, distance = theta + np.pi, -distance

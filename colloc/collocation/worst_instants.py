@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from colloc.collocation.shape_checks import ShapeCheck
-from colloc.gaits.guesses import Limit
+from colloc.gaits.limits import Limit
 from colloc.gaits.path_samples import Gait
 from colloc.numerics.mesh import Mesh
 

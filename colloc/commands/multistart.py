@@ -19,8 +19,9 @@ from colloc.commands.options import add_bound, add_printing, add_problem, change
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
-from colloc.results.distinct_optima import CRASHED, ERROR, STATUSES, TIME_LIMIT, Basin, Outcome, basins, counts
+from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
+from colloc.results.distinct_optima import Basin, basins
+from colloc.results.outcome import RETRIED, STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
 _MOST_BASINS_SHOWN = 12
 _SEARCH = {"seed": 0, "sampler": LATIN_HYPERCUBE}
-_RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 
 
 _EPILOG = """\
@@ -140,7 +140,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
     table = not quiet and sys.stdout.isatty()
     archive = open_archive(problem, path)  # or refused, before anything is solved
     before = archive.of_search(options.sampler, options.seed)
-    done = {k for k, o in before.items() if not (options.retry and o.status in _RETRIED)}
+    done = {k for k, o in before.items() if not (options.retry and o.status in RETRIED)}
     todo = [k for k in range(options.starts) if k not in done]
     if not quiet:
         print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go", flush=True)

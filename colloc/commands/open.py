@@ -15,7 +15,7 @@ from colloc.commands.options import add_printing, new_parser, output_path, tell
 from colloc.commands.solve import EXIT
 from colloc.commands.summary import summary_dict as solution_dict
 from colloc.commands.summary import summary_lines as solution_lines
-from colloc.gaits.sampling import LATIN_HYPERCUBE, SAMPLERS
+from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS
 from colloc.results.archive import StartName, archive_at
 from colloc.results.distinct_optima import basins
 from colloc.system.errors import ProblemError

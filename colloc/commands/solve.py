@@ -12,21 +12,16 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
 from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.results.level import Level
-from colloc.results.search_step import SearchStep
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
+from colloc.results.steps import Level, SearchStep
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
-
-if TYPE_CHECKING:
-    pass
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
 """Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""

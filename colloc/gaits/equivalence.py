@@ -30,11 +30,6 @@ _GRID = 64
 _NEWTON_STEPS = 6
 
 
-def mirrored(gait: Fourier) -> Fourier:
-    """The mirror image, -q(t)."""
-    return Fourier(-gait.mean, -gait.cos, -gait.sin)
-
-
 def reversed_in_time(gait: Fourier) -> Fourier:
     """The gait run backwards, q(-t)."""
     return Fourier(gait.mean, gait.cos, -gait.sin)
@@ -53,7 +48,7 @@ def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
             continue
         if reversal != swap and not friction.reversible:
             continue
-        image = mirrored(gait) if mirror else gait
+        image = gait.scaled(-1.0) if mirror else gait
         image = reversed_in_time(image) if reversal else image
         result.append(swapped(image, body) if swap else image)
     return result

@@ -14,6 +14,9 @@ import numpy as np
 from colloc.gaits.symmetry import SYMMETRIES, fraction
 from colloc.system.errors import ProblemError
 
+DELTA_START = 0.01
+"""Where searches begin in delta at unit shape speed [body lengths per radian of path]."""
+
 
 class GaitFunction:
     """Base of the kinds of gaits: ``gait(t)`` gives joint angles and rates, so a gait can stand where a path is asked for.
@@ -46,6 +49,25 @@ class GaitFunction:
         """Joint rates ``(n_joint, n_time)`` per period at phases t."""
         raise NotImplementedError
 
+    def mapped(self, matrix: np.ndarray) -> Any:
+        """The gait, or a polygon near it, with shapes multiplied by a matrix ``(m, n_joint)``."""
+        raise NotImplementedError
+
+    @property
+    def delta_unit(self) -> float:
+        """What the delta of the gait's class is multiplied by to get delta per period."""
+        return 1.0
+
+    @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: by default per radian of phase."""
+        return 2 * np.pi
+
+    @property
+    def corner_phases(self) -> np.ndarray:
+        """Phases in (0, 1) where the rates jump: by default none."""
+        return np.empty(0)
+
     def lines(self, coordinate: str = "joint") -> list[str]:
         """The gait in words or as a formula; `coordinate` is what the body calls its shape coordinates."""
         raise NotImplementedError
@@ -58,6 +80,50 @@ class GaitFunction:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.n_joint} joint{'s' if self.n_joint > 1 else ''}>"
+
+
+class UnitSpeedGait(GaitFunction):
+    """A gait that runs along its path at constant shape speed.
+
+    Only the part of the period that symmetry leaves is stored; `colloc.gaits.symmetry` gives the rest. The phase is the arc
+    length from the start over the length of the whole closed path, ``|q'(t)| = length``. Power and distance do not depend on
+    the pace once delta scales with it: delta of such gaits is measured at unit shape speed, ``delta_unit`` times that per
+    period.
+    """
+
+    length: float
+    symmetry: str
+
+    def _check_symmetry(self) -> None:
+        if self.symmetry not in SYMMETRIES:
+            raise ProblemError(f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}.")
+
+    def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles and rates."""
+        raise NotImplementedError
+
+    @property
+    def delta_unit(self) -> float:
+        """Shape speed per period: what delta at unit shape speed is multiplied by to get delta per period."""
+        return self.length
+
+    @property
+    def speed_unit(self) -> float:
+        """Speeds among the variables of a program are those per period divided by this: they are at unit shape speed."""
+        return self.length
+
+    @property
+    def shape_speed(self) -> float:
+        """Root-mean-square shape speed, in rad per radian of phase."""
+        return self.length / (2 * np.pi)
+
+    def angles(self, t: np.ndarray) -> np.ndarray:
+        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
+        return self._both(t)[0]
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
+        return self._both(t)[1]
 
 
 class ClassOfGaits:
@@ -82,6 +148,11 @@ class ClassOfGaits:
     def _check_symmetry(self) -> None:
         if self.symmetry not in self.symmetries:
             raise ProblemError(f"gait.symmetry must be one of {', '.join(self.symmetries)}, not {self.symmetry!r}.")
+
+    def check_joints(self, n_joint: int) -> None:
+        """A `ProblemError` if bodies with so many shape coordinates have no gaits of the class."""
+        if self.unit_speed and n_joint < 2:
+            raise ProblemError(f"the class {type(self).__name__} needs a body of at least three links, or two modes.")
 
     @property
     def fraction(self) -> float:
@@ -123,3 +194,20 @@ class ClassOfGaits:
     def own_checks(self, gait: Any) -> list[tuple[str, float, float, str]]:
         """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""
         return []
+
+
+def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
+    """Numbers of a gait as an array of so many dimensions.
+
+    Raises
+    ------
+    ProblemError
+        If they are none, or not finite.
+    """
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ProblemError(f"{name} must be numbers, not {value!r}.") from None
+    if array.ndim != ndim or not np.isfinite(array).all():
+        raise ProblemError(f"{name} must be a finite {ndim}-D array.")
+    return array

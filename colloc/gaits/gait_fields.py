@@ -1,4 +1,4 @@
-"""Gaits, classes of gaits, bodies and laws of friction as plain dictionaries (JSON), and back.
+"""Problems, gaits, classes of gaits, bodies and laws of friction as plain dictionaries (JSON), and back.
 
 The names of the fields tell the kind; of laws other than Coulomb's their name does.
 """
@@ -6,22 +6,23 @@ The names of the fields tell the kind; of laws other than Coulomb's their name d
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.mixture import Mixture
-from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
-from colloc.gaits.relaxed import Relaxed
+from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
-from colloc.mechanics.bodies import Body
+from colloc.mechanics.bodies import FULL, IMPLICIT, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
@@ -29,7 +30,7 @@ from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
-from colloc.system.argument_names import STATED_IF_SET
+from colloc.system.arguments import STATED_IF_SET
 
 AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
@@ -41,6 +42,10 @@ BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 """Laws of friction that files can hold, Coulomb's first; a law of your own making is added to the list."""
+_AIMS = 5
+"""The last fields of a problem say what is asked of a gait, from the objective on; what is usual of them is left out."""
+_EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
+"""What earlier files call the formulations; those of paths name none."""
 
 
 def fields(value: Any) -> dict[str, Any]:
@@ -92,3 +97,25 @@ def law_from(given: dict[str, Any]) -> Law:
 def body_from(given: dict[str, Any]) -> Body:
     """The body that `fields` described; as `gait_from`."""
     return _from(BODIES, given)
+
+
+def problem_fields(problem: Any) -> dict[str, Any]:
+    """All fields of a problem."""
+    stated = {f.name: getattr(problem, f.name) for f in dataclasses.fields(problem)}
+    usual = [f.name for f in dataclasses.fields(problem)[-_AIMS:] if stated[f.name] == f.default]
+    stated |= {name: fields(stated[name]) for name in ("guess", "gait", "body")} | {"friction": law_fields(problem.friction)}
+    stated |= {"objective": problem.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in problem.at_least]}
+    return {name: value for name, value in stated.items() if name not in usual}
+
+
+def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
+    """The arguments of the problem that `problem_fields` described; as `gait_from`."""
+    kinds = {"guess": gait_from, "body": body_from, "friction": law_from, "gait": class_from}
+    found = dict(stated)
+    found |= {name: kind(found[name]) for name, kind in kinds.items()}
+    return found | {"formulation": _EARLIER.get(found.get("formulation"), found.get("formulation"))}
+
+
+def statement_hash(stated: dict[str, Any]) -> str:
+    """SHA-256 of what `problem_fields` gave."""
+    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()

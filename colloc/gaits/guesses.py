@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.system.errors import ProblemError
@@ -33,43 +34,6 @@ _SLACK = 1e-6
 _AT_THE_BOUND = 1e-2
 """An optimum that lies on the lower bound of the shape speed is a good guess for a richer class, although sampling cuts its
 corners and makes it a little shorter."""
-
-
-Limit = float | tuple[float, ...]
-"""On the magnitude of all angles of a body, or of each joint angle of a chain."""
-
-
-def checked_limit(body: Body, limit: Any) -> Limit:
-    """A limit as it is, or as a tuple of one for each joint.
-
-    Raises
-    ------
-    ProblemError
-        If it cannot be used for the body.
-    """
-    each, largest = np.ravel(np.asarray(limit, dtype=object)), body.usual.largest_limit
-    numbers = all(isinstance(a, (int, float, np.number)) and not isinstance(a, bool) for a in each)
-    if not numbers or not all(0 < a <= largest + 1e-12 for a in each):
-        most = f"pi/{np.pi / largest:g}".removesuffix("/1")
-        shown = f"{limit:g}" if numbers and np.ndim(limit) == 0 else repr(limit)
-        raise ProblemError(f"joint_limit must lie in (0, {most}], not {shown}.")
-    if np.ndim(limit) == 0:
-        return limit
-    if len(each) != body.n_joint or len(body.limit_names) != body.n_joint:
-        raise ProblemError(f"joint_limit has {len(each)} values; give one for all joints, or one for each joint of a chain.")
-    return tuple(float(a) for a in each)
-
-
-def widest(limit: Limit) -> float:
-    """The largest of the limits."""
-    return float(np.max(limit))
-
-
-def under_one_limit(angles: np.ndarray, limit: Limit) -> tuple[np.ndarray, float]:
-    """Shapes ``(n_joint, n)``, each joint stretched by what its limit is below the widest, and that: to be held against it."""
-    if np.ndim(limit) == 0:
-        return angles, limit  # type: ignore[return-value]
-    return angles * (widest(limit) / np.array(limit))[:, None], widest(limit)
 
 
 def largest_factor(body: Body, joint_limit: Limit, angles: np.ndarray) -> float:
@@ -103,7 +67,7 @@ def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share:
     cos, sin = body.wave(waves)
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
     size = min(share * largest_factor(body, joint_limit, unit.angles(_PHASES)), _LARGEST)
-    return Fourier(unit.mean, size * unit.cos, size * unit.sin)
+    return unit.grown(size)
 
 
 def check_guess(body: Body, gait_class: Any, stated: Any, joint_limit: Limit, smallest_shape_speed: float) -> None:

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.gait import ClassOfGaits, GaitFunction
-from colloc.system.argument_names import named_arguments
+from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
+from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 _COARSE = 16
@@ -49,13 +49,7 @@ class Fourier(GaitFunction):
 
     def __post_init__(self) -> None:
         for name, ndim in (("mean", 1), ("cos", 2), ("sin", 2)):
-            try:
-                value = np.array(getattr(self, name), dtype=float)
-            except (TypeError, ValueError):
-                raise ProblemError(f"guess.{name} must be numbers, not {getattr(self, name)!r}.") from None
-            if value.ndim != ndim or not np.isfinite(value).all():
-                raise ProblemError(f"guess.{name} must be a finite {ndim}-D array, one row per joint.")
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, finite_array(f"guess.{name}", getattr(self, name), ndim))
         if self.cos.shape != self.sin.shape or len(self.cos) != len(self.mean):
             raise ProblemError(
                 f"guess.mean, cos and sin disagree in shape: {self.mean.shape}, {self.cos.shape}, {self.sin.shape}."
@@ -66,25 +60,10 @@ class Fourier(GaitFunction):
         return len(self.mean)
 
     @property
-    def delta_unit(self) -> float:
-        """Delta of harmonic gaits is in body lengths per period as it is."""
-        return 1.0
-
-    @property
-    def speed_unit(self) -> float:
-        """Speeds among the variables of a program are those per period divided by this: radians of phase per period."""
-        return 2 * np.pi
-
-    @property
     def shape_speed(self) -> float:
         """Root-mean-square shape speed, in rad per radian of phase."""
         k = np.arange(1, self.n_harmonic + 1)
         return float(np.sqrt(0.5 * np.sum(k**2 * (self.cos**2 + self.sin**2))))
-
-    @property
-    def corner_phases(self) -> np.ndarray:
-        """Phases in (0, 1) where the rates jump: none."""
-        return np.empty(0)
 
     @property
     def n_harmonic(self) -> int:
@@ -114,6 +93,18 @@ class Fourier(GaitFunction):
                 terms.append(f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}")
             found.append(f"{coordinate} {j + 1}: " + " ".join(terms))
         return found
+
+    def mapped(self, matrix: np.ndarray) -> Fourier:
+        """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
+        return Fourier(matrix @ self.mean, matrix @ self.cos, matrix @ self.sin)
+
+    def scaled(self, factor: float) -> Fourier:
+        """The gait with all angles multiplied by a factor."""
+        return Fourier(factor * self.mean, factor * self.cos, factor * self.sin)
+
+    def grown(self, factor: float) -> Fourier:
+        """The gait with all angles multiplied by a factor about their mean."""
+        return Fourier(self.mean, factor * self.cos, factor * self.sin)
 
     def resized(self, n_harmonic: int) -> Fourier:
         """The same gait with harmonics added (zero) or cut."""
@@ -172,7 +163,7 @@ class Harmonic(ClassOfGaits):
     moves_knots = True
 
     def __post_init__(self) -> None:
-        if not isinstance(self.harmonics, (int, np.integer)) or not 1 <= self.harmonics <= 64:
+        if not is_whole(self.harmonics, 1, 64):
             raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
         self._check_symmetry()
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from colloc.numerics.expression import Dual, Formula, formula
+from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
 QUANTITIES = {
@@ -172,7 +173,7 @@ def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
     pairs: Sequence = list(stated.items()) if isinstance(stated, Mapping) else list(stated or ())  # type: ignore[call-overload]
     found = []
     for what, least in pairs:
-        if isinstance(least, bool) or not isinstance(least, (int, float, np.number)) or not np.isfinite(least):
+        if not is_number(least):
             raise ProblemError(f"at_least needs a finite number for {what!r}, not {least!r}.")
         found.append((objective_from(what), float(least)))
     return tuple(found)

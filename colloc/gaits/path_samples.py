@@ -10,9 +10,9 @@ from typing import Protocol
 
 import numpy as np
 
+from colloc.gaits.free_path import ArcPath, FreePath, across_the_axis
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, fraction
 
 _DENSE = 2000
@@ -36,9 +36,9 @@ class Gait(Protocol):
     def rates(self, t: np.ndarray) -> np.ndarray: ...
 
 
-def path_length(gait: Gait, count: int = _DENSE) -> float:
+def path_length(gait: Gait) -> float:
     """Length of the closed path of a gait [rad], which is its mean shape speed per period."""
-    points = gait.angles(np.linspace(0.0, 1.0, count + 1))
+    points = gait.angles(np.linspace(0.0, 1.0, _DENSE + 1))
     return float(np.linalg.norm(np.diff(points), axis=0).sum())
 
 
@@ -131,7 +131,7 @@ def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> n
         winding += 1
     first = 0.0
     if target.symmetry == BILATERAL:
-        first = np.pi * np.round((headings[0, 0] - np.pi / 4) / np.pi) + np.pi / 4 - headings[0, 0]
+        first = across_the_axis(headings[0, 0]) - headings[0, 0]
     return first + at * (winding * unit - turned)
 
 

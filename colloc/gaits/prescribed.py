@@ -31,8 +31,6 @@ class Phases(GaitFunction):
     schedule: tuple[float, ...] = (0.0, 1.0)
     symmetry: str = NONE
 
-    delta_unit = 1.0
-    speed_unit = 2 * np.pi
     shape_speed = 1.0
 
     def __post_init__(self) -> None:

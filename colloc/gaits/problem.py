@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,27 +11,25 @@ import numpy as np
 
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.guesses import Limit, check_guess, checked_limit, travelling_wave
+from colloc.gaits.guesses import check_guess, travelling_wave
 from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
-from colloc.gaits.path_classes import FreePath
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
-from colloc.mechanics.actuators import ActuatorLimits, checked_actuator_limit
-from colloc.mechanics.bodies import FULL, IMPLICIT, Body
+from colloc.mechanics.actuators import ActuatorLimits
+from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
-LONGEST_NAME = 200
+_NAME, LONGEST_NAME = re.compile(r"[A-Za-z0-9_.-]+"), 200
 """File systems allow 255 bytes, and results of a problem add endings to its name."""
-_AIMS = 5
-"""The last fields say what is asked of a gait, from the objective on; files that know of nothing else leave them out."""
 
 
 @named_arguments
@@ -155,7 +152,7 @@ class Problem:
             raise ProblemError(f"body must be a {_names(gait_fields.BODIES)}, not {type(self.body).__name__}.")
 
     def _check_parts(self) -> None:
-        if not isinstance(self.name, str) or not self.name or not set(self.name) <= _NAME_CHARACTERS:
+        if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
         if len(self.name) > LONGEST_NAME:
             raise ProblemError(
@@ -172,7 +169,7 @@ class Problem:
     def _check_numbers(self) -> None:
         for field in ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance"):
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+            if not is_number(value):
                 raise ProblemError(f"{field} must be a finite number, not {value!r}.")
         if self.delta <= 0:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
@@ -191,7 +188,7 @@ class Problem:
         if self.formulation not in self.body.formulations:
             known = ", ".join(self.body.formulations)
             raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
-        if isinstance(self.intervals, bool) or not isinstance(self.intervals, (int, np.integer)):
+        if not is_whole(self.intervals):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
         self._check_resolution()
         if self.intervals > 100_000:
@@ -200,7 +197,7 @@ class Problem:
     def _check_aims(self) -> None:
         object.__setattr__(self, "objective", objective_from(self.objective))
         object.__setattr__(self, "at_least", least_values(self.at_least))
-        if self.rotation is not None and (isinstance(self.rotation, bool) or not abs(self.rotation) < np.inf):
+        if self.rotation is not None and not is_number(self.rotation):
             raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
         if self.rotation == 0 and self.uses("rotation"):
             raise ProblemError("the objective speaks of the rotation, which is 0 unless rotation says otherwise (None: free).")
@@ -226,11 +223,7 @@ class Problem:
     @property
     def actuator_limits(self) -> ActuatorLimits:
         """What the actuators can do, joint by joint."""
-        each = (
-            () if limit is None else np.broadcast_to(limit, self.body.n_joint)
-            for limit in (self.torque_limit, self.power_limit)
-        )
-        return ActuatorLimits(*(tuple(float(value) for value in limit) for limit in each))
+        return ActuatorLimits(*(of_each(limit, self.body.n_joint) for limit in (self.torque_limit, self.power_limit)))
 
     @property
     def paced_by(self) -> str:
@@ -270,10 +263,7 @@ class Problem:
             limit = getattr(self, name)
             if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
                 raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same {name}.")
-        if self.gait.unit_speed and self.body.n_joint < 2:
-            raise ProblemError(f"the class {type(self.gait).__name__} needs a body of at least three links, or two modes.")
-        if isinstance(self.gait, FreePath) and self.gait.winding is not None and self.body.n_joint != 2:
-            raise ProblemError("gait.winding has a meaning for bodies of three links only; leave it out.")
+        self.gait.check_joints(self.body.n_joint)
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
@@ -296,13 +286,7 @@ class Problem:
 
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON)."""
-        stated = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        for name in ("guess", "gait", "body"):
-            stated[name] = gait_fields.fields(stated[name])
-        stated["friction"] = gait_fields.law_fields(self.friction)
-        usual = [f.name for f in dataclasses.fields(self)[-_AIMS:] if stated[f.name] == f.default]
-        stated |= {"objective": self.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in self.at_least]}
-        return {name: value for name, value in stated.items() if name not in usual}
+        return gait_fields.problem_fields(self)
 
     @classmethod
     def from_dict(cls, stated: dict) -> Problem:
@@ -314,33 +298,15 @@ class Problem:
             If a field is missing, unknown or has an unusable value.
         """
         try:
-            stated = dict(stated)
-            stated["guess"] = gait_fields.gait_from(stated["guess"])
-            stated["body"] = gait_fields.body_from(stated["body"])
-            stated["friction"] = gait_fields.law_from(stated["friction"])
-            stated["gait"] = gait_fields.class_from(stated["gait"])
-            stated["formulation"] = _EARLIER.get(stated.get("formulation"), stated.get("formulation"))
-            return cls(**stated)
+            return cls(**gait_fields.problem_arguments(stated))
         except (KeyError, TypeError) as error:
             raise ProblemError(f"not the description of a problem: {error}.") from None
 
     @property
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
-        return statement_hash(self.to_dict())
-
-
-_EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
-"""What earlier files call the formulations; those of paths name none."""
-
-
-def statement_hash(stated: dict) -> str:
-    """SHA-256 of what `Problem.to_dict` gave."""
-    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
+        return gait_fields.statement_hash(self.to_dict())
 
 
 def _names(kinds: Sequence[type]) -> str:
     return " or ".join(kind.__name__ for kind in kinds)
-
-
-_NAME_CHARACTERS = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from colloc.gaits.problem import Problem
+from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -80,7 +81,7 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
     if reference is not None and not isinstance(reference, Reference):
         raise ProblemError(f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}.")
     starts = names.get("STARTS")
-    if starts is not None and (isinstance(starts, bool) or not isinstance(starts, int) or starts < 1):
+    if starts is not None and not is_whole(starts, 1):
         raise ProblemError(f"{path}: STARTS must be a whole number of at least 1, not {starts!r}.")
     return ProblemFile(problem, reference, source, starts)
 

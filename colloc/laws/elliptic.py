@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from colloc.mechanics.friction import Friction
 from colloc.numerics.arrays import Array
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import named_arguments
 
 
 @named_arguments

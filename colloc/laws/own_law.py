@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from colloc.laws.link_quadrature import ByQuadrature
-from colloc.mechanics.friction import check_positive, regularised_speed
+from colloc.mechanics.friction import regularised_speed
 from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
 from colloc.numerics.expression import Dual, Formula, formula
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import check_positive, named_arguments
 from colloc.system.errors import ProblemError
 
 VARIABLES = ("vs", "vn", "speed", "delta")
@@ -62,7 +62,7 @@ class OwnLaw(ByQuadrature):
     """Samples cannot tell whether a formula is the gradient of a convex function: several motions are reckoned with."""
 
     def __post_init__(self) -> None:
-        check_positive(self, "unit", "speed_unit")
+        check_positive(self, "unit", "speed_unit", of="friction.")
         vs, vn, delta = _samples()
         with np.errstate(all="ignore"):  # what is not finite is refused
             fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from colloc.laws.link_quadrature import ByQuadrature
-from colloc.mechanics.friction import Coefficients, check_positive, regularised_speed
+from colloc.mechanics.friction import Coefficients, regularised_speed
 from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import check_positive, is_number, named_arguments
 from colloc.system.errors import ProblemError
 
 
@@ -43,8 +41,8 @@ class PowerLaw(Coefficients, ByQuadrature):
     mu_b: float = 1.0
 
     def __post_init__(self) -> None:
-        check_positive(self, "mu_t", "mu_f", "mu_b")
-        if isinstance(self.power, bool) or not isinstance(self.power, (int, float, np.floating)) or not 0 <= self.power <= 2:
+        check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
+        if not (is_number(self.power) and 0 <= self.power <= 2):
             raise ProblemError(f"friction.power must lie in [0, 2], not {self.power!r}; friction that falls with speed sticks.")
 
     @property

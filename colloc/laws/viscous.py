@@ -12,11 +12,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from colloc.mechanics.friction import check_positive
 from colloc.mechanics.law import Matrix
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import check_positive, named_arguments
 
 
 @named_arguments
@@ -47,7 +46,7 @@ class Viscous:
     kernel_source = ""
 
     def __post_init__(self) -> None:
-        check_positive(self, "normal", "tangential")
+        check_positive(self, "normal", "tangential", of="friction.")
 
     @property
     def smallest(self) -> float:

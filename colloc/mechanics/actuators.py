@@ -15,14 +15,13 @@ It vanishes with delta like friction's own regularisation, and the certificate's
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
-from colloc.system.errors import ProblemError
 
 
 def joint_moments(body: Body, friction: Law, angles: Array, forces: Array, delta: Array) -> Array:
@@ -109,22 +108,3 @@ class ActuatorLimits(NamedTuple):
 
 
 UNLIMITED = ActuatorLimits()
-
-
-def checked_actuator_limit(name: str, limit: Any, n_joint: int) -> float | tuple[float, ...] | None:
-    """A limit as it is, or as a tuple of one for each joint; None is none.
-
-    Raises
-    ------
-    ProblemError
-        If it cannot be used.
-    """
-    if limit is None:
-        return None
-    each = np.ravel(np.asarray(limit, dtype=object))
-    numbers = all(isinstance(a, (int, float, np.number)) and not isinstance(a, bool) for a in each)
-    if not numbers or not all(0 < a < np.inf for a in each):
-        raise ProblemError(f"{name} must be positive and finite, not {limit!r}.")
-    if np.ndim(limit) and len(each) != n_joint:
-        raise ProblemError(f"{name} has {len(each)} values; give one for all joints, or one for each of the {n_joint}.")
-    return tuple(float(a) for a in each) if np.ndim(limit) else float(each[0])

@@ -8,26 +8,17 @@ from typing import Self
 import numpy as np
 
 from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.bodies import (
-    ARROWS,
-    FULL,
-    IMPLICIT,
-    BalancedMotion,
-    BalanceSolution,
-    Branches,
-    Contact,
-    Lifted,
-    Pairs,
-    Sliding,
-    Usual,
-)
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Branches, Lifted, Sliding
+from colloc.mechanics.bodies import ARROWS, FULL, IMPLICIT, Contact, Pairs, Usual
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     SMOOTHING,
     crossing_sums,
+    excesses,
     far_pairs,
     intrusions,
+    overlap,
     passing_depth,
 )
 from colloc.mechanics.fixed_point import solve_balance
@@ -35,9 +26,8 @@ from colloc.mechanics.law import Law
 from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.mechanics.width import excesses, overlap
 from colloc.numerics.arrays import Array, namespace
-from colloc.system.argument_names import named_arguments
+from colloc.system.arguments import named_arguments
 
 
 @named_arguments
@@ -49,7 +39,7 @@ class Chain(Links):
     lengths : tuple of float
         Link lengths from tail to head; they add up to the body length, 1.
     width : float
-        Of every link [body lengths]: links do not overlap but neighbours about their joint (`colloc.mechanics.width`). By
+        Of every link [body lengths]: links do not overlap but neighbours about their joint (`colloc.mechanics.contact`). By
         default links are lines, which must not cross but may lie on each other. Friction is that of the lines either way.
     weights : tuple of float
         Of the links from tail to head, in parts of the body's weight, 1; by default in proportion to their lengths. What a

@@ -7,15 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant, link_stiffness, total_power
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
-from colloc.mechanics.compiled_balance import motion
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
+from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.implicit_slopes import Load, implicit_changes
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
-from colloc.mechanics.native_kernel import native_kernel
-
-N_SLOPES = 6
-"""Rows of `BalancedMotion` that are differentiated: tail velocity, centre velocity, power."""
+from colloc.mechanics.native_kernel import compiled_motion, native_kernel
 
 
 def chain_motion(
@@ -31,12 +28,10 @@ def chain_motion(
 
     Under a load the actuators' power is that of friction less the load's.
     """
-    library, arguments = (
-        native_kernel(body, friction),
-        (body, friction, angles, rates, delta, load, solved.anchor, solved.anchor_velocity),
-    )
-    values = _numpy_values(*arguments) if library is None else motion(library, *arguments, with_slopes=False)[0]
-    return _named(values)
+    library, at = native_kernel(body, friction), (angles, rates, delta, load, solved.anchor, solved.anchor_velocity)
+    if library is None:
+        return _named(_by_anchor(_values, (7,), body, friction, *at))
+    return _named(compiled_motion(library, body, friction, *at, with_slopes=False)[0])
 
 
 def chain_slopes(
@@ -50,15 +45,13 @@ def chain_slopes(
 ) -> tuple[BalancedMotion, np.ndarray]:
     """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates); under a
     load two columns more, with respect to its components."""
-    library, arguments = (
-        native_kernel(body, friction),
-        (body, friction, angles, rates, delta, load, solved.anchor, solved.anchor_velocity),
-    )
-    if library is None:
-        return _named(_numpy_values(*arguments)), _numpy_slopes(*arguments)
-    values, slopes = motion(library, *arguments, with_slopes=True)
-    assert slopes is not None
-    return _named(values), slopes
+    library, at = native_kernel(body, friction), (angles, rates, delta, load, solved.anchor, solved.anchor_velocity)
+    if library is not None:
+        values, slopes = compiled_motion(library, body, friction, *at, with_slopes=True)
+        return _named(values), slopes
+    slopes = _by_anchor(_slopes, (6, 2 * body.n_joint + 2), body, friction, *at)
+    values = _by_anchor(_values, (7,), body, friction, *at)
+    return _named(values), slopes[:, : 2 * body.n_joint] if load is None else slopes
 
 
 def _named(values: np.ndarray) -> BalancedMotion:
@@ -79,21 +72,10 @@ def _by_anchor(
 ) -> np.ndarray:
     held = np.zeros((2, anchor.size)) if load is None else load
     found = np.empty((*rows, anchor.size))
-    for link in np.unique(anchor):
-        at = anchor == link
-        moving = angles[:, at], rates[:, at], delta, held[:, at], int(link), anchor_velocity[:, at]
+    for link, at in groups(anchor):
+        moving = angles[:, at], rates[:, at], delta, held[:, at], link, anchor_velocity[:, at]
         found[..., at] = of_one(body, friction, *moving)
     return found
-
-
-def _numpy_values(body: Links, *arguments) -> np.ndarray:
-    return _by_anchor(_values, (7,), body, *arguments)
-
-
-def _numpy_slopes(body: Links, *arguments) -> np.ndarray:
-    columns = 2 * body.n_joint + 2
-    found = _by_anchor(_slopes, (N_SLOPES, columns), body, *arguments)
-    return found[:, : 2 * body.n_joint] if arguments[4] is None else found
 
 
 def _values(

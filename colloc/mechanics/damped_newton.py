@@ -12,7 +12,7 @@ of order delta, which a velocity of order one could only represent to 1e-16 in a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -36,20 +36,22 @@ _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
 METHODS = ("auto", "newton", "fixed_point")
 
 
+Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
+"""Body state ``(k, n_body, n)``, net force ``(3, n)`` and, of an associated law, the potential ``(n,)`` whose gradient is minus
+that force."""
+
+
 class Batch(Protocol):
     """Instants that share a reference: what the iteration evaluates on subsets of them."""
 
     @property
     def friction(self) -> Law: ...
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Body state ``(k, n_body, n)``, net force ``(3, n)`` and merit ``(n,)`` at z ``(3, n)`` of the selected instants.
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """What there is at z ``(3, n)`` of the selected instants."""
 
-        The merit is what a step has to reduce: the potential where there is one, else half the squared residual.
-        """
-
-    def step(self, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
-        """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``."""
+    def matrix(self, state: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
+        """Minus the derivative of the net force, or the matrix of the paper's fixed point, ``(n, 3, 3)``."""
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The slowest reference ``(n,)`` of every instant, and its velocity ``(3, n)``, for z in the batch's own."""
@@ -72,6 +74,12 @@ def force_unit(friction: Law, delta: np.ndarray) -> np.ndarray:
     """
     degree = 1.0 if friction.degree is None else friction.degree
     return friction.largest * np.hypot(1.0, delta) ** (degree - 1.0)
+
+
+def groups(anchor: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """The anchors ``(n_time,)`` that occur, and the instants that have each."""
+    for reference in np.unique(anchor):
+        yield int(reference), np.flatnonzero(anchor == reference)
 
 
 MakeBatch = Callable[[np.ndarray, int], Batch]
@@ -155,9 +163,9 @@ def _advance(
     todo = chosen
     for _ in range(n_reference):
         moved = []
-        for reference in np.unique(state.anchor[todo]):
-            members = todo[state.anchor[todo] == reference]
-            batch = make_batch(members, int(reference))
+        for reference, chosen_of_todo in groups(state.anchor[todo]):
+            members = todo[chosen_of_todo]
+            batch = make_batch(members, reference)
             z, residual, iterations = iterate(
                 batch, state.velocity[:, members], delta[:, members], tolerance, max_iterations, method
             )
@@ -180,12 +188,18 @@ def iterate(
     batch: Batch, z: np.ndarray, delta: np.ndarray, tolerance: float, max_iterations: int, method: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Damped Newton from z ``(3, n)``, with fixed-point steps where a Newton step fails; returns z, residual, iterations."""
+
+    def evaluated(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """With the merit ``(n,)`` that a step has to reduce: the potential if there is one, else half the squared residual."""
+        state, force, potential = batch.evaluate(select, z, delta)
+        return state, force, 0.5 * np.sum(force * force, axis=0) if potential is None else potential
+
     n_time = z.shape[1]
     z = z.copy()
     residual, iterations = np.full(n_time, np.inf), np.zeros(n_time, dtype=int)
     fixed_point_steps_due = np.full(n_time, np.iinfo(int).max if method == "fixed_point" else 0)
     active = np.arange(n_time)
-    links, force, merit = batch.evaluate(active, z, delta)
+    links, force, merit = evaluated(active, z, delta)
     while True:
         residual[active] = np.abs(force).max(axis=0) / force_unit(batch.friction, delta[0, active])
         keep = (residual[active] > tolerance) & (iterations[active] < max_iterations)
@@ -193,14 +207,14 @@ def iterate(
             return z, residual, iterations
         active, links, force, merit = active[keep], links[:, :, keep], force[:, keep], merit[keep]
         d, newton = delta[:, active], fixed_point_steps_due[active] == 0
-        step = batch.step(links, force, d, newton)
+        step = _step(batch, links, force, d, newton)
         if batch.friction.associated:
             slope, slack = -np.sum(force * step, axis=0), _ROUNDING * merit
         else:
             slope, slack = -2.0 * merit, np.zeros_like(merit)
         alpha = np.ones(active.size)
         trial = z[:, active] + step
-        new_links, new_force, new_merit = batch.evaluate(active, trial, d)
+        new_links, new_force, new_merit = evaluated(active, trial, d)
         failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
         for shrink in _BACKTRACKING if batch.friction.associated else _SHORT_BACKTRACKING:
             retry = np.flatnonzero(failed)
@@ -208,8 +222,8 @@ def iterate(
                 break
             alpha[retry] *= shrink
             trial[:, retry] = z[:, active[retry]] + alpha[retry] * step[:, retry]
-            evaluated = batch.evaluate(active[retry], trial[:, retry], d[:, retry])
-            new_links[:, :, retry], new_force[:, retry], new_merit[retry] = evaluated
+            again = evaluated(active[retry], trial[:, retry], d[:, retry])
+            new_links[:, :, retry], new_force[:, retry], new_merit[retry] = again
             failed = newton & ~(new_merit <= merit + _ARMIJO * alpha * slope + slack)
         trial[:, failed], new_links[:, :, failed] = z[:, active[failed]], links[:, :, failed]
         new_force[:, failed], new_merit[failed] = force[:, failed], merit[failed]
@@ -219,6 +233,16 @@ def iterate(
         fixed_point_steps_due[active[failed]] = _FIXED_POINT_STEPS_AFTER_FAILURE
         if method == "newton":
             iterations[active[failed]] = max_iterations
+
+
+def _step(batch: Batch, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
+    """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``."""
+    step = np.empty_like(force)
+    for by_newton, chosen in ((True, newton), (False, ~newton)):
+        if chosen.any():
+            matrix = batch.matrix(state[:, :, chosen], delta[:, chosen], newton=by_newton)
+            step[:, chosen] = solve3(matrix, force[:, chosen])
+    return step
 
 
 def solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

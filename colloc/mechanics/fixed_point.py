@@ -28,12 +28,11 @@ from colloc.mechanics.balance import (
     net_force,
     secant_matrix,
 )
-from colloc.mechanics.bodies import BalanceSolution
-from colloc.mechanics.compiled_balance import balance
-from colloc.mechanics.damped_newton import METHODS, relative_delta, solve, solve3, starting_state
+from colloc.mechanics.balance_results import BalanceSolution
+from colloc.mechanics.damped_newton import METHODS, Evaluated, groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
-from colloc.mechanics.native_kernel import native_kernel
+from colloc.mechanics.native_kernel import compiled_balance, native_kernel
 from colloc.system.errors import ProblemError
 
 
@@ -49,33 +48,20 @@ class _Batch:
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
         return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Links ``(7, n_link, n)`` (posture, then velocity), net force ``(3, n)`` and merit ``(n,)`` at z.
-
-        The merit is what a step has to reduce: the potential (less the load's power) where there is one, else half the
-        squared residual.
-        """
-        now = self.at(select, z, delta)
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """Links ``(7, n_link, n)``, posture, then velocity; net force and potential at z, those of the load with them."""
+        now, body = self.at(select, z, delta), self.body
         force = net_force(now.posture, now.force)
+        potential = dissipation_potential(body, self.friction, now.velocity, delta) if self.friction.associated else None
         if self.load is not None:
-            force += load_wrench(self.body, now.posture, self.load[:, select])
-        if self.friction.associated:
-            merit = dissipation_potential(self.body, self.friction, now.velocity, delta)
-            if self.load is not None:
-                merit -= load_power(self.body, now.posture, now.velocity, self.load[:, select])
-        else:
-            merit = 0.5 * np.sum(force * force, axis=0)
-        return np.stack([*now.posture, *now.velocity]), force, merit
+            load = self.load[:, select]
+            force += load_wrench(body, now.posture, load)
+            potential = None if potential is None else potential - load_power(body, now.posture, now.velocity, load)
+        return np.stack([*now.posture, *now.velocity]), force, potential
 
-    def step(self, links: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
-        """Newton steps where `newton`, the paper's fixed-point steps elsewhere, ``(3, n)``."""
-        step = np.empty_like(force)
-        for matrix, chosen in ((balance_jacobian, newton), (secant_matrix, ~newton)):
-            if chosen.any():
-                posture, velocity = Posture(*links[:4, :, chosen]), LinkVelocity(*links[4:, :, chosen])
-                left = matrix(self.body, self.friction, posture, velocity, delta[:, chosen])
-                step[:, chosen] = solve3(left, force[:, chosen])
-        return step
+    def matrix(self, links: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
+        matrix = balance_jacobian if newton else secant_matrix
+        return matrix(self.body, self.friction, Posture(*links[:4]), LinkVelocity(*links[4:]), delta)
 
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
@@ -186,7 +172,7 @@ def solve_balance(
     settings = float(tolerance), int(max_iterations), method
     library = native_kernel(body, friction)
 
-    solved = _numpy_balance if library is None else partial(balance, library)
+    solved = _numpy_balance if library is None else partial(compiled_balance, library)
     found = solved(body, friction, angles, rates, float(delta), load, start, *settings)
     for link in range(body.n_link if method == "auto" else 0):
         failed = np.flatnonzero(~(found[1] <= tolerance))
@@ -216,7 +202,7 @@ def _numpy_balance(
     max_iterations: int,
     method: str,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Arguments and results as those of `colloc.mechanics.compiled_balance.balance`, which it is the reference of."""
+    """Arguments and results as those of `colloc.mechanics.native_kernel.compiled_balance`, which it is the reference of."""
     n_time = angles.shape[1]
     # work in units of the largest rate, where the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
@@ -240,8 +226,7 @@ def _numpy_balance(
     solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
 
     tail_z = np.empty((3, n_time))
-    for link in np.unique(state.anchor):
-        chosen = np.flatnonzero(state.anchor == link)
-        posture = body.posture(angles[:, chosen], int(link))
-        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], int(link))
+    for link, chosen in groups(state.anchor):
+        posture = body.posture(angles[:, chosen], link)
+        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], link)
     return tail_z * speed, state.residual, state.iterations, state.anchor, state.velocity * speed

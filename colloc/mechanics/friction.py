@@ -15,16 +15,7 @@ from colloc.mechanics import link_friction
 from colloc.mechanics.law import Matrix
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
-from colloc.system.argument_names import named_arguments
-from colloc.system.errors import ProblemError
-
-
-def check_positive(law: object, *names: str) -> None:
-    """A `ProblemError` that names the first of some numbers of a law that is not positive and finite."""
-    for name in names:
-        value = getattr(law, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not np.isfinite(value) or value <= 0:
-            raise ProblemError(f"friction.{name} must be a positive finite number, not {value!r}.")
+from colloc.system.arguments import check_positive, named_arguments
 
 
 class Coefficients:
@@ -88,7 +79,7 @@ class Friction(Coefficients):
     kernel_source = ""
 
     def __post_init__(self) -> None:
-        check_positive(self, "mu_t", "mu_f", "mu_b")
+        check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
 
     @property
     def kernel_numbers(self) -> tuple[float, ...]:

@@ -83,8 +83,8 @@ def _roots(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> _Root
     signed_root_q = 2.0 * half / S
     q = signed_root_q * signed_root_q
     small = q < _SERIES_LIMIT
-    h_small = _H_SERIES[-1]
-    for coefficient in _H_SERIES[-2::-1]:
+    h_small = 0.0
+    for coefficient in reversed(_H_SERIES):
         h_small = h_small * q + coefficient
     safe = xp.where(small, 0.5, xp.abs(signed_root_q))
     # 1 - q = 2 P / S^2 = 2 a^2 / (Q S^2)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
-from colloc.system.argument_names import STATED_IF_SET
+from colloc.system.arguments import STATED_IF_SET, is_number
 from colloc.system.errors import ProblemError
 
 TAIL = None
@@ -47,7 +47,7 @@ class Links:
     lengths : tuple of float
         Link lengths from tail to head; they add up to the body length, 1.
     width : float
-        Of every link [body lengths], see `colloc.mechanics.width`; by default links are lines.
+        Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines.
     weights : tuple of float
         Of the links, in parts of the body's; by default the body is as heavy everywhere.
     """
@@ -69,7 +69,7 @@ class Links:
         if abs(sum(lengths) - 1.0) > 1e-12:
             raise ProblemError(f"body.lengths must add up to the body length 1, not {sum(lengths):.12g}.")
         width = self.width
-        if isinstance(width, bool) or not isinstance(width, (int, float, np.number)) or not 0 <= width < min(lengths):
+        if not (is_number(width) and 0 <= width < min(lengths)):
             raise ProblemError(f"body.width must be a number from 0 to below the shortest link, not {width!r}.")
         object.__setattr__(self, "width", float(width))
         object.__setattr__(self, "weights", self._checked_weights())

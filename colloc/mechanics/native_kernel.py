@@ -1,9 +1,8 @@
-"""The compiled kernel of chains: C sources of this package as a shared library, or none. No CasADi.
+"""The compiled kernel of chains: C sources of this package as a shared library, or none, and its calls. No CasADi.
 
-The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled by the system's compiler
-when first needed, in about half a second, and kept in the user's cache folder under a name made of their content: whoever
-edits, updates or shares an installation never meets an old library. Without a compiler, or a folder to keep the library in,
-everything is done by NumPy, the reference (docs/notes/kernel.md says why C, and why then).
+The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled when first needed, in about
+half a second, and kept (`colloc.numerics.c_compiler`). Without a compiler, or a folder to keep the library in, everything is
+done by NumPy, the reference (docs/notes/kernel.md says why C, and why then).
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on
 nothing but its own data, so it is the same in any batch and on any number of threads.
 """
@@ -12,12 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import hashlib
-import os
-import platform
-import shutil
-import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -26,16 +19,15 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
-from colloc.numerics.c_compiler import c_compiler, cache_folder, compile_library
+from colloc.numerics.c_compiler import kept_library
 from colloc.system.errors import StoreError
-from colloc.system.private_folder import is_private, make_private
 from colloc.system.processors import available_threads
-from colloc.system.replaced_file import replaced_file
 
-_FLAGS = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
+_FLAGS: tuple[str, ...] = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing that reorders arithmetic. -O3 takes three times as long to compile and gains 5 to 10 %."""
 _MAIN = "kernel.c"
 _PIECE = 4000
@@ -75,50 +67,13 @@ def numpy_instead() -> Iterator[None]:
 @cache
 def library(own_law: str = "") -> ctypes.CDLL | None:
     """The kernel, loaded, and compiled before if need be, by itself or with a law's own C; None if that cannot be."""
-    folder = cache_folder()
-    if folder is None:
-        return None
+    flags, headers = ((*_FLAGS, "-DOWN_LAW"), {"own_law.h": own_law}) if own_law else (_FLAGS, {})
     try:
         with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
-            name = f"kernel-{_fingerprint(sources, own_law)}"
-            own = (found for found in folder.glob(f"{name}-*.so") if is_private(found))
-            whole = (found for found in own if found.stem.endswith(_digest(found)))
-            file = next(whole, None) or _compiled(sources, own_law, folder, name)
+            file = kept_library("kernel", sources, _MAIN, flags, headers)
             return None if file is None else _loaded(file)
     except (OSError, StoreError):
         return None
-
-
-def _fingerprint(sources: Path, own_law: str) -> str:
-    """Of everything that the library is made of."""
-    content = hashlib.sha256(" ".join((*_FLAGS, sys.platform, platform.machine(), own_law)).encode())
-    for source in sorted(sources.glob("*.[ch]")):
-        content.update(source.read_bytes())
-    return content.hexdigest()[:32]
-
-
-def _digest(file: Path) -> str:
-    """Of a library; it ends the name, as loading a part of a library kills the process."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
-
-
-def _compiled(sources: Path, own_law: str, folder: Path, name: str) -> Path | None:
-    """The library, put in the folder; None without a compiler, or where nothing can be kept."""
-    make_private(folder)
-    if c_compiler() is None or not os.access(folder, os.W_OK):
-        return None
-    with tempfile.TemporaryDirectory(prefix="colloc-") as scratch:
-        made = Path(scratch) / "kernel.so"
-        flags = [*_FLAGS]
-        if own_law:
-            (Path(scratch) / "own_law.h").write_text(own_law, encoding="ascii")
-            flags += ["-DOWN_LAW", f"-I{scratch}", f"-I{sources}"]
-        compile_library(sources / _MAIN, flags, made)
-        file = folder / f"{name}-{_digest(made)}.so"
-        make_private(folder)
-        with replaced_file(file) as unfinished:
-            shutil.copy(made, unfinished)  # with its permissions
-    return file
 
 
 def _loaded(file: Path) -> ctypes.CDLL:
@@ -129,7 +84,19 @@ def _loaded(file: Path) -> ctypes.CDLL:
     return loaded
 
 
-def each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
+def address(array: np.ndarray | None) -> int | None:
+    """Where an array's data are, for a call."""
+    return None if array is None else array.ctypes.data
+
+
+def _call(function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object) -> None:
+    """Call a function of the kernel for all instants: with the chain, the law and the instants of a piece, then arguments."""
+    numbers = np.array(body.lengths), body.pressure_column().ravel(), np.array(friction.kernel_numbers, dtype=float)
+    chain = (body.n_link, *map(address, numbers), n_time)
+    _each_piece(n_time, lambda first, last: function(*chain, first, last, *arguments))
+
+
+def _each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
     """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large.
 
     Raises
@@ -149,6 +116,74 @@ def each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
         raise MemoryError("no memory for the links of a body.")
 
 
-def address(array: np.ndarray | None) -> int | None:
-    """Where an array's data are, for a call."""
-    return None if array is None else array.ctypes.data
+def compiled_balance(
+    library: ctypes.CDLL,
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    load: np.ndarray | None,
+    start: np.ndarray | None,
+    tolerance: float,
+    max_iterations: int,
+    method: str,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3, n_time)``."""
+    n_time = angles.shape[1]
+    angles, rates = np.ascontiguousarray(angles), np.ascontiguousarray(rates)
+    load, start = (None if a is None else np.ascontiguousarray(a) for a in (load, start))
+    z, anchor_velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
+    iterations, anchor = np.empty(n_time, dtype=np.int64), np.empty(n_time, dtype=np.int64)
+    found = z, residual, iterations, anchor, anchor_velocity
+    before, after = map(address, (angles, rates)), map(address, (load, start))
+    how = tolerance, max_iterations, METHODS.index(method)
+    _call(library.colloc_balance, body, friction, n_time, *before, delta, *after, *how, *map(address, found))
+    return found
+
+
+def compiled_motion(
+    library: ctypes.CDLL,
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    delta: float,
+    load: np.ndarray | None,
+    anchor: np.ndarray,
+    anchor_velocity: np.ndarray,
+    *,
+    with_slopes: bool,
+) -> tuple[np.ndarray, np.ndarray]:
+    """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, n, n_time)`` if asked
+    for."""
+    n_time = angles.shape[1]
+    angles, rates, anchor_velocity = (np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity))
+    load = None if load is None else np.ascontiguousarray(load, dtype=float)
+    anchor = np.ascontiguousarray(anchor, dtype=np.int64)
+    columns = 2 * body.n_joint + (0 if load is None else 2)
+    values, slopes = np.empty((7, n_time)), np.empty((6 if with_slopes else 0, columns, n_time))
+    after = map(address, (load, anchor, anchor_velocity, values, slopes if with_slopes else None))
+    _call(library.colloc_motion, body, friction, n_time, *map(address, (angles, rates)), delta, *after)
+    return values, slopes
+
+
+def compiled_loaded(
+    library: ctypes.CDLL,
+    body: Links,
+    friction: Law,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    load: np.ndarray,
+    start: np.ndarray,
+    delta: float,
+    steps: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The fields of `colloc.bounds.loaded_balance.Loaded`."""
+    n_time = angles.shape[1]
+    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, load, start)]
+    velocity, potential, power = np.empty((3, n_time)), np.empty(n_time), np.empty(n_time)
+    forces, residual, leftover_power = np.empty((body.n_link, 3, n_time)), np.empty((2, n_time)), np.empty(n_time)
+    found = velocity, potential, power, forces, residual, leftover_power
+    _call(library.colloc_loaded, body, friction, n_time, *map(address, given), delta, steps, *map(address, found))
+    return found

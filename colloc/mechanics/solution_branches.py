@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian, instant
-from colloc.mechanics.bodies import BalanceSolution, Branches
+from colloc.mechanics.balance_results import BalanceSolution, Branches
+from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
@@ -113,11 +114,9 @@ def _determinant(
 ) -> np.ndarray:
     """Of `balance_jacobian`, ``(n_time,)``; the reference does not matter, but the slowest link loses no digits."""
     result = np.empty(solved.anchor.size)
-    for link in np.unique(solved.anchor):
-        chosen = solved.anchor == link
-        at = (angles[:, chosen], rates[:, chosen], solved.anchor_velocity[:, chosen], delta, int(link))
-        now = instant(body, friction, *at)
-        everywhere = np.full((1, int(chosen.sum())), delta)
+    for link, chosen in groups(solved.anchor):
+        now = instant(body, friction, angles[:, chosen], rates[:, chosen], solved.anchor_velocity[:, chosen], delta, link)
+        everywhere = np.full((1, chosen.size), delta)
         result[chosen] = np.linalg.det(balance_jacobian(body, friction, now.posture, now.velocity, everywhere))
     return result
 

@@ -179,7 +179,6 @@ class Oracles:
 
     nlp: dict[str, ca.MX]
     options: dict[str, ca.Function]
-    parameter_shapes: list[tuple[int, int]]
 
     def parameter_vector(self, delta: float, parameters: list[np.ndarray]) -> np.ndarray:
         """The vector of delta and all instance parameters, in the order of the blocks."""
@@ -230,7 +229,6 @@ def oracles(assembly: Assembly) -> Oracles:
                 "nlp_hess_l", [x, p, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
             ),
         },
-        shapes,
     )
 
 

@@ -1,16 +1,25 @@
-"""The system's C compiler, and the folder where what it made is kept. No CasADi."""
+"""C sources as shared libraries, made by the system's compiler and kept in the user's cache folder. No CasADi.
+
+A library is kept under a name made of the content of its sources and its own: whoever edits, updates or shares an installation
+never meets an old one, nor a part of one, which would kill the process that loads it.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import platform
 import shutil
 import subprocess
-from collections.abc import Sequence
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
 from colloc.system.errors import StoreError
+from colloc.system.private_folder import is_private, make_private
 from colloc.system.replaced_file import replaced_file
 
 FOLDER, OFF = "COLLOC_CODE", "off"
@@ -40,14 +49,63 @@ def c_compiler() -> str | None:
     return next((found for name in names if name and (found := shutil.which(name))), None)
 
 
-def compile_library(source: str | Path, flags: Sequence[str], library: Path) -> None:
-    """Compile a C file into a shared library, which appears whole or not at all.
+def kept_library(kind: str, sources: Path, main: str, flags: Sequence[str], headers: Mapping[str, str]) -> Path | None:
+    """A shared library in the cache folder, compiled if it is not there; None without a compiler, or where nothing can be kept.
+
+    Parameters
+    ----------
+    kind : str
+        What its name begins with.
+    sources : Path
+        The folder of C files and headers that it is made of.
+    main : str
+        The file in it that includes the others.
+    flags : sequence of str
+    headers : mapping of str to str
+        Names and texts of further headers.
 
     Raises
     ------
     StoreError
-        If there is no compiler, it fails, or the library cannot be written.
+        If the compiler fails, or the library cannot be written.
     """
+    folder = cache_folder()
+    if folder is None:
+        return None
+    name = f"{kind}-{_fingerprint(sources, flags, headers)}"
+    for found in folder.glob(f"{name}-*.so"):
+        if is_private(found) and found.stem.endswith(_digest(found)):
+            return found
+    make_private(folder)
+    if c_compiler() is None or not os.access(folder, os.W_OK):
+        return None
+    with tempfile.TemporaryDirectory(prefix="colloc-") as scratch:
+        for header, text in headers.items():
+            (Path(scratch) / header).write_text(text, encoding="ascii")
+        made = Path(scratch) / f"{kind}.so"
+        _compile(sources / main, [*flags, f"-I{scratch}", f"-I{sources}"], made)
+        file = folder / f"{name}-{_digest(made)}.so"
+        make_private(folder)
+        with replaced_file(file) as unfinished:
+            shutil.copy(made, unfinished)  # with its permissions
+    return file
+
+
+def _fingerprint(sources: Path, flags: Sequence[str], headers: Mapping[str, str]) -> str:
+    """Of everything that a library is made of."""
+    content = hashlib.sha256(" ".join((*flags, sys.platform, platform.machine(), *headers.values())).encode())
+    for source in sorted(sources.glob("*.[ch]")):
+        content.update(source.read_bytes())
+    return content.hexdigest()[:32]
+
+
+def _digest(file: Path) -> str:
+    """Of a library; it ends the name."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+
+
+def _compile(source: Path, flags: Sequence[str], library: Path) -> None:
+    """Compile a C file into a shared library, which appears whole or not at all."""
     command = [str(c_compiler()), *flags]
     with replaced_file(library) as unfinished:
         try:

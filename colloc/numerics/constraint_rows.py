@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -86,7 +85,7 @@ def total_group(name: str, variable: np.ndarray, mesh: Mesh, n: int, unit: float
     return equalities(name, selector(variable[0], n), {name: sparse.csr_matrix(-unit * rate.sum(axis=0))})
 
 
-def least_group(name: str, least: Sequence[float], n: int) -> Group:
-    """Outputs of the block of the same name are no less than given values."""
-    lower, rows = np.array(least, dtype=float), len(least)
-    return Group(name, lower, np.full(rows, np.inf), sparse.csr_matrix((rows, n)), {name: sparse.eye(rows, format="csr")})
+def block_group(name: str, lower: np.ndarray | float, upper: np.ndarray | float, rows: int, n: int, block: str = "") -> Group:
+    """Outputs of a block, by default of the same name, between bounds."""
+    low, high = (np.full(rows, bound, dtype=float) for bound in (lower, upper))
+    return Group(name, low, high, sparse.csr_matrix((rows, n)), {block or name: sparse.eye(rows, format="csr")})

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from colloc.gaits.guesses import Limit, under_one_limit
+from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import lab_outline
@@ -24,6 +24,7 @@ _FLAT, _SEEN = 0.12, 0.3
 _SMALL = 1.6
 """Extent [rad] below which a path in shape space is shown from closer than the whole plane."""
 _MOST_PERIODS = 3
+_CELLS = 180
 _ROUND = 9
 """Vertices of the round end of a link."""
 _EXPONENT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -107,17 +108,17 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     _key(axes)
 
 
-def forbidden(body: Body, joint_limit: Limit, cells: int = 180) -> tuple[np.ndarray, np.ndarray]:
+def forbidden(body: Body, joint_limit: Limit) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of joint angles that joint limits or, for two joints, crossing links forbid.
 
     Returns
     -------
-    grid : (cells + 1,)
+    grid : (n,)
         Joint angles from -pi to pi.
-    excess : (cells + 1, cells + 1)
+    excess : (n, n)
         Positive where forbidden; rows are the second joint. With more joints contact depends on the others and is left out.
     """
-    grid = np.linspace(-np.pi, np.pi, cells + 1)
+    grid = np.linspace(-np.pi, np.pi, _CELLS + 1)
     a, b = np.meshgrid(grid, grid)
     shapes = np.zeros((body.n_joint, a.size))
     shapes[:2] = a.ravel(), b.ravel()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from colloc.gaits.mixture import Mixture
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Mixture
 from colloc.pictures.figure import draw_allowed, set_log
 from colloc.pictures.style import BLUE, GREY, ORANGE, VERMILION
 from colloc.results.relaxation import Relaxation
@@ -18,24 +18,23 @@ _USED = 1e-4
 """Share of a piece's time from which a direction counts as mixed in."""
 
 
-def draw_mixture(axes: Axes, problem: Problem, gait: Mixture, first: int = 0, second: int = 1) -> None:
-    """The mean shape of a relaxed gait in the plane of two joint angles; where it mixes, the directions as small loops."""
+def draw_mixture(axes: Axes, problem: Problem, gait: Mixture) -> None:
+    """The mean shape of a relaxed gait in the plane of its first two joints; where it mixes, the directions as small loops."""
     draw_allowed(axes, problem.body, problem.joint_limit)
     whole = gait.whole
-    shapes = whole.shapes[[first, second]]
+    shapes, shares = whole.shapes[:2], whole.shares
     axes.plot(*shapes, color=BLUE, lw=1.6, label="mean shape")
     axes.plot(*shapes[:, :1], "o", color=VERMILION, ms=5)
-    shares = whole.durations / np.maximum(whole.durations.sum(axis=1, keepdims=True), 1e-300)
     mixed = np.flatnonzero((shares > _USED).sum(axis=1) > 1)
     for piece in mixed[:: max(1, mixed.size // _LOOPS)]:
-        steps = (_LOOP * shares[piece, :, None] * whole.directions[piece])[:, [first, second]]
+        steps = (_LOOP * shares[piece, :, None] * whole.directions[piece])[:, :2]
         steps = steps[np.argsort(np.arctan2(steps[:, 1], steps[:, 0]))]
         corners = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
         corners += shapes[:, piece + 1] - corners.mean(axis=0)
         axes.plot(*corners.T, color=ORANGE, lw=0.9, label="directions mixed" if piece == mixed[0] else None)
     limit = 1.02 * np.pi
     axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
-    axes.set(xlabel=f"joint angle {first + 1}  [rad]", ylabel=f"joint angle {second + 1}  [rad]")
+    axes.set(xlabel="joint angle 1  [rad]", ylabel="joint angle 2  [rad]")
     axes.legend(loc="lower left")
 
 
@@ -66,8 +65,7 @@ def draw_realised(axes: Axes, relaxed: Relaxation) -> None:
 
 def draw_shares(axes: Axes, gait: Mixture) -> None:
     """Share of the time that the directions of a mixture take over the period, the largest first."""
-    whole = gait.whole
-    shares = np.sort(whole.durations / np.maximum(whole.durations.sum(axis=1, keepdims=True), 1e-300), axis=1)[:, ::-1]
+    shares = np.sort(gait.whole.shares, axis=1)[:, ::-1]
     for k, share in enumerate(shares.T):
         axes.stairs(
             share, gait.phases, color=(BLUE, ORANGE, VERMILION, GREY)[min(k, 3)], lw=1.2, label=f"{k + 1}", baseline=None

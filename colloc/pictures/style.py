@@ -32,7 +32,7 @@ GREY, INK = "#777777", "#1d2329"
 SERIES = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, GREY, "#8a7a00")
 """Colours of links or joints; the palette's yellow is darkened to be read on white."""
 VELOCITY, FORCE = BLUE, VERMILION
-SEQUENTIAL, DIVERGING, PHASE = "viridis", "cividis", "cividis_r"
+SEQUENTIAL, PHASE = "viridis", "cividis_r"
 _DPI = 150
 _STYLE: Any = {
     "text.color": INK,

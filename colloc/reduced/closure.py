@@ -14,7 +14,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import seed_class
+from colloc.gaits.starts import seed_class
 from colloc.gaits.symmetry import NONE
 from colloc.numerics.sqp import minimised
 from colloc.reduced.program import ReducedProgram

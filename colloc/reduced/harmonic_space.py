@@ -8,8 +8,8 @@ from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.guesses import widest
 from colloc.gaits.harmonic import Fourier
+from colloc.gaits.limits import widest
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
@@ -97,11 +97,9 @@ class HarmonicSpace:
             times = times + later * self.mesh.h[cells]
             values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
             self._placed.append((check, held_shares(check, gait, times), matrix))
-            excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.bounds(limit)
-            # of the two bounds on an angle the nearer one
-            below = values - lower < upper - values
-            low.append(np.where(below, lower, -np.inf))
-            high.append(np.where(below, np.inf, upper))
+            excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
+            low.append(lower)
+            high.append(upper)
         self.watched["shape speed"] = np.zeros(1, dtype=int)
         self.row_lower = np.concatenate([*low, [self.problem.smallest_shape_speed**2]])
         self.row_upper = np.concatenate([*high, [np.inf]])

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.collocation.shape_checks import shape_checks
-from colloc.gaits.mixture import Mixture
 from colloc.gaits.path_samples import Gait, symmetric_samples
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Mixture
 from colloc.gaits.symmetry import end_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
@@ -184,13 +184,11 @@ class MixtureSpace:
             values = check.along(angles)
             beyond = check.excess(values, limit)
             at = np.flatnonzero(beyond > -_NEAR)
-            lower, upper = check.bounds(limit)
-            # of the two bounds on an angle the nearer one
-            below = values[at] - lower < upper - values[at]
+            lower, upper = check.nearer_bounds(values[at], limit)
             self._placed.append(at)
             self.watched[check.name] = at
-            low.append(np.where(below, lower, -np.inf))
-            high.append(np.where(below, np.inf, upper))
+            low.append(lower)
+            high.append(upper)
             excess = max(excess, float(beyond.max()))
         self.row_lower = np.concatenate([closing, *low, [self._least]])
         self.row_upper = np.concatenate([closing, *high, [np.inf]])

@@ -20,7 +20,8 @@ from typing import Protocol
 import numpy as np
 
 from colloc.gaits.symmetry import ANTIPODAL, BOTH, fraction
-from colloc.mechanics.bodies import BalanceSolution, Body
+from colloc.mechanics.balance_results import BalanceSolution
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 

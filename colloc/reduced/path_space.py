@@ -12,9 +12,10 @@ import numpy as np
 
 from colloc.collocation.path_transcription import path_through, transcribe_fit
 from colloc.collocation.worst_instants import check_values, held_shares, peaks
+from colloc.gaits.free_path import ArcPath
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.path_samples import arcs_through
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import Pairs
@@ -95,7 +96,7 @@ class PathSpace:
         self._scatter = selector(self._gather.ravel(), self._fixed.size)
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        """The parameters of `colloc.gaits.path_classes`: shapes where arcs meet follow from the start."""
+        """The parameters of `colloc.gaits.free_path`: shapes where arcs meet follow from the start."""
         return self._followed(v).copy()
 
     def _raw(self, v: np.ndarray) -> np.ndarray:

@@ -1,21 +1,22 @@
 """Programs and classes of gaits for a problem of any kind: which of them a class of gaits wants.
 
-A class in whose parameters the angles are linear, as `Harmonic`, needs nothing here. Another kind registers its own.
+A class in whose parameters the angles are linear, as `Harmonic`, needs nothing here; another kind has a line in `SEARCHED`.
 """
 
 from __future__ import annotations
 
-from functools import singledispatch
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from colloc.collocation.path_transcription import transcribe_path
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
-from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.free_path import FreePath
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
-from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
@@ -23,7 +24,35 @@ from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
 from colloc.system.errors import ProblemError
 
-_OWN_SEARCH = "relaxed gaits have a search of their own: colloc solve FILE, or colloc.solve."
+
+class Searched(NamedTuple):
+    """How a class of gaits is collocated, and how a search sees it.
+
+    Attributes
+    ----------
+    program : callable
+        Of a problem, a gait near, the edges of a mesh, and pairs of links that must not cross: its nonlinear program.
+    space : callable
+        Of a problem, a gait near, the edges of a mesh, and a scheme: its parameters.
+    """
+
+    program: Callable[[Problem, AnyGait, np.ndarray | None, Pairs], GaitProgram]
+    space: Callable[[Problem, AnyGait, np.ndarray | None, str], SearchSpace]
+
+
+_LINEAR = Searched(
+    lambda problem, gait, edges, far: transcribe(problem, edges, far),
+    lambda problem, gait, edges, scheme: HarmonicSpace(problem, edges, scheme),
+)
+_ALONG_PATHS = Searched(transcribe_path, PathSpace)
+SEARCHED: dict[type, Searched] = {FreePath: _ALONG_PATHS, Polygon: _ALONG_PATHS}
+"""Of classes whose angles are not linear in their parameters."""
+
+
+def _searched(problem: Problem) -> Searched:
+    if problem.gait.mixes:
+        raise ProblemError("relaxed gaits have a search of their own: colloc solve FILE, or colloc.solve.")
+    return next((how for kind, how in SEARCHED.items() if isinstance(problem.gait, kind)), _LINEAR)
 
 
 def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:
@@ -31,23 +60,7 @@ def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray
 
     Self-contact is constrained between links two apart, and between the pairs `far` (see `colloc.search.far_contact`).
     """
-    return _program(problem.gait, problem, problem.guess if gait is None else gait, edges, far)
-
-
-@singledispatch
-def _program(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, far: Pairs) -> GaitProgram:
-    return transcribe(problem, edges, far)
-
-
-@_program.register(FreePath)
-@_program.register(Polygon)
-def _path_program(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, far: Pairs) -> GaitProgram:
-    return transcribe_path(problem, gait, edges, far)
-
-
-@_program.register
-def _no_program(gait_class: Relaxed, problem: Problem, gait: AnyGait, edges: np.ndarray | None, far: Pairs) -> GaitProgram:
-    raise ProblemError(_OWN_SEARCH)
+    return _searched(problem).program(problem, problem.guess if gait is None else gait, edges, far)
 
 
 def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
@@ -73,34 +86,18 @@ def space_near(
     NotConvergedError
         If no path of the class is found near the gait.
     """
-    space = _space(problem.gait, problem, gait, edges, scheme)
+    space = _searched(problem).space(problem, gait, edges, scheme)
     return space, space.parameters(gait)
 
 
 def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
     """The class of a problem on its first mesh, and parameters about a gait that need not keep every row: ten times as fast for
     free paths."""
-    space = _space(problem.gait, problem, gait, None, "")
+    space = _searched(problem).space(problem, gait, None, "")
     return space, space.laid(gait)
-
-
-@singledispatch
-def _space(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, scheme: str) -> SearchSpace:
-    return HarmonicSpace(problem, edges, scheme)
-
-
-@_space.register(FreePath)
-@_space.register(Polygon)
-def _path_space(gait_class: AnyClass, problem: Problem, gait: AnyGait, edges: np.ndarray | None, scheme: str) -> SearchSpace:
-    return PathSpace(problem, gait, edges, scheme)
 
 
 def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:
     """Parameters of the member of a program's class that is nearest to a gait, on the program's mesh."""
     space, v = space_near(program.problem, gait, program.mesh.edges)
     return space.full_parameters(v)
-
-
-@_space.register
-def _no_space(gait_class: Relaxed, problem: Problem, gait: AnyGait, edges: np.ndarray | None, scheme: str) -> SearchSpace:
-    raise ProblemError(_OWN_SEARCH)

@@ -23,10 +23,11 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 
-from colloc.gaits.problem import Problem, statement_hash
-from colloc.gaits.sampling import on_speed_floor
-from colloc.results.distinct_optima import Outcome, basins, fourier_series
-from colloc.results.outcome_fields import outcome_fields, outcome_from
+from colloc.gaits.gait_fields import statement_hash
+from colloc.gaits.problem import Problem
+from colloc.gaits.starts import on_speed_floor
+from colloc.results.distinct_optima import basins, fourier_series
+from colloc.results.outcome import Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.file_lock import locked

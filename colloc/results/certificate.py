@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from colloc.gaits.guesses import under_one_limit
-from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
-from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
-from colloc.mechanics.bodies import Body
-from colloc.mechanics.law import Law
 from colloc.results.checks import Certificate, Check
-from colloc.results.delta_limit import Limit, extrapolated_limit
-from colloc.results.level import REALISED
+from colloc.results.measured import astray, measured
 from colloc.results.solution import Solution
+from colloc.results.steps import REALISED
 from colloc.verification.mesh_error import mesh_error
-from colloc.verification.replay import MixedPath, Path, Replay, replay
+from colloc.verification.replay import MixedPath, Path, Replay
 
 KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK = 1e-6, 1e-8, 1e-6, 1e-9, 1e-4, 1e-6, 1e-4, 1e-7
 """Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
@@ -142,67 +136,6 @@ def gait_certificate(
         fine.length,
         fine.driven_work,
     )
-
-
-class Measured(NamedTuple):
-    """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for every balanced motion."""
-
-    fine: Replay
-    value_error: float
-    limit: Limit
-    efficiency_error: float
-    efficiency_limit: Limit
-    distance_error: float
-    work_error: float
-
-
-def measured(
-    body: Body,
-    friction: Law,
-    path: Path | MixedPath,
-    delta: float,
-    *,
-    tolerance: float = 1e-6,
-    instants: int = 1600,
-    breaks: np.ndarray | tuple[float, ...] = (),
-    objective: Objective = EFFICIENCY,
-    rotation: float | None = 0.0,
-    driven: bool = False,
-    limits: ActuatorLimits = UNLIMITED,
-) -> Measured:
-    """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
-
-    Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked for: the distance of a body
-    that turns by more depends on the point that is followed.
-    """
-    replays: list[Replay] = []
-    smoothed = friction.regularised or "driven_work" in objective.uses
-    for part in (1.0, 0.1, 0.01) if smoothed else (1.0,):
-        near = replays[-1] if replays else None
-        at = (body, friction, path, part * delta)
-        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}
-        replays.append(replay(*at, **settings, near=near, objective=objective))  # type: ignore[arg-type]
-    known = []
-    for aim in (objective, EFFICIENCY):
-        values = [aim(each.period) for each in replays]
-        errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
-        limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
-        known.append((errors[0], limit))
-    fine = replays[0]
-    distance_error = fine.distance_error + astray(fine, rotation) + fine.other_distance
-    return Measured(fine, *known[0], *known[1], distance_error, fine.work_error + fine.other_work)
-
-
-def astray(replayed: Replay, rotation: float | None) -> float:
-    """How far the distance depends on the point of the body that is followed: by the rotation beyond what is asked for."""
-    return 0.0 if rotation is None else abs(replayed.rotation - rotation) * replayed.lever
-
-
-def _error(replayed: Replay, aim: Objective, rotation: float | None) -> float:
-    """Relative error of an objective, for every reason."""
-    by_lever = float(aim.relative_error(replayed.period, {"distance": astray(replayed, rotation)}))
-    error = replayed.error if aim == replayed.objective else replayed.error_of(aim)
-    return error + by_lever + replayed.ambiguity_of(aim)
 
 
 def _optimality(solution: Solution) -> list[Check]:

@@ -55,7 +55,7 @@ class Certificate:
     instants : int
         Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
     error_at_zero_delta : float
-        Error of the extrapolation (`colloc.results.delta_limit.extrapolated_limit`); NaN if an older file does not state it.
+        Error of the extrapolation (`colloc.results.measured.extrapolated_limit`); NaN if an older file does not state it.
     distance_error, work_error : float
         The same of distance and work; NaN if an older file does not state it.
     value, value_error, value_at_zero_delta, value_error_at_zero_delta : float

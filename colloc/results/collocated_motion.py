@@ -11,7 +11,7 @@ from colloc.collocation.layout import Layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, reduced
-from colloc.mechanics.bodies import Sliding
+from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
 from colloc.results.motion import SampledMotion, turned
 

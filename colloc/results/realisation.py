@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.gaits.guesses import largest_factor, under_one_limit
-from colloc.gaits.mixture import Mixture
-from colloc.gaits.paths import Corners
+from colloc.gaits.guesses import largest_factor
+from colloc.gaits.limits import under_one_limit
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Mixture
 from colloc.results.certificate import VIOLATION, gait_certificate
 from colloc.results.checks import Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation

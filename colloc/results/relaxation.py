@@ -1,15 +1,15 @@
 """What stands beside the answer to a problem of relaxed gaits: the relaxed gait, and the finite ones that come near it.
 
 The relaxed value is the limit of ever smaller loops, which no gait attains. So the answer is the best of the finite gaits that
-repeat its directions so and so often (`colloc.gaits.mixture.Mixture.realised`), each certified like any other gait.
+repeat its directions so and so often (`colloc.gaits.relaxed.Mixture.realised`), each certified like any other gait.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from colloc.gaits.mixture import Mixture, corners_of
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
+from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import Certificate
 
 
@@ -20,7 +20,7 @@ class Realised:
     Attributes
     ----------
     repeats, sense : int
-        See `colloc.gaits.mixture.Mixture.realised`.
+        See `colloc.gaits.relaxed.Mixture.realised`.
     gait : Corners
     certificate : Certificate
     """
@@ -33,7 +33,7 @@ class Realised:
     @property
     def corners(self) -> int:
         """Over the whole period."""
-        return corners_of(self.gait)
+        return self.gait.n_corner
 
     def line(self) -> str:
         """Repeats, what they lead to, and whether it is certified."""

@@ -16,16 +16,14 @@ from colloc.collocation.layout import Layout, problem_layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.mechanics.bodies import Sliding
+from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.alternative import Alternative
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
-from colloc.results.level import REALISED, Level
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
-from colloc.results.solution_card import solution_card
+from colloc.results.steps import REALISED, Alternative, Level
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 
@@ -241,28 +239,7 @@ class Solution:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: verdict, numbers and checks."""
-        return solution_card(self.problem.name, self.status, self.message, self._facts(), self._checks())
-
-    def _facts(self) -> list[tuple[str, str]]:
-        if not self.levels:
-            return []
-        certificate, best = self.certificate, self.problem.objective
-        if not certificate.replayed:
-            return [(f"{best.name} (not replayed)", f"{self.value:.5f}"), ("δ", f"{self.last.delta:.0e}")]
-        own = [] if best == EFFICIENCY else [(EFFICIENCY.label, f"{certificate.efficiency:.5f}")]
-        return [
-            (best.label, f"{certificate.value:.5f} ± {certificate.value_error:.0e}"),
-            ("for δ → 0", f"{certificate.value_at_zero_delta:.5f} ± {certificate.value_error_at_zero_delta:.0e}"),
-            *own,
-            ("distance d", f"{certificate.distance:.5f}"),
-            ("work W", f"{certificate.work:.5f}"),
-            ("δ", f"{self.last.delta:.0e}"),
-            ("search", self.standing[0]),
-        ]
-
-    def _checks(self) -> list[tuple[str, bool, str]]:
-        checks = self.certificate.checks if self.certificate.replayed else ()
-        return [(check.name, check.passed, f"{check.value:.1e} (≤ {check.threshold:.0e})") for check in checks]
+        return bound("card")(self)
 
 
 def versions() -> dict[str, str]:

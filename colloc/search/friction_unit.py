@@ -11,11 +11,11 @@ import dataclasses
 
 import numpy as np
 
-from colloc.gaits.guesses import Limit
+from colloc.gaits.limits import Limit
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.law import Law
-from colloc.results.level import Level
+from colloc.results.steps import Level
 
 
 def friction_unit(friction: Law) -> float:

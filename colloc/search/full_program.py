@@ -19,7 +19,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import heading, transcribed
-from colloc.results.level import REDUCED, Level
+from colloc.results.steps import REDUCED, Level
 from colloc.search.diagnosis import explanation
 from colloc.search.nlp import NlpResult, Solver
 from colloc.search.reduced_search import Found

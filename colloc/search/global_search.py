@@ -20,16 +20,14 @@ from colloc.gaits.equivalence import distance
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.laid_gaits import laid_into, over_links
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor, seed_class
+from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
 from colloc.mechanics.body import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import SearchSpace
 from colloc.reduced.spaces import space_about, space_near
-from colloc.results.alternative import Alternative
-from colloc.results.search_step import SearchStep
+from colloc.results.steps import Alternative, SearchStep
 from colloc.search.reduced_search import (
     FIRST_RADIUS,
     NEXT_RADIUS,
@@ -205,7 +203,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     seconds : float
         Wall time after which no other start is begun and no other gait is followed.
     watch : callable
-        Called with a `colloc.results.search_step.SearchStep` after every start and every gait that was followed.
+        Called with a `colloc.results.steps.SearchStep` after every start and every gait that was followed.
 
     Raises
     ------

@@ -14,8 +14,8 @@ import numpy as np
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, nearest_parameters, transcribed
-from colloc.results.level import Level
 from colloc.results.solution import Solution
+from colloc.results.steps import Level
 from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.friction_unit import in_friction_units, restated
 from colloc.search.full_program import level_of

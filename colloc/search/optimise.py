@@ -10,13 +10,12 @@ import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import on_speed_floor
+from colloc.gaits.starts import on_speed_floor
 from colloc.gaits.symmetry import NONE
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
-from colloc.results.level import Level
-from colloc.results.search_step import SearchStep
 from colloc.results.solution import SOLVED, Solution
+from colloc.results.steps import Level, SearchStep
 from colloc.search.friction_unit import in_friction_units, in_unit, restated
 from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
@@ -210,7 +209,7 @@ def best_gait(
     before : sequence of Level
         Levels of an interrupted run; it goes on from the last one.
     watch : callable
-        Called with every `colloc.results.search_step.SearchStep` before the first level; of relaxed gaits with what is under
+        Called with every `colloc.results.steps.SearchStep` before the first level; of relaxed gaits with what is under
         way, in words.
 
     Returns

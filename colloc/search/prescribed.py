@@ -10,11 +10,11 @@ import numpy as np
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.warm_start import balanced_variables
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.level import PRESCRIBED, REALISED, Level
+from colloc.results.steps import PRESCRIBED, REALISED, Level
 from colloc.verification.refinement import planned_mesh
 
 _MESHES = 4

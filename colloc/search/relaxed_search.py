@@ -14,16 +14,16 @@ from itertools import islice
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.mixture import Mixture
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Mixture
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.results.alternative import Alternative
 from colloc.results.realisation import realised_gaits, relaxed_certificate
 from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
+from colloc.results.steps import Alternative
 from colloc.search.global_search import starting_gaits
 from colloc.search.prescribed import realised
 from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
+from colloc.mechanics.damped_newton import groups, relative_delta, solve, starting_state
 from colloc.mechanics.law import Law
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, PanelGrid, bending_power, mean_velocity, node_velocity
 from colloc.smooth.motion import Motion
 from colloc.system.errors import NotConvergedError, ProblemError
 
-_MOST_PANELS = 600
+_MOST_PANELS, _REFINEMENTS = 600, 40
+"""Of an instant, and halvings of a panel."""
 _ROUNDING = 1e-15
 
 
@@ -118,7 +119,6 @@ def solve_smooth(
     quadrature_tolerance: float = 1e-10,
     tolerance: float = 1e-11,
     max_iterations: int = 2000,
-    refinements: int = 40,
     regions: tuple[tuple[float, float], ...] = (),
     method: str = "auto",
     slide: np.ndarray | None = None,
@@ -140,8 +140,6 @@ def solve_smooth(
         Largest net force or torque over the largest coefficient at which an instant counts as converged.
     max_iterations : int
         As in `colloc.mechanics.fixed_point.solve_balance`.
-    refinements : int
-        Most halvings of a panel.
     regions : tuple of (float, float)
         Arcs whose power is reported separately; their ends should be breaks of the motion.
     method : {"auto", "newton", "fixed_point"}
@@ -166,7 +164,7 @@ def solve_smooth(
     if slide is not None:
         anchor, velocity = np.zeros(n, dtype=int), slide.copy()
         velocity[2] += motion.rate(np.zeros((1, n)), t)[0]
-    for level in range(refinements + 1):
+    for level in range(_REFINEMENTS + 1):
         grid = PanelGrid(edges, order)
         # work in units of the largest rate: the law is homogeneous once delta scales along
         unit = np.ones(active.size) if friction.degree is None else None
@@ -183,7 +181,8 @@ def solve_smooth(
             # one cheap pass finds what rests, so that the anchor is right before anything is judged
             state = starting_state(anchor, velocity / speed)
             solve(state, make, 1, np.maximum(d, 1e-3), 1e-6, max_iterations, method)
-            for members, batch in _groups(state.anchor, make):
+            for reference, members in groups(state.anchor):
+                batch = make(members, reference)
                 state.anchor[members], state.velocity[:, members] = batch.slowest(state.velocity[:, members], d[:, members])
             state = starting_state(state.anchor, state.velocity)
         else:
@@ -194,7 +193,8 @@ def solve_smooth(
         velocity = state.velocity * speed
 
         split = np.zeros((grid.n, active.size), dtype=bool)
-        for members, batch in _groups(state.anchor, make):
+        for reference, members in groups(state.anchor):
+            batch = make(members, reference)
             chosen, z = active[members], state.velocity[:, members]
             own, body = PanelGrid(edges[:, members], order), Curve(*batch.curve)
             vs, vn = node_velocity(body, z)
@@ -204,7 +204,7 @@ def solve_smooth(
             out["bending_power"][chosen] = bending_power(own, body, fs, fn, fields.rate[:, members]) * spent[members]
             middle = 0.5 * (edges[1:, members] + edges[:-1, members])
             inside = sum(((middle > a) & (middle < b) for a, b in regions), np.zeros(middle.shape, dtype=bool))
-            out["force"][:, chosen] = whole[:3].sum(axis=1)
+            out["force"][:, chosen] = whole[:3].sum(axis=1) * (spent / speed)[members]
             out["power"][chosen] = whole[3].sum(axis=0) * spent[members]
             out["power_inside"][chosen] = np.sum(whole[3] * inside, axis=0) * spent[members]
             out["slowest"][chosen] = batch.panel_speed(z).min(axis=0) * speed[members]
@@ -220,19 +220,12 @@ def solve_smooth(
         n_panel[active] = np.sum(np.diff(edges, axis=0) > 0, axis=0)
 
         more = split.any(axis=0) & (n_panel[active] < _MOST_PANELS) & (state.residual <= tolerance)
-        if quadrature_tolerance == 0 or level == refinements or not more.any():
+        if quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
         active, velocity, edges = active[more], velocity[:, more], _split(edges[:, more], split[:, more])
         anchor = np.argmax(edges == anchor_at, axis=0)
     return SmoothSolution(t, z_tail, **out, panels=n_panel, iterations=iterations, tolerance=tolerance)
-
-
-def _groups(anchor: np.ndarray, make):
-    """Instants by anchor, with their batch."""
-    for reference in np.unique(anchor):
-        members = np.flatnonzero(anchor == reference)
-        yield members, make(members, int(reference))
 
 
 def _panel_error(

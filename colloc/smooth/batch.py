@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.mechanics.damped_newton import solve3
+from colloc.mechanics.damped_newton import Evaluated
 from colloc.mechanics.law import Law
 from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity, pulled_back, resultant
 
@@ -26,26 +26,18 @@ class PanelBatch:
         anchor_rate = self.edge_rate[reference : reference + 1]
         self.curve = np.stack(curve(self.panels, fields.angle[:, members], fields.rate[:, members], reference, anchor_rate))
 
-    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        body = Curve(*self.curve[:, :, select])
+    def evaluate(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Evaluated:
+        """Nodes ``(9, n_node, n)``, curve, then velocity; net force and potential at z."""
+        body, friction = Curve(*self.curve[:, :, select]), self.friction
         vs, vn = node_velocity(body, z)
-        force = resultant(body, *self.friction.density(vs, vn, delta))
-        if self.friction.associated:
-            merit = np.sum(body.weight * self.friction.density_potential(vs, vn, delta), axis=0)
-        else:
-            merit = 0.5 * np.sum(force * force, axis=0)
-        return np.stack([*body, vs, vn]), force, merit
+        force = resultant(body, *friction.density(vs, vn, delta))
+        potential = (body.weight * friction.density_potential(vs, vn, delta)).sum(axis=0) if friction.associated else None
+        return np.stack([*body, vs, vn]), force, potential
 
-    def step(self, state: np.ndarray, force: np.ndarray, delta: np.ndarray, newton: np.ndarray) -> np.ndarray:
-        step = np.empty_like(force)
-        for law, chosen in ((self.friction.density_jacobian, newton), (self.friction.density_secant, ~newton)):
-            if chosen.any():
-                vs, vn = state[7:, :, chosen]
-                blocks = law(vs, vn, delta[:, chosen])
-                left = pulled_back(Curve(*state[:7, :, chosen]), blocks)
-                matrix = np.array([[entry[0] for entry in row] for row in left]).transpose(2, 0, 1)
-                step[:, chosen] = solve3(matrix, force[:, chosen])
-        return step
+    def matrix(self, nodes: np.ndarray, delta: np.ndarray, *, newton: bool) -> np.ndarray:
+        vs, vn = nodes[7:]
+        law = self.friction.density_jacobian if newton else self.friction.density_secant
+        return pulled_back(Curve(*nodes[:7]), law(vs, vn, delta))
 
     def edge_velocity(self, z: np.ndarray) -> np.ndarray:
         """Velocity and rotation rate of every edge, ``(3, n_edge, n)``, in the axes of Theta."""

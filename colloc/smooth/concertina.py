@@ -165,14 +165,14 @@ def _one_bump(crawler: Concertina) -> Motion:
     def breaks(t: np.ndarray) -> np.ndarray:
         centre = state(t)[2]
         (low, high) = crawler.regions[0]
-        ends = [np.full_like(t, low), *_parts(centre - w / 2, centre + w / 2), np.full_like(t, high)]
+        ends = [np.full_like(t, low), *_quarters(centre - w / 2, centre + w / 2), np.full_like(t, high)]
         return np.stack(ends)
 
     return Motion(angle, rate, breaks, stages=(0.0, 1 / 6, 1 / 3, 0.5), antipodal=True)
 
 
-def _parts(a: np.ndarray, b: np.ndarray, n: int = 4) -> list[np.ndarray]:
-    return [a + (b - a) * k / n for k in range(n + 1)]
+def _quarters(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
+    return [a + (b - a) * k / 4 for k in range(5)]
 
 
 def _constant_chord(amplitude: float, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -228,7 +228,7 @@ def _two_bumps(crawler: Concertina) -> Motion:
     def breaks(t: np.ndarray) -> np.ndarray:
         centre = state(t)[2]
         low, high = crawler.regions[0]
-        ends = [np.full_like(t, low), *_parts(centre - w / 2, centre + w / 2), np.full_like(t, high)]
+        ends = [np.full_like(t, low), *_quarters(centre - w / 2, centre + w / 2), np.full_like(t, high)]
         return np.stack([*ends, *(1 - end for end in ends)])
 
     return Motion(angle, rate, breaks, stages=(0.0, 0.25, 0.5, 0.75, 1.0))

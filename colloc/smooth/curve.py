@@ -154,15 +154,12 @@ def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
     )
 
 
-def pulled_back(body: Curve, blocks: tuple[tuple[Array, Array], ...]) -> Array:
-    """``integral of G^T K G``, G = d(vs, vn)/dz and K the given 2 x 2 of densities: six entries of a 3 x 3 by columns.
-
-    Returned as a 3 x 3 tuple of ``(1, n_time)`` rows.
-    """
-    xp = namespace(body.cos, blocks[0][0])
+def pulled_back(body: Curve, blocks: tuple[tuple[np.ndarray, np.ndarray], ...]) -> np.ndarray:
+    """``integral of G^T K G``, ``(n_time, 3, 3)``, with G = d(vs, vn)/dz and K the given 2 x 2 of densities."""
     row_s, row_n = (body.cos, body.sin, body.arm_s), (-body.sin, body.cos, body.arm_n)
-    right = [[body.weight * (blocks[i][0] * row_s[j] + blocks[i][1] * row_n[j]) for j in range(3)] for i in range(2)]
-    return tuple(tuple(xp.sum_rows(row_s[i] * right[0][j] + row_n[i] * right[1][j]) for j in range(3)) for i in range(3))
+    right = [[body.weight * (block[0] * row_s[j] + block[1] * row_n[j]) for j in range(3)] for block in blocks]
+    columns = [[(row_s[i] * right[0][j] + row_n[i] * right[1][j]).sum(axis=0) for j in range(3)] for i in range(3)]
+    return np.array(columns).transpose(2, 0, 1)
 
 
 def mean_velocity(body: Curve, vs: Array, vn: Array) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
+from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 
 LEGENDRE, FOURIER = "legendre", "fourier"
@@ -57,7 +58,7 @@ class ModalBody(PanelBody):
             raise ProblemError(f"basis must be {LEGENDRE!r} or {FOURIER!r}, not {self.basis!r}.")
         for name, least, most in (("modes", 1, 20), ("panels", 1, 200), ("order", 2, 12)):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
+            if not is_whole(value, least, most):
                 raise ProblemError(f"{name} must be a whole number from {least} to {most}, not {value!r}.")
         if self.basis == FOURIER and self.modes % 2:
             raise ProblemError(f"fourier modes come in pairs (sine and cosine); {self.modes} is odd.")

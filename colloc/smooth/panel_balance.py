@@ -10,8 +10,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding
-from colloc.mechanics.damped_newton import relative_delta, solve, starting_state
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
+from colloc.mechanics.damped_newton import groups, relative_delta, solve, starting_state
 from colloc.mechanics.implicit_slopes import implicit_changes
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
@@ -96,9 +96,8 @@ def solved_on_panels(
     state = starting_state(np.full(n, TAIL), velocity)
     solve(state, make, _ANCHOR_MOVES, relative_delta(delta, speed), tolerance, _STEPS, "auto")
     z = np.empty((3, n))
-    for reference in np.unique(state.anchor):
-        members = np.flatnonzero(state.anchor == reference)
-        z[:, members] = make(members, int(reference)).edge_velocity(state.velocity[:, members])[:, TAIL]
+    for reference, members in groups(state.anchor):
+        z[:, members] = make(members, reference).edge_velocity(state.velocity[:, members])[:, TAIL]
     z[2] -= fields.edge_rate[TAIL]
     converged = state.residual <= tolerance
     return BalanceSolution(z * speed, state.residual, state.iterations, converged, state.anchor, state.velocity * speed)
@@ -130,10 +129,9 @@ def panel_motion(
     """The motion at instants that were solved for."""
     n = q.shape[1]
     centre, power, bending = np.empty((2, n)), np.empty(n), np.empty(n)
-    for reference in np.unique(solved.anchor):
-        at = solved.anchor == reference
+    for reference, at in groups(solved.anchor):
         velocity = solved.anchor_velocity[:, at]
-        batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q[:, at], rates[:, at], delta, int(reference), velocity)
+        batch, now, vs, vn, fs, fn = _at_anchor(body, friction, q[:, at], rates[:, at], delta, reference, velocity)
         centre[:, at] = mean_velocity(now, vs, vn)
         power[at] = -(now.weight * (fs * vs + fn * vn)).sum(axis=0)
         bending[at] = bending_power(batch.panels, now, fs, fn, batch.fields.rate)
@@ -145,10 +143,9 @@ def panel_slopes(
 ) -> np.ndarray:
     """Derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to shapes and rates."""
     slopes = np.empty((6, 2 * len(q), q.shape[1]))
-    for reference in np.unique(solved.anchor):
-        at = solved.anchor == reference
+    for reference, at in groups(solved.anchor):
         velocity = solved.anchor_velocity[:, at]
-        slopes[:, :, at] = _slopes(body, friction, q[:, at], rates[:, at], delta, int(reference), velocity)
+        slopes[:, :, at] = _slopes(body, friction, q[:, at], rates[:, at], delta, reference, velocity)
     return slopes
 
 
@@ -169,10 +166,10 @@ def _slopes(
         return panels.integrate((panels.widths[:, :1, None] * a).reshape(len(a), -1), reference).reshape(a.shape)
 
     (k_ss, k_sn), (k_ns, k_nn) = friction.density_jacobian(vs, vn, delta)
-    left = np.array([[entry[0] for entry in row] for row in pulled_back(now, ((k_ss, k_sn), (k_ns, k_nn)))])
+    left = pulled_back(now, ((k_ss, k_sn), (k_ns, k_nn)))
     stiffness = ((weight * k_ss, weight * k_sn, none), (weight * k_ns, weight * k_nn, none), (none, none, none))
     d = implicit_changes(
-        (c, s, x, y), (vs, vn, turning), (weight * fs, weight * fn, none), stiffness, left.transpose(2, 0, 1), along_path,
+        (c, s, x, y), (vs, vn, turning), (weight * fs, weight * fn, none), stiffness, left, along_path,
         dphi * np.ones(n_time), (turned - anchor) * np.ones(n_time),
     )  # fmt: skip
     back = (panels.edge_path(reference)[TAIL] * panels.widths[:, 0])[:, None, None]

@@ -7,7 +7,8 @@ from typing import Self
 
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
+from colloc.mechanics.bodies import Usual
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.curve import PanelGrid

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.bodies import BalancedMotion, BalanceSolution, Sliding, Usual
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Sliding
+from colloc.mechanics.bodies import Usual
 from colloc.mechanics.law import Law
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.smooth.smooth_body import SmoothBody
+from colloc.system.arguments import check_positive
 from colloc.system.errors import ProblemError
 
 _TURN = 2 * np.pi
@@ -123,10 +125,7 @@ class Wave(PrescribedBody):
     def __post_init__(self) -> None:
         if self.profile not in ("sine", "tanh", "standing"):
             raise ProblemError(f"profile must be 'sine', 'tanh' or 'standing', not {self.profile!r}.")
-        for name in ("amplitude", "waves", "steepness"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
-                raise ProblemError(f"{name} must be a positive finite number, not {value!r}.")
+        check_positive(self, "amplitude", "waves", "steepness")
 
     def prescribed(self) -> Motion:
         if self.profile == "sine":

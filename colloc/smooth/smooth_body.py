@@ -7,7 +7,8 @@ from typing import Self
 
 import numpy as np
 
-from colloc.mechanics.bodies import ARROWS, IMPLICIT, BalancedMotion, Contact, Lifted, Pairs
+from colloc.mechanics.balance_results import BalancedMotion, Lifted
+from colloc.mechanics.bodies import ARROWS, IMPLICIT, Contact, Pairs
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.balance import SmoothSolution, solve_smooth
@@ -116,6 +117,12 @@ class SmoothBody:
         s = panels.nodes
         return panels, curve(panels, self.tangent(s, angles), self.turning(s, angles, rates), TAIL, np.zeros((1, 1)))
 
+    def _at_equal_steps(self, count: int, angles: np.ndarray, rates: np.ndarray) -> Curve:
+        """The middles of so many equal parts of the body, integrated on no fewer than `_OUTLINE` panels."""
+        each = 1 + 2 * (_OUTLINE // (2 * count))  # an odd number, so that one of them lies in the middle
+        _, now = self._curve(count * each, _NODES, angles, rates)
+        return Curve(*(row[_NODES * each // 2 :: _NODES * each] for row in now))
+
     def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         panels, now = self._curve(_OUTLINE, _NODES, angles, np.zeros_like(angles))
         path = panels.edge_path(TAIL)
@@ -128,14 +135,13 @@ class SmoothBody:
     def rubbing(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
     ) -> tuple[np.ndarray, np.ndarray]:
-        _, now = self._curve(max(1, count // _NODES), _NODES, angles, rates)
+        now = self._at_equal_steps(count, angles, rates)
         fs, fn = friction.density(*node_velocity(now, z), delta)
         return np.stack(_places(now)), np.stack([fs * now.cos - fn * now.sin, fs * now.sin + fn * now.cos])
 
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
         """At equal steps from tail to head."""
-        _, now = self._curve(_SHOWN, _NODES, angles, rates)
-        return "part", np.hypot(*node_velocity(now, z))[_NODES // 2 :: _NODES]
+        return "part", np.hypot(*node_velocity(self._at_equal_steps(_SHOWN, angles, rates), z))
 
     def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise NotImplementedError("gaits of a smooth body are never bilateral.")

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.results.checks import Certificate
-from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
-from colloc.results.level import Level
+from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
+from colloc.results.steps import Level
 from colloc.search.optimise import is_trivial, maximise_efficiency
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, completed, process_pool

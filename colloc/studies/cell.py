@@ -12,12 +12,12 @@ import numpy as np
 
 from colloc.gaits.equivalence import phase_distance
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.laid_gaits import laid_into
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import LATIN_HYPERCUBE, start_gait
+from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.spaces import space_near
-from colloc.results.distinct_optima import ERROR, Outcome, fourier_series
+from colloc.results.distinct_optima import fourier_series
+from colloc.results.outcome import ERROR, Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import run_guess
 from colloc.system.errors import CollocError

@@ -19,7 +19,7 @@ from colloc.mechanics.law import Law
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
 _SAME, _STANDING = 0.02, 0.05
 """Relative distance of a gait to its image that counts as symmetric; |wave| below which it counts as standing."""
-_INSTANTS = 200
+_INSTANTS, _FINE = 200, 2000
 _DELTA = 1e-3
 
 
@@ -73,9 +73,9 @@ def _amplitude(gait: Fourier) -> float:
     return float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
 
 
-def winding(gait: Fourier, instants: int = 2000) -> int:
+def winding(gait: Fourier) -> int:
     """Turns of the first two joint angles about their mean in a period."""
-    angles = gait.angles(np.arange(instants + 1) / instants) - gait.mean[:, None]
+    angles = gait.angles(np.linspace(0.0, 1.0, _FINE + 1)) - gait.mean[:, None]
     turns = np.unwrap(np.arctan2(angles[1], angles[0]))
     return round((turns[-1] - turns[0]) / (2 * np.pi))
 
@@ -117,7 +117,5 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     antipodal = np.linalg.norm(even) < close
     retraced = phase_distance(gait, reversed_in_time(gait)) < close
     turns = 0 if retraced else winding(gait)
-    bending = body.bending
-    bent = Fourier(bending @ gait.mean, bending @ gait.cos, bending @ gait.sin)
     ahead = headed_displacement(gait, body, friction)
-    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(bent), ahead)
+    return GaitClass(bool(bilateral), bool(antipodal), bool(retraced), turns, wave_direction(gait.mapped(body.bending)), ahead)

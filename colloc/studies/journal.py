@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from colloc.results.outcome_fields import outcome_fields, outcome_from
+from colloc.results.outcome import outcome_fields, outcome_from
 from colloc.studies.cell import Attempt
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.row_file import hash_of, put_rows, read_rows

@@ -15,14 +15,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from colloc.gaits.problem import Problem
-from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT
+from colloc.results.outcome import CRASHED, RETRIED
 from colloc.studies.cell import BETTER, Attempt, Work, best_attempt, failed_visit, run_chunk, start_key
 from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.study import Index, Study
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
-
-RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 
 
 @dataclass(eq=False)

@@ -17,6 +17,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import stated_names
+from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
 
 Index = tuple[int, ...]
@@ -35,8 +36,6 @@ class Axis:
         In the order in which starts travel.
     label, units : str
         For figures and files; the name, and "1", by default.
-    logarithmic : bool
-        For figures.
     travels : bool
         Whether warm starts travel along this axis.
 
@@ -51,7 +50,6 @@ class Axis:
     values: tuple
     label: str = ""
     units: str = "1"
-    logarithmic: bool = False
     travels: bool = True
 
     def __post_init__(self) -> None:
@@ -124,14 +122,9 @@ class Study:
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
         if not callable(self.problem):
             raise ProblemError("problem must be a function from coordinates to a Problem.")
-        for field, least in (
-            ("cold_starts", 0),
-            ("warm_starts", 1),
-            ("chunk", 1),
-            ("seed", 0),
-        ):
+        for field, least in (("cold_starts", 0), ("warm_starts", 1), ("chunk", 1), ("seed", 0)):
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            if not is_whole(value, least):
                 raise ProblemError(f"{field} must be a whole number, at least {least}, not {value!r}.")
         if not (self.time_limit > 0 and self.warm_delta_start > 0):
             raise ProblemError("time_limit and warm_delta_start must be positive.")

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.gaits.problem import Problem
-from colloc.gaits.sampling import on_speed_floor
+from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.law import rate_independent
-from colloc.results.distinct_optima import Outcome, fourier_series, series_class
+from colloc.results.distinct_optima import fourier_series, series_class
+from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.gait_class import GaitClass, gait_class
 from colloc.studies.run import StudyRun

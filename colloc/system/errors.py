@@ -41,14 +41,13 @@ class NotConvergedError(CollocError, RuntimeError):
 
 
 class StoreError(CollocError, OSError):
-    """A results file cannot be read or written.
+    """A results file cannot be read or written. It is caught like any other trouble with a file.
 
     Examples
     --------
     >>> import colloc
-    >>> colloc.load("nothing.h5")
-    Traceback (most recent call last):
-    colloc.system.errors.StoreError: there is no file nothing.h5.
+    >>> issubclass(colloc.StoreError, OSError)
+    True
     """
 
 

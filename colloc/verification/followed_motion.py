@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.bodies import Body, Branches
+from colloc.mechanics.balance_results import Branches
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 
 FORWARDS, BACKWARDS = 1, -1

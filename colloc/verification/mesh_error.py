@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.guesses import under_one_limit
+from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import smooth_minimum

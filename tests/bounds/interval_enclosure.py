@@ -1,12 +1,13 @@
 """The allowance of strong convexity for one cell, written out in interval arithmetic (mpmath): docs/bound.md, section 3.
 
-A second implementation of colloc/mechanics/native/enclosure.h, for cells where no link rests. Choices that are free (nodes, the
-kind of a piece, tau) are made by midpoints; whatever is claimed is an interval that holds the exact value.
+A second implementation of colloc/mechanics/native/enclosure.h. Choices that are free (nodes, the kind of a piece, tau) are made
+by midpoints; whatever is claimed is an interval that holds the exact value.
 """
 
 import numpy as np
 from mpmath import iv
 
+iv.prec = 80
 PIECES, CORNERS = 16, range(8)
 
 
@@ -88,12 +89,22 @@ class Link:
         return [self.row[0], [self.row[1][0], self.row[1][1], self.row[1][2] + self.sign * s]]
 
     def nodes(self):
+        """Shorter where the mean velocity turns; where some corners are slow, where the mean of their directions does."""
         l, vs, vn, w = (mid(x) for x in (self.l, *self.v, self.w))
-        speeds = [max(norm(*map(mid, self.at(k, s))).mid for s in (0, self.l)) for k in CORNERS]
-        assert min(speeds) > 0.3 * max(speeds), "a slow pattern: not written out here"
-        width = max(abs(vs), mid(self.spread(min(max(-vn / w, 0.0), l))), 1e-9)
-        t = np.linspace(np.arcsinh(vn / width), np.arcsinh((vn + w * l) / width), PIECES + 1)
-        nodes = np.clip((width * np.sinh(t) - vn) / w, 0.0, l)
+        speeds = [max(mid(norm(*self.at(k, s))) for s in (0, self.l)) for k in CORNERS]
+        self.patterned = min(speeds) < 0.3 * max(speeds)
+        if self.patterned:
+            ways = [(mid(p[0]) / v, mid(p[1]) / v, mid(w) / v) for p, w, v in zip(self.hinge, self.spin, speeds, strict=True)]
+            vs, vn, w = np.mean(ways, axis=0)
+            s0 = min(max(-vn / w, 0.0), l)
+            width = max(abs(vs), 1e-3, *(np.hypot(x - vs, y + s0 * turn - vn - s0 * w) for x, y, turn in ways))
+        else:
+            width = max(abs(vs), mid(self.spread(min(max(-vn / w, 0.0), l))), 1e-9)
+        if abs(w) * l > 1e-3 * width:
+            t = np.linspace(np.arcsinh(vn / width), np.arcsinh((vn + w * l) / width), PIECES + 1)
+            nodes = np.clip((width * np.sinh(t) - vn) / w, 0.0, l)
+        else:
+            nodes = np.linspace(0.0, l, PIECES + 1)
         return [iv.mpf(0), *(iv.mpf(float(s)) for s in nodes[1:-1]), self.l]
 
     def find_errors(self):
@@ -132,10 +143,15 @@ class Link:
             sine, fastest = iv.sqrt(top([1 - cosine**2, 0])), top([norm(*v) for v in velocities])
             slowest = least([norm(*v) for v in velocities]) * cosine
             held = slowest / norm(slowest, self.delta)
-            assert slowest.a > 1e3 * self.delta, "next to rest: not written out here"
+            far = 1000 * mid(self.delta)
+            speeds = [[mid(norm(*self.at(k, s))) for s in (sa, sb)] for k in CORNERS]
+            apart = all(max(each) <= far or min(each) * mid(cosine) >= far for each in speeds)
             side = 2 * fastest * sine * cosine + self.off
             narrow = 2 * fastest * sine**2 + 2 * self.off + side**2 * 3 / 2 / (fastest + self.off)
-            narrow += ((1 - held) / 4 + iv.mpf(1) / 2 / 10**6) * fastest + 1000 * self.delta
+            if apart:
+                narrow += ((1 - held) / 4 + iv.mpf(1) / 2 / 10**6) * fastest + 1000 * self.delta
+            else:
+                narrow += (1 - held) * fastest
             if mid(narrow) < mid(gap):
                 return "slow", narrow, least([power, fastest * (1 - cosine) + self.off]), (u, sine, fastest + self.off)
         return "loose", gap, power, None
@@ -280,6 +296,9 @@ def allowance(lengths, low, size, motions, forces, left, point, delta):
             for row in k.rows(iv.mpf(0)):
                 add(G, weight * h * (1 + h), row)
     gap, power = sum(k.gap for k in links), sum(k.power for k in links)
+    for i in range(3):
+        if found := resting(links, i, turning, left, point, iv.mpf(delta)):
+            return found
     one, none = iv.mpf(1), iv.mpf(0)
     px, py, beside = (iv.mpf(float(x)) for x in point)
     force, torque = (iv.mpf(float(x)) for x in left)
@@ -305,3 +324,34 @@ def allowance(lengths, low, size, motions, forces, left, point, delta):
             top([1.5 * m, A]) if all(fit[: i + 1]) else 1.5 * m for i, (m, A) in enumerate(zip(moved, allowed, strict=True))
         ]
     raise AssertionError("nothing is known of this cell")
+
+
+def resting(links, i, turning, left, point, delta):
+    """Where link i rests at all corners: beta int |a| <= g + |rho.d| with beta = 1 - |f|, |a| on it as large as at one end."""
+    k = links[i]
+    speed = top([norm(*k.at(corner, s)) for corner in CORNERS for s in (0, k.l)])
+    fastest = speed + k.off
+    beta = 1 - fastest / norm(fastest, delta)
+    if mid(speed) > 100 * mid(delta) or mid(beta) < 1e-6:
+        return None
+    # a changes by at most 2/l along a body that turns as a whole: at the ends of the others, of a on link i
+    far, hinge = {i: iv.mpf(1)}, {i: iv.mpf(1)}
+    for step in (-1, 1):
+        j, before = i + step, iv.mpf(1)
+        while 0 <= j < 3:
+            hinge[j] = before if j != 1 else iv.mpf(1)
+            before = far[j] = before + 2 * links[j].l / k.l
+            j += step
+    force, torque = (iv.mpf(float(x)) for x in left)
+    others = [j for j in range(3) if j != i]
+    rho = force * far[1] + torque * 2 / k.l + sum(turning[j] * hinge[j] for j in (0, 2))
+    for j in others:
+        rho += far[j] * sum(e * (b - a) for e, a, b in zip(links[j].error, links[j].node, links[j].node[1:], strict=False))
+    room = beta * (iv.sqrt(2) - 1) * k.l - rho
+    if mid(room) <= 0:
+        return None
+    given = 3 * fastest * k.l + sum(links[j].gap for j in others)
+    moved = given / room
+    px, py, beside = (iv.mpf(float(x)) for x in point)
+    gain = moved * (far[1] + 2 / k.l * (norm(px, py) + beside))
+    return gain, sum(each.power for each in links) + given + rho * moved

@@ -6,7 +6,9 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from colloc import solve_balance
+from colloc.bounds import cutting_plane
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental
+from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
 from colloc.bounds.sampling import Domain
@@ -178,6 +180,34 @@ def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
     start = lattice.take(alone[np.argsort(-cone(lattice.take(alone)))[-20:]])
     top = domain.summits(cone, start, 0.3, 0.1, 40, np.random.default_rng(18))
     assert np.median(cone(top)) > -1e-3
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.37])
+def test_lattices_hold_the_corners_between_limit_and_contact(shift):
+    """A potential that had converged at 0.8609 stood at 1.0283 in such a corner, (2.5, 1.8911), where nothing was sampled."""
+    angles = Domain(Chain(), Friction(0.5, 1, 5), 2.5).lattice(8, 6, shift).angles
+    assert np.abs(angles - np.array([[2.5], [1.89109]])).sum(axis=0).min() < 1e-4
+    assert np.isclose(angles.max(), 2.5)  # and the limit
+
+
+def test_what_a_check_finds_is_sampled_and_checked_again(monkeypatch):
+    domain = Domain(Chain(), Friction(), 2.0)
+    space = PotentialSpace(TensorSpline(2, 2.0, 4), (1,), True)
+    missed = domain.lattice(3, 5, 0.3).take(np.arange(2))
+    answers = [np.array([0.1, 9.0]), np.array([0.1, 0.2])]
+    monkeypatch.setattr(cutting_plane, "summits_met", lambda *_, **__: (answers.pop(0), missed))
+    held, add = [], cutting_plane._Program.add
+
+    def noted(program, motion):
+        held.append(motion)
+        add(program, motion)
+
+    monkeypatch.setattr(cutting_plane._Program, "add", noted)
+    found = exchanged_optimum(domain, space, shapes=6, directions=12, rounds=12, starts=10, tolerance=0.3)
+    assert not answers
+    assert found.converged
+    assert found.top < 1.5
+    assert any(m.size == 1 and np.array_equal(m.angles, missed.angles[:, 1:]) for m in held)
 
 
 def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):

@@ -82,6 +82,7 @@ def test_the_period_is_a_whole_number_of_samples_and_never_shorter_than_asked():
     [
         ({}, "needs a period"),
         ({"period": -1.0}, "must be positive"),
+        ({"period": 0.0}, "must be positive"),
         ({"period": np.nan}, "must be positive"),
         ({"period": 0.1, "limits": 1.0}, "too short for the joint speed limits; use at least"),
         ({"limits": 0.0}, "must be positive"),

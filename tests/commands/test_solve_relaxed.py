@@ -1,5 +1,7 @@
 """``colloc solve`` and ``colloc animate`` on a class of relaxed gaits."""
 
+import contextlib
+import io
 import json
 
 import pytest
@@ -15,16 +17,22 @@ PROBLEM = Problem(
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def solved(tmp_path_factory):
+    """The folder of the result, and what the command said."""
     folder = tmp_path_factory.mktemp("relaxed")
     (folder / "loops.py").write_text(FILE)
-    return folder
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        assert main(["solve", str(folder / "loops.py"), "--starts", "1", "--json", "--output", f"{folder}/"]) == 0
+    return folder, json.loads(said.getvalue())
 
 
-def test_solve_reports_the_best_finite_gait_and_what_it_tends_to(folder, capsys):
-    code = main(["solve", str(folder / "loops.py"), "--starts", "1", "--json", "--output", f"{folder}/"])
-    told = json.loads(capsys.readouterr().out)
-    assert code == 0
+@pytest.fixture
+def folder(solved):
+    return solved[0]
+
+
+def test_solve_reports_the_best_finite_gait_and_what_it_tends_to(solved):
+    folder, told = solved
     found = told["certificate"]["efficiency"]
     assert found < told["relaxed"]["efficiency"]
     assert found == max(each["efficiency"] for each in told["relaxed"]["realised"])

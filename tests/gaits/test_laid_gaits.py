@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.laid_gaits import laid_into, over_links, prolonged
 from colloc.gaits.path_samples import path_length
+from colloc.gaits.starts import laid_into, over_links, prolonged
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
 from colloc.reduced.spaces import nearest_parameters, transcribed

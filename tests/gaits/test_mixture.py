@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.gaits.gait_fields import class_from, fields, gait_from
-from colloc.gaits.mixture import Mixture, corners_of
-from colloc.gaits.relaxed import Relaxed
+from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.system.errors import ProblemError
 
 
@@ -74,8 +73,8 @@ def test_realised_polygons_stay_near_the_mean_shape_the_nearer_the_more_they_rep
 
 def test_a_piece_of_one_direction_is_one_side_however_often_it_is_repeated():
     gait = Mixture([[1.0, 0.0], [0.5, 0.5], [1.0, 0.0]], [[[1, 0], [0, 1]], [[0, 1], [1, 0]], [[-1, 0], [0, 1]]], [0.0, 0.0])
-    assert corners_of(gait.realised(1)) == 4
-    assert corners_of(gait.realised(5)) == 12
+    assert gait.realised(1).n_corner == 4
+    assert gait.realised(5).n_corner == 12
 
 
 def test_a_mixture_taken_apart_is_the_polygon_and_its_mean_follows_the_same_shapes():

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from colloc import Harmonic, Objective, Problem, ProblemError
+from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.objective import DRIVEN, EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
-from colloc.gaits.problem import statement_hash
 
 PERIOD = {"distance": 0.31, "work": 1.3, "rotation": 0.7, "length": 8.0, "driven_work": 1.5}
 EXPRESSIONS = [

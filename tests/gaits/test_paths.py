@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.arcs import advance, direction
 from colloc.gaits.harmonic import shifted
-from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import (
     corners_through,
     fourier_through,
@@ -14,8 +12,10 @@ from colloc.gaits.path_samples import (
     path_length,
     symmetric_samples,
 )
+from colloc.gaits.starts import prolonged
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth, passing_depth
+from colloc.numerics.arcs import advance, direction
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.replay import replay

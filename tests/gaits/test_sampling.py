@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from colloc.gaits.sampling import latin_hypercube
+from colloc.gaits.starts import latin_hypercube
 
 
 def test_every_part_of_every_coordinate_has_one_point():

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shared.instants import random_instants
+from shared.kernels import by_both
 
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
@@ -14,9 +15,8 @@ from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.body import Chain
-from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.search.optimise import maximise_efficiency
 from colloc.system.errors import ProblemError
 
@@ -121,13 +121,8 @@ def test_a_law_compiled_from_its_formulas_is_the_law(case):
     law, body, (angles, rates) = COMPILED[case], Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)), random_instants(60)
     assert native_kernel(body, law) is not None
     rates[:, ::2] *= 1e-3  # links of some instants hardly turn
-    solved = body.solve(law, angles, rates, 1e-3)
-    motion, slopes = chain_slopes(body, law, angles, rates, 1e-3, solved)
-    with numpy_instead():
-        known = body.solve(law, angles, rates, 1e-3, start=solved.z)
-        same, reference = chain_slopes(body, law, angles, rates, 1e-3, solved)
-    np.testing.assert_allclose(solved.z, known.z, atol=1e-8)
+    (z, motion, slopes), (same_z, same, reference) = by_both(body, law, angles, rates, 1e-3)
+    np.testing.assert_allclose(z, same_z, atol=1e-8)
     np.testing.assert_allclose(motion.power, same.power, rtol=1e-9)
     np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-7)
-    scale = np.abs(reference).max(axis=(0, 1))
-    np.testing.assert_allclose(slopes / scale, reference / scale, atol=1e-8)
+    np.testing.assert_allclose(slopes, reference, atol=1e-8)

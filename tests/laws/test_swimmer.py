@@ -9,8 +9,9 @@ from scipy.integrate import solve_ivp
 from benchmarks.peers import drag
 from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Harmonic, ellipse
-from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import load_problem
 from colloc.laws.power_law import PowerLaw

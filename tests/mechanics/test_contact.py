@@ -13,11 +13,11 @@ from colloc.mechanics.contact import (
     SMOOTHING,
     crossing_bounds,
     crossing_depth,
+    gap,
     share_of_first,
     smooth_minimum,
     tangent_of_minimum,
 )
-from colloc.mechanics.width import gap
 
 AROUND_THE_CORNER = Fourier(np.zeros(2), np.array([[2.877], [0.172]]), np.array([[0.0], [-2.872]]))
 """A gait that rounds the shape (2 pi/3, 2 pi/3), where the first end passes the third link, within 2e-3 rad."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from shared.instants import random_instants
+from shared.kernels import by_both
 
 from benchmarks.independent_replay import Crawler, played
 from colloc import Chain, Elliptic, Friction, OwnLaw, PowerLaw, Problem, ProblemError, load, replay, save, solve_balance
@@ -11,8 +12,8 @@ from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.chain_motion import chain_motion, chain_slopes
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.chain_motion import chain_motion
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.search.optimise import maximise_efficiency
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
@@ -62,16 +63,11 @@ def test_a_body_named_from_its_other_end_moves_the_same_way():
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_compiled_balances_and_slopes_are_those_of_numpy(law):
     body, (angles, rates) = Chain(LENGTHS, weights=WEIGHTS), random_instants(100)
-    solved = solve_balance(body, law, angles, rates, 1e-4)
-    motion, slopes = chain_slopes(body, law, angles, rates, 1e-4, solved)
-    with numpy_instead():
-        same = solve_balance(body, law, angles, rates, 1e-4, start=solved.z)
-        known, reference = chain_slopes(body, law, angles, rates, 1e-4, solved)
-    np.testing.assert_allclose(same.z, solved.z, atol=1e-9)
+    (z, motion, slopes), (same_z, known, reference) = by_both(body, law, angles, rates, 1e-4)
+    np.testing.assert_allclose(same_z, z, atol=1e-9)
     np.testing.assert_allclose(motion.centre, known.centre, atol=1e-12)
     np.testing.assert_allclose(motion.actuator_power, motion.power, atol=1e-9)
-    scale = np.abs(reference).max(axis=(0, 1))
-    np.testing.assert_allclose(slopes / scale, reference / scale, atol=1e-9)
+    np.testing.assert_allclose(slopes, reference, atol=1e-9)
 
 
 def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced():

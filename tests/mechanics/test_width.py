@@ -5,8 +5,7 @@ import pytest
 
 from colloc import Chain, Harmonic, Problem, ProblemError, ellipse, maximise_efficiency
 from colloc.bounds.coulomb_motion import admissible
-from colloc.mechanics.contact import crossing_depth
-from colloc.mechanics.width import ends_and_links, gap, overlap, square_distance
+from colloc.mechanics.contact import crossing_depth, ends_and_links, gap, overlap, square_distance
 
 
 def nearest(body, angles, first, second, points=301):

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from colloc import Problem, Relaxed
 from colloc.bounds.coulomb_motion import balanced_motion
 from colloc.bounds.measure import Measure
-from colloc.gaits.mixture import Mixture
+from colloc.gaits.relaxed import Mixture
 from colloc.pictures.relaxed_figure import draw_mixture, draw_shares
 from scripts.figures_measure import measure_figure
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from colloc.commands.report import main
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import BODIES
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.path_classes import FreePath
 from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem

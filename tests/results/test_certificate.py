@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from colloc.commands.verify import main as recheck
+from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.path_classes import FreePath
-from colloc.gaits.paths import ArcPath
 from colloc.mechanics.body import Chain
+from colloc.mechanics.friction import Friction
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
-from colloc.results.certificate import certify
+from colloc.results import measured
+from colloc.results.certificate import _one_motion, certify
 from colloc.results.checks import Check
-from colloc.results.delta_limit import extrapolated_limit
+from colloc.results.measured import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.verification.replay import replay
@@ -34,7 +35,7 @@ def replays(three_link):
         return found[arguments[3]]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(verify, "replay", kept)
+        patch.setattr(measured, "replay", kept)
         assert certify(three_link).passed
     return found
 
@@ -45,7 +46,7 @@ def failures(three_link, replays, monkeypatch):
 
     def names(solution=three_link, change=lambda part, replayed: replayed):
         largest = max(replays)
-        monkeypatch.setattr(verify, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
+        monkeypatch.setattr(measured, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
         return {check.name for check in certify(solution).failures}
 
     return names
@@ -234,8 +235,24 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
     assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12)
 
 
+def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to_delta(three_link, replays, monkeypatch):
+    fine = replays[max(replays)]
+    monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(fine, distance=fine.distance * (1 + 3 * a[3])))
+    assert certify(three_link).efficiency_at_zero_delta == pytest.approx(fine.efficiency, rel=1e-12)
+
+
+def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(three_link, replays):
+    unequal, fine = three_link.problem.with_(friction=Friction(1.7, 1.0, 1.3)), replays[max(replays)]
+    for problem, several, said in (
+        (three_link.problem, 0.0, "leaves one balanced motion"),
+        (unequal, 0.0, "no other balanced motion was found"),
+        (unequal, 0.01, "several motions are balanced at 0.01 of the period"),
+    ):
+        assert said in _one_motion(problem, replace(fine, several=several)).meaning
+
+
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
-    monkeypatch.setattr(verify, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
+    monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
     known, fine = certify(three_link), replays[max(replays)]
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
@@ -262,7 +279,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     gapped = with_last(three_link, efficiency=fine.efficiency * (1 + 3e-4))
     assert failures(gapped) == {"replay gap"}
     assert failures(gapped, open_by(2.5e-4)) == set()
-    monkeypatch.setattr(verify, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
+    monkeypatch.setattr(measured, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
     known = certify(three_link)
     assert min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency) >= 5e-3
     assert known.work_error >= 5e-3 * known.work

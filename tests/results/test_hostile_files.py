@@ -277,7 +277,7 @@ def test_nothing_is_unpickled_or_executed(samples, tmp_path, monkeypatch):
         samples.read(kind)
         samples.path(kind).unlink()
     for path in Path(store_file.__file__).parents[1].rglob("*.py"):
-        if path.stem in ("store", "store_file", "archive", "journal", "row_file", "outcome_fields"):
+        if path.stem in ("store", "store_file", "archive", "journal", "row_file", "outcome"):
             text = path.read_text(encoding="utf-8")
             assert "pickle" not in text
             assert "eval(" not in text

@@ -10,6 +10,8 @@ from colloc import (
     Friction,
     Harmonic,
     ModalBody,
+    OwnLaw,
+    PowerLaw,
     Problem,
     ProblemError,
     Relaxed,
@@ -20,7 +22,7 @@ from colloc import (
     save,
 )
 from colloc.commands import verify
-from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, joint_moments
+from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power_in_balance, joint_moments
 from colloc.mechanics.balance import instant
 from colloc.search.optimise import maximise_efficiency
 
@@ -76,6 +78,24 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
     z = BODY.solve(LAW, angles, rates, 1e-3).z
     powers = actuator_powers(BODY, LAW, angles, rates, BODY.forces(LAW, angles, rates, z, 1e-3), 1e-3)
     np.testing.assert_allclose(powers, slow * rates, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("law", "degree"), [(LAW, 0), (PowerLaw(0.5, 2.0, 1.0, 1.0), 0.5), (Viscous(2, 1), 1)], ids=str)
+def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
+    angles, rates = random_instants(50)
+    z = Chain().solve(law, angles, rates, 0.1).z
+    slow, fast = (driven_power_in_balance(Chain(), law, angles, pace * rates, pace * z, pace * 0.1) for pace in (1.0, 3.0))
+    np.testing.assert_allclose(fast, 3.0 ** (1 + degree) * slow, rtol=1e-9)
+
+
+def test_of_a_law_without_a_degree_driven_power_is_the_positive_part_up_to_what_delta_hides():
+    law, (angles, rates) = OwnLaw("-vs/speed*(1 + exp(-speed))", "-vn/speed*(1 + exp(-speed))"), random_instants(50)
+    assert law.degree is None
+    z = Chain().solve(law, angles, rates, 1e-3).z
+    powers = actuator_powers(Chain(), law, angles, rates, Chain().forces(law, angles, rates, z, 1e-3), 1e-3)
+    more = driven_power_in_balance(Chain(), law, angles, rates, z, 1e-3) - np.maximum(powers, 0).sum(axis=0)
+    assert np.all(more >= 0)
+    assert more.max() <= 2 * law.largest * 1e-3 / 2
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
-from colloc.gaits.sampling import latin_hypercube_gait
+from colloc.gaits.starts import latin_hypercube_gait
 from colloc.search.optimise import maximise_efficiency
 
 

@@ -8,8 +8,9 @@ import pytest
 
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.path_classes import FreePath, Polygon
+from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.mechanics.body import Chain

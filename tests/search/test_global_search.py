@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem
-from colloc.gaits.sampling import on_speed_floor
+from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load, save
 from colloc.search import global_search
 from colloc.search.global_search import candidates

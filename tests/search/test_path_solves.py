@@ -7,8 +7,8 @@ from shared.differences import assert_derivatives_are_differences
 from colloc import Chain, Corners, Fourier, FreePath, Friction, Polygon, Problem, ellipse, load, save
 from colloc.bounds.infinitesimal import small_gait
 from colloc.collocation.warm_start import feasible_point
-from colloc.gaits.laid_gaits import prolonged
 from colloc.gaits.path_samples import path_length
+from colloc.gaits.starts import prolonged
 from colloc.mechanics.bodies import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed

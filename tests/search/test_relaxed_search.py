@@ -5,7 +5,7 @@ import pytest
 
 import colloc
 from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency, replay
-from colloc.gaits.mixture import Mixture
+from colloc.gaits.relaxed import Mixture
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import realisation
 from colloc.results.realisation import finite_certificate, kept_inside, realised_gaits, relaxed_certificate
@@ -85,7 +85,7 @@ def prices_of(gait, directions):
 
 
 def _with_idle(gait, stated):
-    from colloc.gaits.mixture import Mixture
+    from colloc.gaits.relaxed import Mixture
 
     idle = np.zeros((len(gait.durations), 2))
     more = np.broadcast_to([[1.0, 0.0], [0.0, 1.0]], (len(gait.durations), 2, 2))

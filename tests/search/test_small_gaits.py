@@ -3,7 +3,7 @@
 import pytest
 
 from colloc import Friction, Harmonic, Problem
-from colloc.gaits.sampling import latin_hypercube_gait, on_speed_floor
+from colloc.gaits.starts import latin_hypercube_gait, on_speed_floor
 from colloc.results.solution import SOLVED
 from colloc.search.optimise import maximise_efficiency
 

@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.robustness import DELTA, NEXT_DELTA, SMALL_DELTA, Table, case_problem
 from colloc import Chain
-from colloc.gaits.sampling import latin_hypercube_gait
+from colloc.gaits.starts import latin_hypercube_gait
 from colloc.results.solution import SOLVED
 from colloc.search.optimise import maximise_efficiency
 

@@ -7,7 +7,7 @@ import numpy as np
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.results.archive import Archive, StartName, open_archive
-from colloc.results.distinct_optima import Outcome
+from colloc.results.outcome import Outcome
 from colloc.results.store import load, save
 from colloc.studies.cell import Attempt
 from colloc.studies.journal import NAME, Record, append_records, read_journal

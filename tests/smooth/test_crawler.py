@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from colloc.commands.main import main as colloc_main
-from colloc.gaits.path_classes import Polygon
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram

@@ -10,20 +10,21 @@ import pytest
 
 from colloc.commands import multistart
 from colloc.gaits.equivalence import distance, images, phase_distance, reversed_in_time
+from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
-from colloc.gaits.path_classes import FreePath, Polygon
 from colloc.gaits.path_samples import arcs_through
-from colloc.gaits.paths import Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.sampling import BLOCK, SAMPLERS, on_speed_floor, start_gait
+from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.body import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
-from colloc.results.distinct_optima import CRASHED, ERROR, TIME_LIMIT, Outcome, basins, counts
+from colloc.results.distinct_optima import basins
+from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
 from colloc.search.optimise import is_trivial, maximise_efficiency, optimum

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from colloc.commands import sweep as sweep_study
+from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.path_classes import FreePath, Polygon
-from colloc.gaits.paths import ArcPath, Corners
+from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.results.distinct_optima import CRASHED, Outcome
+from colloc.results.outcome import CRASHED, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, start_key

@@ -9,7 +9,7 @@ from benchmarks.error_bars import DELTA, LIMIT, QUANTITIES, compared, random_gai
 from benchmarks.independent_replay import Crawler, played
 from benchmarks.reference import net_force
 from colloc.gaits.harmonic import ellipse
-from colloc.results.certificate import measured
+from colloc.results.measured import measured
 from tests.conftest import ROOT
 
 RECORDED = [json.loads(line) for line in (ROOT / "results/curated/error_bars.jsonl").read_text(encoding="utf-8").splitlines()]

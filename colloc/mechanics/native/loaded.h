@@ -7,7 +7,7 @@
 #define LOADED_TOLERANCE 1e-10
 #define STALLED 1e-7
 #define SOFTEST 1e-2
-#define RUNAWAY 1e6
+#define RUNAWAY 1e6 /* speed beyond which a load is more than friction can hold: nothing balances it, and the search ends */
 #define REGULAR 1e-13
 
 static const double LOADED_SHRINK[] = {0.5, 0.5, 0.5, 0.1, 0.1, 0.1, 0.1, 0.1};

@@ -1,4 +1,4 @@
-"""Circular arcs in joint space: where one leads and which way, in closed form, from the tangents at its ends.
+"""Circular arcs: where one leads and which way, in closed form, from the tangents at its ends.
 
 An arc of unit length (curvature = turn) runs from tangent T0 to tangent T1; at a fraction ``tau`` of it the tangent has
 turned by that fraction of the way. For two joints a tangent is its heading psi, one row, and may turn by any angle; for

@@ -1,5 +1,6 @@
-"""Seeded starts for a search over gaits: start number k is the same whatever the number of starts.
+"""Where a search over gaits begins: by chance, or at a gait of another class or chain that is laid into this one.
 
+Start number k of a seed is the same whatever the number of starts.
 Admissible shapes form a region that is star-shaped about the straight body (joint limits and non-crossing keep holding
 when all angles shrink together). So a gait is sampled as a direction in the space of Fourier parameters, from a Latin
 hypercube over the harmonics, times a fraction of the largest amplitude that is admissible in that direction.
@@ -7,15 +8,17 @@ hypercube over the harmonics, times a fraction of the largest amplitude that is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import largest_factor
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.path_samples import fourier_through
+from colloc.gaits.limits import Limit
+from colloc.gaits.path_samples import fourier_through, path_length
+from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.body import Chain
 from colloc.system.errors import ProblemError
 
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
@@ -27,7 +30,14 @@ _FRACTIONS = (0.2, 0.95)
 _PHASES = 200
 _ATTEMPTS = 200
 _CLEARLY_MOVING = 1.5
+_SPREAD = 0.3
 _ON_FLOOR = 1e-4
+_SHORT = 1.002
+"""An optimum on the lower bound of the path length is not too short; its length as a polyline is, by the corners it cuts."""
+_PERIOD = np.linspace(0.0, 1.0, 1001)
+_NEAR = 10.0
+"""A search from a known optimum begins at so many times the final delta: friction more regularised than that prefers other
+gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 times the final delta 0.3998)."""
 
 
 def largest_amplitude(problem: Problem, gait: Fourier) -> float:
@@ -97,27 +107,24 @@ def _multiplied(problem: Problem, drawn: Fourier, fraction: float) -> Fourier:
     largest = largest_amplitude(problem, gait)
     if not np.isfinite(largest):
         return gait
-    factor = fraction * largest
-    return Fourier(factor * gait.mean, factor * gait.cos, factor * gait.sin)
+    return gait.scaled(fraction * largest)
 
 
-def perturbed_gait(problem: Problem, optima: Sequence[AnyGait], seed: int, start: int, spread: float = 0.3) -> Fourier:
-    """Start number `start` near a known optimum: optima take turns, coefficients move by normals of `spread` [rad].
+def perturbed_gait(problem: Problem, seed: int, start: int) -> Fourier:
+    """Start number `start` near the problem's own guess, whose coefficients move by normals of 0.3 rad.
 
     Where that leaves the admissible region, the whole gait is shrunk back into it.
     """
-    if not optima:
-        raise ProblemError("perturbed starts need at least one known optimum.")
     rng = np.random.default_rng([seed, start])
-    near = fourier_through(optima[start % len(optima)], seed_class(problem)).resized(seed_class(problem).harmonics)
+    near = fourier_through(problem.guess, seed_class(problem)).resized(seed_class(problem).harmonics)
     for _ in range(_ATTEMPTS):
-        mean, cos, sin = (a + spread * rng.standard_normal(a.shape) for a in (near.mean, near.cos, near.sin))
+        mean, cos, sin = (a + _SPREAD * rng.standard_normal(a.shape) for a in (near.mean, near.cos, near.sin))
         drawn = Fourier(mean, cos, sin)
         member = seed_class(problem).fourier(seed_class(problem).parameters(drawn), problem.body.n_joint)
         gait = _multiplied(problem, member, min(1.0, 1.0 / largest_amplitude(problem, member)))
         if gait.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
-    raise ProblemError(f"found no admissible start within {spread:g} rad of the known optimum; change the spread.")
+    raise ProblemError(f"found no admissible start within {_SPREAD:g} rad of the guess.")
 
 
 def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> Fourier:
@@ -125,5 +132,64 @@ def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> Fourier
     if sampler not in SAMPLERS:
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {sampler!r}.")
     if sampler == PERTURBED:
-        return perturbed_gait(problem, [problem.guess], seed, start)
+        return perturbed_gait(problem, seed, start)
     return latin_hypercube_gait(problem, seed, start)
+
+
+def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> AnyGait:
+    """A gait of a chain laid into another body: every link gets the mean tangent angle of the part of the body it covers.
+
+    That is linear in the joint angles and keeps the symmetries, if both bodies have them. A path of arcs becomes a polygon of
+    many corners. Where links would cross, or a joint pass its limit, all angles shrink.
+    """
+    matrix = other.laid(np.array(body.lengths))
+    angles = matrix @ gait.angles(_PERIOD)
+    matrix = matrix * min(1.0, largest_factor(other, joint_limit, angles))
+    return gait.mapped(matrix)
+
+
+def laid_into(
+    gait_class: AnyClass, gait: AnyGait, body: Body, joint_limit: Limit = float(np.pi), smallest_shape_speed: float = 0.1
+) -> AnyGait:
+    """The gait that starts a search in a class: its Fourier series for harmonics, else itself, made admissible.
+
+    A truncated series overshoots, and a path that touches its limits is no longer admissible then: all angles shrink. It cuts
+    corners, and a path as short as it may be becomes too short: it grows about its mean.
+    """
+    near = fourier_through(gait, gait_class) if isinstance(gait_class, Harmonic) else gait
+    growth = 2 * np.pi * smallest_shape_speed / path_length(near)
+    if growth > _SHORT and isinstance(near, Fourier):
+        near = near.grown(growth)
+    elif growth > _SHORT and isinstance(near, Corners):
+        mean = near.angles(_PERIOD[:-1]).mean(axis=1, keepdims=True)
+        near = Corners(mean + growth * (near.corners - mean), near.symmetry)
+    if near is gait or not isinstance(near, Fourier):
+        return near
+    return near.scaled(min(1.0, largest_factor(body, joint_limit, near.angles(_PERIOD))))
+
+
+def delta_in(gait_class: AnyClass, gait: AnyGait, at_unit_speed: float) -> float:
+    """Delta in the units of a class, from delta at unit shape speed, for a gait of the same path length.
+
+    Harmonic gaits measure it per period, paths at unit shape speed.
+    """
+    return at_unit_speed * (1.0 if gait_class.unit_speed else path_length(gait))
+
+
+def prolonged(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:
+    """The problem in another class of gaits, to be searched from a known optimum of any class.
+
+    Delta stays what it is relative to the shape speed; other fields may be changed too (``intervals=...``).
+
+    Examples
+    --------
+    >>> from colloc import FreePath, Harmonic, Problem, ellipse
+    >>> best = ellipse(0, 2.86, 1.30)
+    >>> prolonged(Problem("loop", best, gait=Harmonic(1, "bilateral")), best, FreePath(8.0, "bilateral")).gait
+    FreePath(curvature=8.0, symmetry='bilateral', winding=None)
+    """
+    at_unit_speed = problem.delta / delta_in(problem.gait, problem.guess, 1.0)
+    delta = delta_in(gait_class, gait, at_unit_speed)
+    guess = laid_into(gait_class, gait, problem.body, problem.joint_limit, problem.smallest_shape_speed)
+    stated = {"guess": guess, "gait": gait_class, "delta": delta, "delta_start": _NEAR * delta}
+    return problem.with_(**(stated | changes))

@@ -1,10 +1,13 @@
-"""Arguments of the classes that people write by hand: misspelt ones meet a sentence with the nearest name."""
+"""Arguments of the classes that people write by hand: misspelt or unusable ones meet a sentence that says so."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Any, TypeVar
+import math
+from typing import Any, TypeGuard, TypeVar
+
+import numpy as np
 
 from colloc.system.errors import ProblemError
 
@@ -43,3 +46,23 @@ def named_arguments(cls: type[T]) -> type[T]:
 
 def _either(names: list[str]) -> str:
     return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether it is a finite real number, and no truth value."""
+    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    return real and bool(abs(value) < math.inf)  # type: ignore[arg-type]
+
+
+def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> TypeGuard[int]:
+    """Whether it is a whole number between two others, and no truth value."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    return whole and bool(least <= value <= most)  # type: ignore[operator]
+
+
+def check_positive(owner: object, *names: str, of: str = "") -> None:
+    """A `ProblemError` about the first of some numbers of an object that is not positive and finite; `of` heads its name."""
+    for name in names:
+        value = getattr(owner, name)
+        if not (is_number(value) and value > 0):
+            raise ProblemError(f"{of}{name} must be a positive finite number, not {value!r}.")

@@ -1,10 +1,12 @@
-"""One step of a continuation, as the optimiser left it."""
+"""What a search tells and leaves: how far it has come, the levels of its continuation, and the other gaits that it met."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
 
 REDUCED, PRESCRIBED, REALISED = "reduced", "prescribed", "realised"
 
@@ -78,3 +80,58 @@ class Level:
         verdict = "" if self.optimal else f", {self.status}"
         size = f"{self.x.size} variables"
         return f"<Level at delta = {self.delta:.1e}: d/W = {self.efficiency:.6g}, {self.program}, {size}{verdict}>"
+
+
+@dataclass(frozen=True)
+class SearchStep:
+    """How far a search over many starts has come.
+
+    Attributes
+    ----------
+    what : str
+        What is counted: "starts" tried on a coarse mesh, or "gaits" followed to the final delta.
+    done, count : int
+        Gaits may be followed for less than their count: those of finite size only until one is found.
+    efficiency : float
+        Of the best gait so far, as collocation sees it; NaN before there is one.
+    delta : float
+        At which that is; NaN before.
+    """
+
+    what: str
+    done: int
+    count: int
+    efficiency: float
+    delta: float
+
+    def __str__(self) -> str:
+        best = f"; best d/W = {self.efficiency:.4f} at delta = {self.delta:.0e}" if self.delta > 0 else ""
+        return f"{self.done} of {self.count} {self.what}{best}"
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """A gait that a search over many starts met.
+
+    Attributes
+    ----------
+    value : float
+        Of the objective, as collocation sees it on a coarse mesh, which may be a little more than a fine one would.
+    delta : float
+        To which it was followed.
+    starts : int
+        How many led to it.
+    on_speed_floor : bool
+        Whether the bound on the shape speed decided its size.
+    gait : AnyGait
+    """
+
+    value: float
+    delta: float
+    starts: int
+    on_speed_floor: bool
+    gait: AnyGait
+
+    def __str__(self) -> str:
+        size = ", as small as its bound allows" if self.on_speed_floor else ""
+        return f"{self.value:.4f} at delta {self.delta:.0e} ({self.starts} start{'s' * (self.starts > 1)}{size})"

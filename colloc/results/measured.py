@@ -1,0 +1,110 @@
+"""What replays say of a gait: its objective, efficiency, distance and work with errors, and for delta -> 0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.law import Law
+from colloc.verification.replay import MixedPath, Path, Replay, replay
+
+PARTS_OF_DELTA = (1.0, 0.1, 0.01)
+"""At which a gait's value is to be known."""
+_DECADE = PARTS_OF_DELTA[1]
+_SLOWEST = 0.9
+
+
+@dataclass(frozen=True)
+class Limit:
+    """An extrapolated value and its estimated error."""
+
+    value: float
+    error: float
+
+
+def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limit:
+    """Limit for delta -> 0 of one gait's value, from its values at delta, delta/10 and delta/100.
+
+    Regularisation acts like c delta at leading order, so a ninth of the last change remains; sticking links act like
+    delta log delta, and gaits of the size of delta like delta squared, with any signs. So the error is that ninth again; or
+    more where the two changes fall off more slowly; and no less than what is left of a linear part of the first change that
+    other parts hide in the second.
+
+    Parameters
+    ----------
+    values, errors : (3,)
+        Values of the objective and their own errors.
+    """
+    first, second = values[1] - values[0], values[2] - values[1]
+    linear = _DECADE / (1 - _DECADE)
+    falloff = min(abs(second) / max(abs(first), 1e-300), _SLOWEST)
+    left = max(max(linear, falloff / (1 - falloff)) * abs(second), linear * _DECADE * abs(first))
+    own = (1 + linear) * errors[2] + linear * errors[1]
+    return Limit(float(values[2] + linear * second), float(left + own))
+
+
+class Measured(NamedTuple):
+    """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for every balanced motion."""
+
+    fine: Replay
+    value_error: float
+    limit: Limit
+    efficiency_error: float
+    efficiency_limit: Limit
+    distance_error: float
+    work_error: float
+
+
+def measured(
+    body: Body,
+    friction: Law,
+    path: Path | MixedPath,
+    delta: float,
+    *,
+    tolerance: float = 1e-6,
+    instants: int = 1600,
+    breaks: np.ndarray | tuple[float, ...] = (),
+    objective: Objective = EFFICIENCY,
+    rotation: float | None = 0.0,
+    driven: bool = False,
+    limits: ActuatorLimits = UNLIMITED,
+) -> Measured:
+    """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
+
+    Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked for: the distance of a body
+    that turns by more depends on the point that is followed.
+    """
+    replays: list[Replay] = []
+    smoothed = friction.regularised or "driven_work" in objective.uses
+    for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
+        near = replays[-1] if replays else None
+        at = (body, friction, path, part * delta)
+        settings = {"instants": instants, "tolerance": tolerance, "breaks": breaks, "driven": driven, "limits": limits}
+        replays.append(replay(*at, **settings, near=near, objective=objective))  # type: ignore[arg-type]
+    known = []
+    for aim in (objective, EFFICIENCY):
+        values = [aim(each.period) for each in replays]
+        errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
+        limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
+        known.append((errors[0], limit))
+    fine = replays[0]
+    distance_error = fine.distance_error + astray(fine, rotation) + fine.other_distance
+    return Measured(fine, *known[0], *known[1], distance_error, fine.work_error + fine.other_work)
+
+
+def astray(replayed: Replay, rotation: float | None) -> float:
+    """How far the distance depends on the point of the body that is followed: by the rotation beyond what is asked for."""
+    return 0.0 if rotation is None else abs(replayed.rotation - rotation) * replayed.lever
+
+
+def _error(replayed: Replay, aim: Objective, rotation: float | None) -> float:
+    """Relative error of an objective, for every reason."""
+    by_lever = float(aim.relative_error(replayed.period, {"distance": astray(replayed, rotation)}))
+    error = replayed.error if aim == replayed.objective else replayed.error_of(aim)
+    return error + by_lever + replayed.ambiguity_of(aim)

@@ -1,0 +1,98 @@
+"""What became of one start of a search over many; as a plain dictionary (JSON) every number to the bit, every gait as it is."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait, gait_from
+from colloc.gaits.gait_fields import fields as gait_fields
+from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
+
+TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
+RETRIED = (ERROR, CRASHED, TIME_LIMIT)
+"""What may end otherwise when it is tried again."""
+STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, TIME_LIMIT, ERROR, CRASHED)
+_LONGEST_MESSAGE = 1000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Outcome:
+    """What became of one start.
+
+    Attributes
+    ----------
+    start : int
+        Its number.
+    status : str
+        One of `STATUSES`; only "solved" (certified by replay) is a success.
+    message : str
+        What went wrong, if something did.
+    guess, gait : Fourier, ArcPath or Corners
+        Where the search began and ended.
+    efficiency, efficiency_error, distance, work : float
+        Replayed and, failing that, collocated; NaN if there is none.
+    delta : float
+        In the units of the problem, the smallest at which an optimum was found; NaN if none.
+    iterations : int
+    seconds : float
+        Wall time, certificate included.
+    cpu_seconds : float
+        Processor time of the same, which other work on the machine does not lengthen as much.
+    value, value_error : float
+        Of the problem's objective; by default those of the efficiency.
+    """
+
+    start: int
+    status: str
+    message: str
+    guess: AnyGait
+    gait: AnyGait
+    efficiency: float = np.nan
+    efficiency_error: float = np.nan
+    distance: float = np.nan
+    work: float = np.nan
+    delta: float = np.nan
+    iterations: int = 0
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    value: float = np.nan
+    value_error: float = np.nan
+
+    def __post_init__(self) -> None:
+        for name, usual in (("value", self.efficiency), ("value_error", self.efficiency_error)):
+            if np.isnan(getattr(self, name)):
+                object.__setattr__(self, name, usual)
+
+    def __repr__(self) -> str:
+        return f"<Outcome of start {self.start}: {self.status}, d/W = {self.efficiency:.6g}, {self.cpu_seconds:.1f} s>"
+
+
+_GAITS, _TEXTS, _COUNTS = ("guess", "gait"), ("status", "message"), ("start", "iterations")
+_NUMBERS = tuple(f.name for f in dataclasses.fields(Outcome) if f.name not in (*_GAITS, *_TEXTS, *_COUNTS))
+_EARLIER = {"value": float("nan"), "value_error": float("nan")}
+"""What earlier rows do not state: they know of the efficiency only."""
+
+
+def outcome_fields(outcome: Outcome) -> dict[str, Any]:
+    """The fields of an outcome as numbers (also NaN), strings and lists."""
+    plain = {name: getattr(outcome, name) for name in (*_COUNTS, *_TEXTS, *_NUMBERS)}
+    return plain | {"message": outcome.message[:_LONGEST_MESSAGE]} | {g: gait_fields(getattr(outcome, g)) for g in _GAITS}
+
+
+def outcome_from(entry: dict[str, Any]) -> Outcome:
+    """The outcome that `outcome_fields` described. KeyError, TypeError, ValueError or ProblemError if it did not."""
+    entry = _EARLIER | entry
+    if entry["status"] not in STATUSES:
+        raise ValueError(f"no status: {entry['status']}")
+    kinds: list[tuple[Callable, tuple[str, ...]]] = [(int, _COUNTS), (str, _TEXTS), (float, _NUMBERS), (gait_from, _GAITS)]
+    return Outcome(**{name: kind(entry[name]) for kind, names in kinds for name in names})
+
+
+def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
+    """How many starts ended in each status; only those that occur."""
+    return {s: n for s in STATUSES if (n := sum(o.status == s for o in outcomes))}

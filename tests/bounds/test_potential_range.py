@@ -1,0 +1,99 @@
+"""What a potential may do over a cell: written out term by term, and met where nothing is lost."""
+
+import numpy as np
+import pytest
+
+from colloc.bounds.enclosure import CORNERS, Cells
+from colloc.bounds.loaded_balance import Loaded
+from colloc.bounds.potential import PotentialSpace
+from colloc.bounds.potential_range import _HEADINGS, PotentialRange, gain_bound
+from colloc.numerics.spline import TensorSpline
+
+N = 6
+
+
+@pytest.fixture(scope="module")
+def potential():
+    space = PotentialSpace(TensorSpline(2, np.pi, 4), (1, 3), True)
+    return PotentialRange(space, np.random.default_rng(3).normal(size=space.size))
+
+
+@pytest.fixture(scope="module")
+def cells():
+    """Oblong ones, none of which a knot cuts, with s of both signs."""
+    rng = np.random.default_rng(4)
+    size = np.array([[0.05], [0.02], [0.3]]) * rng.uniform(0.5, 1, (3, N))
+    low = np.stack([*(rng.integers(-2, 2, (2, N)) * np.pi / 2 + rng.uniform(0.1, 1.4, (2, N))), rng.uniform(-1, 0.7, N)])
+    points = (low[:, :, None] + size[:, :, None] * CORNERS.T[:, None, :]).reshape(3, -1)
+    return Cells(low, size, points, np.arange(8 * N).reshape(N, 8))
+
+
+def motions_at(points, seed=5):
+    rng = np.random.default_rng(seed)
+    n = points.shape[1]
+    blank = [np.zeros((3, 3, n)), np.zeros((2, n)), np.zeros(n)]
+    return Loaded(rng.normal(size=(3, n)), rng.uniform(1, 2, n), rng.uniform(1, 2, n), *blank)
+
+
+def value(potential, k, q, order=(0, 0)):
+    """c_k or a derivative of it at one shape."""
+    return (potential.spline.matrix(np.asarray(q, dtype=float)[:, None], order) @ potential.c[k])[0]
+
+
+@pytest.mark.parametrize("harmonic", [1, 2, 3])
+def test_half_way_between_headings_the_bound_of_the_gain_is_met_to_fourth_order(harmonic):
+    step = np.pi / _HEADINGS
+    for amplitude in (1.0, 2.5):
+        found = gain_bound({harmonic: np.array([amplitude * np.exp(1j * harmonic * step)])})[0]
+        assert amplitude <= found <= amplitude * (1 + (harmonic * step) ** 4 / 20)
+
+
+def test_the_error_of_a_trial_motion_is_that_of_interpolating_slopes_and_products(potential, cells):
+    """h^2/8 of second derivatives of the rate, and of spin times potential; (h/4) of the change of one times the slope of the
+    other."""
+    motions = motions_at(cells.points)
+    found = potential.trial_error(cells, motions)
+    for n in range(N):
+        spin, place = motions.velocity[2, cells.at[n]].reshape(2, 2, 2), cells.low[:2, n]
+        s = max(abs(cells.low[2, n]), abs(cells.low[2, n] + cells.size[2, n]))
+        i, j = (int(np.searchsorted(potential.spline.knots, q, side="right")) - 1 for q in place)
+        total = 0.0
+        for k in (1, 3):
+            largest = {order: table[i, j] for (harmonic, order), table in potential.largest.items() if harmonic == k}
+            for axis in (0, 1):
+                h, change = cells.size[axis, n], np.abs(np.diff(spin, axis=axis)).max()
+                twice, once = ((2, 0), (1, 0)) if axis == 0 else ((0, 2), (0, 1))
+                rate = largest[twice[0] + 1, twice[1]] + s * largest[twice[0], twice[1] + 1]
+                product = h**2 / 8 * np.abs(spin).max() * largest[twice] + h / 4 * change * largest[once]
+                total += h**2 / 8 * rate + k * product
+        assert found[n] == pytest.approx(total, rel=1e-12)
+
+
+def test_a_reference_point_is_the_first_harmonic_and_all_else_is_beside_it(potential, cells):
+    found = potential.reference(cells)
+    for n in range(N):
+        centre = cells.low[:2, n] + 0.5 * cells.size[:2, n]
+        i, j = (int(np.searchsorted(potential.spline.knots, q, side="right")) - 1 for q in centre)
+        slopes = {k: [potential.largest[k, order][i, j] for order in ((1, 0), (0, 1))] for k in (1, 3)}
+        across = {k: cells.size[0, n] * a + cells.size[1, n] * b for k, (a, b) in slopes.items()}
+        bent = [potential.largest[1, order][i, j] for order in ((2, 0), (0, 2))]
+        assert found.centre[n] == pytest.approx(value(potential, 1, centre), rel=1e-12)
+        for corner in cells.at[n]:
+            assert found.at[corner] == pytest.approx(value(potential, 1, cells.points[:2, corner]), rel=1e-12)
+        third = abs(value(potential, 3, centre))
+        assert found.beside[n] == pytest.approx(0.5 * across[1] + 3 * (0.5 * across[3] + third), rel=1e-12)
+        assert found.change[n] == pytest.approx(across[1], rel=1e-12)
+        assert found.curvature[n] == pytest.approx((cells.size[:2, n] ** 2 / 8 * bent).sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [(1, 0), (0, 1), (2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
+def test_bounds_of_derivatives_are_the_hull_of_their_coefficients(potential, order):
+    """A cubic that is the same everywhere has the same derivatives everywhere: the bound is met by a polynomial."""
+    a, b = order
+    spline, space = potential.spline, potential.space
+    whole = PotentialRange(space, np.zeros(space.size))
+    at = np.stack([axis.ravel() for axis in np.meshgrid(*[np.linspace(-np.pi, np.pi, 29)] * 2)])
+    monomial = at[0] ** a * at[1] ** b
+    whole.c = {1: np.linalg.lstsq(spline.matrix(at).toarray(), monomial.astype(complex), rcond=None)[0]}
+    factorial = np.prod(np.arange(1, a + 1)) * np.prod(np.arange(1, b + 1))
+    np.testing.assert_allclose(whole.largest[1, order], factorial, rtol=1e-7)
