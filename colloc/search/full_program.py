@@ -131,14 +131,17 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
         return level_of(program, in_reduced_space, delta, REDUCED), text
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
-    for _ in range(_ROUNDS):  # the gait may have moved so far that other instants are the worst
-        if not result.optimal or reduced.place_rows(result.x[own]) <= _ADMISSIBLE:
+    for _ in range(_ROUNDS):
+        if not result.optimal:
             break
+        if reduced.place_rows(result.x[own]) <= _ADMISSIBLE:
+            return level_of(program, result, delta, problem.formulation), ""
+        # the gait has moved so far that other instants are the worst
         solver.transcription = program = _limited(reduced, program)
         result = solver.solve_within(result.x, delta, (result.lam_x, result.lam_g), RADIUS).accumulated(result)
-    if result.optimal:
-        return level_of(program, result, delta, problem.formulation), ""
     ended = f"IPOPT, begun there, ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
+    if result.optimal:
+        ended = f"IPOPT, begun there, moved the gait beyond its limits {_ROUNDS} times"
     if before.optimal:
         kept = replace(before, status=STATIONARY)
         text = f"First-order conditions hold (KKT error {before.kkt_error:.1e} on the {problem.formulation} program); {ended}."
