@@ -13,6 +13,7 @@ from colloc.mechanics.contact import (
     SMOOTHING,
     crossing_bounds,
     crossing_depth,
+    passing_depth,
     share_of_first,
     smooth_minimum,
     tangent_of_minimum,
@@ -131,3 +132,13 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
     # without it the constraint at that instant falls behind the peak in proportion to the move
     assert min(blind) > 1e-4
     assert blind[0] > 3 * blind[-1]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_and_after(order):
+    """The head of three equal links goes through the first one; it is (sin a + sin(a + b))/3 beside its line."""
+    steps = np.array([-0.2, -0.1, -0.05, 0.02, 0.1, 0.2])[::order]
+    angles = np.stack([np.full(6, 2.0), 2 * np.pi - 4.0 + steps])
+    height = np.abs(np.sin(2.0) + np.sin(angles.sum(axis=0))) / 3
+    assert passing_depth(Chain(), angles) == pytest.approx(height[np.abs(steps) == 0.02].item(), rel=1e-12)
+    assert passing_depth(Chain(), angles[:, :3]) == 0.0
