@@ -113,9 +113,10 @@ def test_a_solution_that_lies_fails_its_certificate(three_link):
     wrong[three_link.layout.parameters[0, 0]] += 0.3
     names = {c.name for c in certify(with_last(x=wrong)).failures}
     assert {"joint limits", "replay gap"} <= names
-    failed = with_last(optimal=False)
-    failed.certificate = three_link.certificate
-    assert failed.status == "not converged"
+    for changes in ({"optimal": False}, {"delta": 1.5 * three_link.last.delta}):  # the last level, and the delta asked for
+        failed = with_last(**changes)
+        failed.certificate = three_link.certificate
+        assert failed.status == "not converged"
 
 
 @pytest.mark.slow
