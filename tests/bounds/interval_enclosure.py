@@ -179,7 +179,7 @@ class Link:
             bend = 2 / iv.sqrt(3) * D**2 if 3 * mid(c) ** 2 > 2 * mid(D) ** 2 else c * iv.sqrt(4 * D**2 - 3 * c**2)
             error += bend / (8 * m**2)
             power += c**2 / (8 * m)
-        return least([error, 2 * sine + 1 - iv.sqrt(1 - sine**2)]), least([power, 2 * spread])
+        return least([error, 2 * sine + 1 - iv.sqrt(1 - sine**2)]), power
 
     def growth(self, H, A):
         vs, vn, w, l, h = *self.v, self.w, self.l, self.h

@@ -6,17 +6,22 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from colloc import solve_balance
-from colloc.bounds import cutting_plane
+from colloc.bounds import cutting_plane, sampled
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental
 from colloc.bounds.cutting_plane import exchanged_optimum
+from colloc.bounds.optimality_gap import upper_bound
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
 from colloc.bounds.sampling import Domain
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.problem import Problem
+from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.minimax_program import smallest_maximum
 from colloc.numerics.spline import TensorSpline
+from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError, StoreError
 
 FRICTIONS = [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0)]
@@ -119,6 +124,19 @@ def test_a_bound_says_whether_the_last_climbs_still_found_more():
     few, enough = (efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, n)) for n in (1, 24))
     assert (few.converged, enough.converged) == (False, True)
     assert few.sampled > 1.05 * enough.sampled
+
+
+def test_samples_that_the_program_did_not_choose_may_refute_it(monkeypatch):
+    chosen = sampled.largest_ratio
+
+    def refuted(*arguments, **settings):
+        ratio, motion = chosen(*arguments, **settings)
+        return ratio + 1.0, motion
+
+    monkeypatch.setattr(sampled, "largest_ratio", refuted)
+    found = efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, 24))
+    assert found.sampled > found.floor + 0.5
+    assert not found.converged
 
 
 @pytest.mark.slow
@@ -259,3 +277,12 @@ def test_a_motion_is_that_of_the_midpoint_of_the_middle_link_in_its_own_axes(len
     velocity = (after - before) / (2 * h) * np.exp(-1j * heading)
     np.testing.assert_allclose(motion.velocity[0] + 1j * motion.velocity[1], velocity, atol=1e-6)
     np.testing.assert_allclose(motion.spin, z[2] + rates[: n // 2].sum(axis=0), atol=1e-6)
+
+
+@pytest.mark.parametrize("changes", [{"friction": Viscous(2.0, 1.0)}, {"body": ModalBody(2)}], ids=["drag", "smooth"])
+def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_path):
+    usual = {"guess": None, "body": Chain(), "friction": Friction(), "gait": Harmonic(1, "antipodal")}
+    problem = Problem("other", **(usual | changes))
+    assert upper_bound(problem, tmp_path, compute=False) is None
+    with pytest.raises(ProblemError, match="chains of links under Coulomb friction only"):
+        upper_bound(problem, tmp_path, compute=True)

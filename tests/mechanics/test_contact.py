@@ -14,6 +14,7 @@ from colloc.mechanics.contact import (
     crossing_bounds,
     crossing_depth,
     gap,
+    passing_depth,
     share_of_first,
     smooth_minimum,
     tangent_of_minimum,
@@ -131,3 +132,29 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
     # without it the constraint at that instant falls behind the peak in proportion to the move
     assert min(blind) > 1e-4
     assert blind[0] > 3 * blind[-1]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_and_after(order):
+    """The head of three equal links goes through the first one; it is (sin a + sin(a + b))/3 beside its line."""
+    steps = np.array([-0.2, -0.1, -0.05, 0.02, 0.1, 0.2])[::order]
+    angles = np.stack([np.full(6, 2.0), 2 * np.pi - 4.0 + steps])
+    height = np.abs(np.sin(2.0) + np.sin(angles.sum(axis=0))) / 3
+    assert passing_depth(Chain(), angles) == pytest.approx(height[np.abs(steps) == 0.02].item(), rel=1e-12)
+    assert passing_depth(Chain(), angles[:, :3]) == 0.0
+
+
+@pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
+def test_a_body_in_a_mirror_meets_itself_on_the_other_side_as_deep(lengths):
+    """And a contact is positive where, and only where, the links two apart cross."""
+    body, angles = Chain(lengths), np.random.default_rng(8).uniform(-2.9, 2.9, (len(lengths) - 1, 400))
+    here, mirrored = ({near.name: near for near in body.contacts(sign * angles)} for sign in (1, -1))
+    for name, near in here.items():
+        other = mirrored[name.replace("left", "RIGHT").replace("right", "left").replace("RIGHT", "right")]
+        np.testing.assert_allclose([near.first, near.second], [other.first, other.second], atol=1e-13)
+    pairs = [(i, i + 2) for i in range(len(lengths) - 2)]
+    crossed = np.max([np.minimum(near.first, near.second) for near in here.values()], axis=0)[0] > 0
+    deep = crossing_depth(body, angles, pairs)
+    assert crossed[deep > 1e-9].all()
+    assert deep[~crossed].max() == 0.0
+    assert 0.05 < crossed.mean() < 0.95

@@ -1,6 +1,7 @@
 """The solved problem: its interpolant, its certificate, its budgets, and the schemes against each other."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,17 @@ def test_sampled_motion_is_consistent(symmetry, solved):
     np.testing.assert_allclose(later.centre, expected, atol=1e-5)
 
 
+def test_headings_a_turn_further_are_those_of_the_same_motion(unsolved):
+    problem = Problem("turned", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "antipodal"), delta=0.3, delta_start=0.3)
+    solution, t = unsolved(problem), np.linspace(0, 2, 41)
+    x = solution.last.x.copy()
+    x[solution.layout.theta] += 2 * np.pi
+    before, after = solution.sample(t), Solution(problem, [replace(solution.last, x=x)]).sample(t)
+    np.testing.assert_allclose(after.theta, before.theta + 2 * np.pi, atol=1e-12)
+    np.testing.assert_allclose(after.centre, before.centre, atol=1e-12)
+    np.testing.assert_allclose(after.tail, before.tail, atol=1e-12)
+
+
 def _smooth(symmetry):
     """A quick solve at large delta, where everything is smooth."""
     problem = Problem(
@@ -90,8 +102,6 @@ def test_distance_and_work_equal_those_of_the_replay_on_a_grid_ten_times_finer(t
 
 
 def test_a_solution_that_lies_fails_its_certificate(three_link):
-    from dataclasses import replace
-
     from colloc.results.solution import Solution
 
     def with_last(**changes):
@@ -103,9 +113,10 @@ def test_a_solution_that_lies_fails_its_certificate(three_link):
     wrong[three_link.layout.parameters[0, 0]] += 0.3
     names = {c.name for c in certify(with_last(x=wrong)).failures}
     assert {"joint limits", "replay gap"} <= names
-    failed = with_last(optimal=False)
-    failed.certificate = three_link.certificate
-    assert failed.status == "not converged"
+    for changes in ({"optimal": False}, {"delta": 1.5 * three_link.last.delta}):  # the last level, and the delta asked for
+        failed = with_last(**changes)
+        failed.certificate = three_link.certificate
+        assert failed.status == "not converged"
 
 
 @pytest.mark.slow

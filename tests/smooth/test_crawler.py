@@ -134,3 +134,13 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     assert dict(dataset.sizes) == {"t": 401, "joint": 3, "velocity": 3, "axis": 2}
     ahead = dataset.centre.isel(t=-1) - dataset.centre.isel(t=0)
     assert float(ahead.sel(axis="x")) == pytest.approx(solution.distance, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
+def test_a_bump_lies_at_the_ends_of_its_region_where_it_grows_and_is_flattened_and_never_beyond(share):
+    body = CrawlerBody(0.1, share=share)
+    ends = body.breaks(np.array([[LAP, -LAP, 0.0, 0.4], *[[1.0] * 4] * body.modes]))[1:-1]
+    np.testing.assert_allclose(ends[0, :2], 0.4, atol=1e-15)
+    np.testing.assert_allclose(ends[-1, 2], 0.6, atol=1e-15)
+    np.testing.assert_allclose(ends[-1] - ends[0], body.width, atol=1e-15)
+    assert 0.4 < ends[0, 3] < ends[-1, 3] < 0.6

@@ -105,6 +105,20 @@ def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
         assert np.log2(coarse / fine) == pytest.approx(order, abs=0.5)
 
 
+def test_the_velocity_error_of_an_interval_is_that_of_the_polynomial_through_its_nodes():
+    stated = problem()
+    mesh = problem_mesh(stated)
+    fine = gait_motion(stated, GAIT, DELTA, mesh.edges, 1e-6)
+    found = mesh_error(stated, mesh, GAIT, DELTA, 1e-6, fine).velocity
+    nodes = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
+    z, known = rates_at(stated.body, stated.friction, path, DELTA, nodes).z, fine.rates.z.reshape(3, -1)
+    for k in range(mesh.n):
+        t = fine.nodes.ravel()
+        inside = (t > mesh.edges[k]) & (t < mesh.edges[k + 1])
+        through = [np.polyval(np.polyfit(nodes[k] - nodes[k, 1], row[k], 2), t[inside] - nodes[k, 1]) for row in z]
+        assert found[k] == pytest.approx(np.abs(np.array(through) - known[:, inside]).max(), rel=1e-6, abs=1e-9)
+
+
 def test_velocity_error_is_largest_where_links_stick():
     stated = problem()
     mesh = problem_mesh(stated)

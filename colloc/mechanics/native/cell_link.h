@@ -216,6 +216,6 @@ static inline void find_errors(CellLink *k, double delta)
         }
         k->error[j] = fmin(error, 2.0 * sine + 1.0 - sqrt(1.0 - sine * sine));
         k->force_error += k->error[j] * length;
-        k->power_error += fmin(power, 2.0 * spread) * length;
+        k->power_error += power * length;
     }
 }
