@@ -128,7 +128,7 @@ def finite(body: Chain, solution: Solution, seconds: float) -> dict[str, Any]:
 
 
 def gait(row: Row, starts: int) -> dict[str, Any]:
-    """The best relaxed gait that travels, begun also from those for equal coefficients and for other limits."""
+    """The best relaxed gait that travels, begun also from two that are kept: of the row, equal coefficients, other limits."""
     begin = time.process_time()
     others = [row._replace(limit=limit, mu=mu) for limit in (row.limit, *LIMITS) for mu in (row.mu, COEFFICIENTS[0])]
     first = [relaxation(other.file("gait")).gait.mean.realised() for other in others if other.file("gait").exists()][:2]
@@ -249,14 +249,14 @@ def largest_angle(of: dict) -> float:
 
 
 def best_held(row: Row, part: str, known: dict) -> dict:
-    """Of the gaits that hold for a row the best: of its law and links, within its limit and apart by its width."""
+    """Of the gaits that hold for a row (law, links, limit and width) the best; a certified one if there is."""
     holds = [known.get(f"{row.name} {part}", {})]
     for key, value in known.items():
         other, kind = row_of(key)
         same = (kind, other.mu, other.links) == (part, row.mu, row.links)
         if same and largest_angle(value) <= row.limit + 1e-4 and value.get("apart", 0.0) >= row.width:
             holds.append(value)
-    return max(holds, key=lambda value: value.get("efficiency", -np.inf))
+    return max(holds, key=lambda value: (bool(value), value.get("passed", True), value.get("efficiency", -np.inf)))
 
 
 def smallest_bound(row: Row, known: dict) -> float:

@@ -14,6 +14,7 @@ from colloc.mechanics.body import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ProblemError
+from scripts.check_potential import Kept, keep, potentials
 
 LIMIT = 2.5
 
@@ -55,6 +56,20 @@ def test_knots_are_worth_something_only_where_the_measure_does_not_close(found):
     # of the two places it took the better
     values = [worth(with_knots(space, np.array([place])), optimum.measure) for place in (0.625, 1.875)]
     assert np.abs(inner - (0.625, 1.875)[int(np.argmax(values))]).min() < 1e-9
+
+
+def test_a_kept_potential_is_the_one_that_was_found(found, tmp_path):
+    space, optimum = found
+    domain, path = Domain(Chain(), Friction(), LIMIT), tmp_path / "potentials.json"
+    path.write_text("[]")
+    for more in (space, with_knots(space, np.array([1.9]))):
+        free = optimum.free if more is space else np.random.default_rng(5).standard_normal(more.size)
+        keep(Kept(domain, more, free, optimum.floor), path)
+        kept, motion = potentials(path)[-1], optimum.measure.motion
+        assert (kept.domain, kept.program) == (domain, optimum.floor)
+        ratios = [Samples(each, motion).ratio(given)[0] for each, given in ((more, free), (kept.space, kept.free))]
+        assert np.allclose(*ratios, atol=1e-12)
+    assert len(potentials(path)) == 2
 
 
 def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
