@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from colloc.laws.power_law import PowerLaw
     from colloc.laws.viscous import Viscous
     from colloc.mechanics.actuators import ActuatorLimits
-    from colloc.mechanics.body import Chain
+    from colloc.mechanics.chain import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
     from colloc.results.certificate import certify
@@ -62,7 +62,7 @@ _HOME = {
     "gaits.problem": ("Problem",),
     "gaits.problem_file": ("Reference", "load_problem"),
     "gaits.objective": ("Objective",),
-    "mechanics.body": ("Chain",),
+    "mechanics.chain": ("Chain",),
     "mechanics.actuators": ("ActuatorLimits",),
     "smooth.modal_body": ("ModalBody",),
     "smooth.concertina": ("Concertina",),

@@ -20,7 +20,7 @@ import numpy as np
 from colloc.bounds.guaranteed import certify
 from colloc.bounds.sampled import efficiency_bound
 from colloc.bounds.sampling import Domain
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from scripts.check_potential import potentials
 

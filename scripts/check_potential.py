@@ -19,7 +19,7 @@ from colloc.bounds.coulomb_motion import swaps_ends
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampling import Domain
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from colloc.gaits.path_samples import Gait
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.pictures.figure import draw_angles, draw_body, draw_shape_path
 from colloc.pictures.motion_frames import turned
 from colloc.pictures.style import INK, snapshot_colours, styled

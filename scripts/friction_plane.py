@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound, known_bound
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.style import save
 from colloc.studies.store import StudyFile, load_study

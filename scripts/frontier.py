@@ -35,7 +35,7 @@ from colloc.gaits.guesses import largest_factor
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import gap
 from colloc.mechanics.friction import Friction
 from colloc.results.relaxation import Relaxation

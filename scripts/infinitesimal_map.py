@@ -13,7 +13,7 @@ import numpy as np
 
 from colloc.bounds.coulomb_motion import admissible, fundamental
 from colloc.bounds.infinitesimal import small_gait
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from scripts.figures_bound import save_small_gait_map
 

@@ -18,7 +18,7 @@ from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampling import Domain
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 from colloc.pictures.style import save

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc.bounds.coulomb_motion import admissible, unit_directions
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.pictures.style import save, styled, subplots

@@ -14,7 +14,7 @@ import numpy as np
 
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.search.slope_search import ClimbingGait, climbing_gait

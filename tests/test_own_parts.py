@@ -11,7 +11,7 @@ import pytest
 from colloc.gaits import gait_fields
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_bounds, gap
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction

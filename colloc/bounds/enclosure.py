@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.bounds.loaded_balance import Loaded, loaded_balance
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.native_kernel import address, native_kernel
 
 DELTA = 1e-9

@@ -19,7 +19,7 @@ from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.potential_range import PotentialRange
 from colloc.bounds.sampled import Bound
 from colloc.bounds.sampling import Domain
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 from colloc.system.processors import available_threads
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion, drawn_in, fundamental, unit_directions
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError
 

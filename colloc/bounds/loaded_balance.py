@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import compiled_loaded, native_kernel
 from colloc.system.errors import ProblemError

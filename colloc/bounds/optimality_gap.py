@@ -9,7 +9,7 @@ from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
 from colloc.gaits.limits import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import rate_independent
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError

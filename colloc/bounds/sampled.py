@@ -21,7 +21,7 @@ from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampling import Domain
 from colloc.gaits.gait_fields import fields, law_fields
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError

@@ -16,7 +16,7 @@ from colloc.bounds.coulomb_motion import (
     one_joint,
     unit_directions,
 )
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 
 _DELTA = 1e-6

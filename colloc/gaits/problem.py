@@ -19,7 +19,7 @@ from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 from colloc.mechanics.actuators import ActuatorLimits
 from colloc.mechanics.bodies import FULL, Body
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme

@@ -18,7 +18,7 @@ from colloc.gaits.path_samples import fourier_through, path_length
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"

@@ -40,7 +40,7 @@ class LinkVelocity(NamedTuple):
 
 @dataclass(frozen=True)
 class Links:
-    """Straight links joined end to end: their geometry. `colloc.mechanics.body.Chain` is the body.
+    """Straight links joined end to end: their geometry. `colloc.mechanics.chain.Chain` is the body.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import SearchSpace
 from colloc.reduced.spaces import space_about, space_near

@@ -16,7 +16,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.numerics.sqp import Stationarity
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.harmonic_space import HarmonicSpace

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law, rate_independent
 from colloc.system.errors import ProblemError
 from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion

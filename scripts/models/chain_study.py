@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import Motion

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.system.errors import ProblemError
 

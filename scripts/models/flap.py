@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from scripts.models.static_friction import KineticGap
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import cumulative_simpson
 
 from colloc.mechanics.balance import instant
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.verification.replay import Path

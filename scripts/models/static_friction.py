@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.mechanics.balance import Instant, instant, net_force
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.links import LinkVelocity

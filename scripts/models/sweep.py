@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 
 from colloc.gaits.harmonic import ellipse
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError

@@ -23,7 +23,7 @@ from functools import partial
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.balance import instant
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures import style
 from scripts import panel_marks

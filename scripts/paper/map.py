@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from scripts.models.velocity_map import STENCILS, VelocityMap, map_error, velocity_map
 from scripts.paper.study import Arrays, Context

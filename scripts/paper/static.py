@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction

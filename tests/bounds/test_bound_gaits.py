@@ -10,7 +10,7 @@ from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_mot
 from colloc.bounds.infinitesimal import small_gait
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 
 ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)

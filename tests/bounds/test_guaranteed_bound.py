@@ -12,7 +12,7 @@ from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.bounds.potential_range import PotentialRange, gain_bound
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.numerics.spline import DEGREE, TensorSpline

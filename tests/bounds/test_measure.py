@@ -10,7 +10,7 @@ from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.bounds.recheck import largest_ratio
 from colloc.bounds.sampling import Domain
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ProblemError

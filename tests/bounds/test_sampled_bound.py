@@ -17,7 +17,7 @@ from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.minimax_program import smallest_maximum
 from colloc.numerics.spline import TensorSpline

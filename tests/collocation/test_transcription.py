@@ -110,7 +110,7 @@ def test_local_functions_do_not_grow_with_the_mesh():
 
 
 def test_a_gait_with_more_joints_transcribes():
-    from colloc.mechanics.body import Chain
+    from colloc.mechanics.chain import Chain
 
     guess = Fourier(np.zeros(3), np.array([[0.5], [0.2], [-0.4]]), np.array([[0.0], [0.6], [0.3]]))
     problem = Problem("p", guess, body=Chain((0.25,) * 4), friction=Friction(3, 1, 1), intervals=8)

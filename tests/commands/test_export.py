@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from colloc.commands.export import main
 from colloc.gaits.harmonic import Fourier, ellipse
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.results.store import save
 from colloc.system.errors import ProblemError

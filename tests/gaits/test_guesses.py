@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.gaits.guesses import SAFE, largest_factor
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 
 STRAIGHT = np.zeros((2, 1))
 

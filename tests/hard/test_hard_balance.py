@@ -14,7 +14,7 @@ from cases import COEFFICIENTS, DELTAS, HARD
 
 from benchmarks.reference import balanced_velocity
 from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from scripts.models.static_friction import SYMMETRIC_CASES, WORKED_CASES

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.balance import balance_jacobian, instant, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.verification.replay import replay

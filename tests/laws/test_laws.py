@@ -13,7 +13,7 @@ from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead

@@ -14,7 +14,7 @@ from colloc.gaits.problem import Problem
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.search.optimise import maximise_efficiency

@@ -16,7 +16,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import load_problem
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.pictures.report_page import report_page
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency

@@ -8,7 +8,7 @@ from colloc.collocation.shape_checks import shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import (
     SMOOTHING,
     crossing_bounds,

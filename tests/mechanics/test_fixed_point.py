@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad_vec
 
 from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import NotConvergedError, ProblemError

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.reference import balanced_velocity
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import numpy_instead

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.gaits.harmonic import ellipse
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay

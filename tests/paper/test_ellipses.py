@@ -3,7 +3,7 @@
 import numpy as np
 
 from colloc.gaits.harmonic import ellipse
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from scripts.models.ellipses import admissible, contact_reach, ellipse_angles, gait_grid, largest_amplitude
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from scripts.models.flap import FlapBody, axial_force, flap_gap, flap_motion

@@ -10,7 +10,7 @@ from PIL import Image
 from colloc.commands.animate import main
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.animation import pictures
 from colloc.pictures.movie import write_movie

@@ -8,7 +8,7 @@ import pytest
 from shared.readable import assert_readable
 
 from colloc import Corners, Fourier
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from scripts.figures_classes import GaitPanel, gait_figure, magnified
 
 PI = np.pi

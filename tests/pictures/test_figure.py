@@ -12,7 +12,7 @@ from shared.readable import assert_readable
 
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import draw_filmstrip, forbidden, strips
 from colloc.pictures.publication import panels

@@ -19,7 +19,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames
 from colloc.pictures.report_page import PLAIN, environment, report_page

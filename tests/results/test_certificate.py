@@ -9,7 +9,7 @@ import pytest
 from colloc.commands.verify import main as recheck
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature

@@ -10,7 +10,7 @@ from colloc.collocation.worst_instants import check_values, held_shares, worst_i
 from colloc.commands.solve import main
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, passing_depth
 from colloc.mechanics.friction import Friction
 from colloc.search.far_contact import crossing_pairs, last_free

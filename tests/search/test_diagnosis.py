@@ -13,7 +13,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.reduced.spaces import transcribed
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.nlp import Solver

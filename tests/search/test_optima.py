@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction

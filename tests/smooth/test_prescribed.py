@@ -9,7 +9,7 @@ from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames
 from colloc.pictures.report_page import report_page

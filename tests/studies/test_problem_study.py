@@ -368,7 +368,7 @@ def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
 @pytest.mark.parametrize(("mu_t", "kind"), [(20.0, RETROGRADE), (0.1, DIRECT)])
 def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
     # the paper, section I: retrograde waves where transverse friction is large, direct ones where it is small
-    from colloc.mechanics.body import Chain
+    from colloc.mechanics.chain import Chain
 
     for sign in (1, -1):
         gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
@@ -380,7 +380,7 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
 
 
 def test_the_displacement_that_decides_the_class_is_that_of_the_replay():
-    from colloc.mechanics.body import Chain
+    from colloc.mechanics.chain import Chain
 
     gait, friction = Fourier([0, 0], [[0.9], [-0.3]], [[0.0], [0.8]]), Friction(5, 1, 1)
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colloc.gaits.harmonic import Fourier
-from colloc.mechanics.body import Chain
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
