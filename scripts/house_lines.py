@@ -28,7 +28,10 @@ NEW = {
         "pictures/relaxed_figure"
     ),
     "the best of many starts, and of hops from the best": "search/global_search",
-    "optima and saddles told apart": "reduced/second_order search/saddles",
+    "optima, saddles and kinks told apart": "reduced/second_order search/saddles numerics/kinks",
+    "slopes": (
+        "verification/gait_on_slope verification/slope verification/heading_map reduced/slope_program search/slope_search"
+    ),
     "IPOPT's word on every answer": "search/full_program",
     "instants with several balanced motions": "mechanics/solution_branches verification/followed_motion",
     "the balance compiled, with exact slopes": "mechanics/native_kernel mechanics/chain_motion",
