@@ -14,7 +14,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-_TOLERANCE = 1e-10
+_TOLERANCE, _MET = 1e-10, 1e-7
+"""What DAQP may leave of a limit, in units of its rows, and how much is taken for a failure."""
 _UNMET = 1e3
 """Price of half the squared share of the violations that stays."""
 
@@ -89,8 +90,17 @@ class _Solver:
         """The step and the multipliers of the rows; None where there is no step."""
         for name, room in self._room.items():
             room[:] = program[name].T
+        self._d.fill(np.nan)
         self._solve()
-        return (self._d.copy(), self._on_rows.copy()) if self._buffer.stats()["success"] else None
+        # a dual method that fails ends outside of some limit
+        d, rows = self._d.copy(), program["a"] @ self._d
+        within = _within(d, program["lbx"], program["ubx"]) and _within(rows, program["lba"], program["uba"])
+        return (d, self._on_rows.copy()) if within else None
+
+
+def _within(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:
+    slack = _MET * np.maximum(1.0, np.abs(values))
+    return bool(((values >= low - slack) & (values <= high + slack)).all())
 
 
 class _OfThread(threading.local):
