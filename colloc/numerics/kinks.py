@@ -55,17 +55,20 @@ def stationarity_around(
     >>> at.kkt_error, round(stationarity_around(Vee, np.zeros(1), at, 1e-6).kkt_error, 12)
     (1.0, 0.0)
     """
-    slopes, columns = program.row_slopes(v), binding(program, v)[2]
+    rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
     drawn = v + radius * np.random.default_rng(seed).uniform(-1.0, 1.0, (points * v.size, v.size))
-    places = [v, *np.clip(drawn, program.lower, program.upper)]
-    # rows have kinks too: they count with the multipliers that are known
+    places = np.clip(np.vstack([v, drawn]), program.lower, program.upper)
+    # rows have kinks too: what is not linear in them counts with the multipliers that are known
     gradients = np.array([program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes) for u in places]).T
-    heights = np.array([program.objective(u) + at.on_rows @ program.rows(u) + at.on_bounds @ u for u in places])
-    if not np.isfinite(gradients).all() or (heights[0] - heights).max() > _LOWER * (heights - heights[0]).max():
+    heights = np.array([program.objective(u) + at.on_rows @ (program.rows(u) - rows - slopes @ (u - v)) for u in places])
+    if not (np.isfinite(gradients).all() and np.isfinite(heights).all()):
         return at
     # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
     size = np.abs(gradients).max()
     matrix = np.vstack([np.hstack([gradients, columns]), np.repeat([size, 0.0], [len(places), columns.shape[1]])])
     found, _ = nnls(matrix, np.append(np.zeros(v.size), size), maxiter=30 * matrix.shape[1])
-    error = float(np.abs(matrix[:-1] @ found).max() / found[: len(places)].sum())
-    return replace(at, kkt_error=error) if error < at.kkt_error else at
+    shares, multipliers = np.split(found, [len(places)])
+    error = float(np.abs(matrix[:-1] @ found).max() / shares.sum())
+    higher = heights - heights[0] + (places - v) @ columns @ multipliers / shares.sum()
+    bends_down = -higher.min() > _LOWER * higher.max()
+    return at if bends_down or error >= at.kkt_error else replace(at, kkt_error=error)

@@ -49,7 +49,8 @@ def test_they_do_not_cancel_on_a_slope_with_a_kink():
 
 
 def test_a_row_that_binds_carries_what_is_left_along_it():
-    assert around(Pieces([(1, 1), (-1, -3)], total=0.0), ZERO).kkt_error < 2e-6
+    assert stationarity(valley := Pieces([(2, 0), (-1, 1)], total=0.0), ZERO).kkt_error == pytest.approx(1)
+    assert around(valley, ZERO, points=16).kkt_error < 2e-6
     assert around(Pieces([(1, 0), (2, -1)], total=0.0), ZERO).kkt_error == pytest.approx(0.5, abs=1e-5)
 
 

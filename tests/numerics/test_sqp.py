@@ -106,3 +106,19 @@ def test_steps_in_several_threads_are_those_of_one():
         together = list(pool.map(steps, range(3)))
     for seed, found in enumerate(together):
         np.testing.assert_array_equal(found, steps(seed))
+
+
+def test_of_rows_that_contradict_each_other_a_part_is_removed():
+    """Of d <= -1 and d >= 3 none, for what helps one harms the other."""
+    low, high = np.array([-np.inf, 3.0]), np.array([-1.0, np.inf])
+    step = quadratic_step(np.eye(1), np.zeros(1), np.ones((2, 1)), low, high, -np.full(1, 10.0), np.full(1, 10.0))
+    assert step.share == pytest.approx(0, abs=1e-9)
+    assert step.d == pytest.approx([0.0], abs=1e-8)
+
+
+def test_a_step_meets_rows_that_agree():
+    low, high = np.array([1.0, 3.0]), np.array([np.inf, np.inf])
+    step = quadratic_step(np.eye(1), np.zeros(1), np.ones((2, 1)), low, high, -np.full(1, 10.0), np.full(1, 10.0))
+    assert step.share == 1
+    assert step.d == pytest.approx([3.0])
+    assert step.on_rows == pytest.approx([0.0, -3.0])
