@@ -39,11 +39,10 @@ class Layout:
         return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 
-def problem_mesh(problem: Problem, edges: np.ndarray | None = None) -> Mesh:
-    """The mesh of a problem on the part of the period that is solved: uniform, or with the given edges."""
-    if edges is not None:
-        return Mesh(scheme(problem.scheme), edges)
-    return uniform_mesh(scheme(problem.scheme), problem.intervals, problem.gait.fraction)
+def problem_mesh(problem: Problem, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
+    """The mesh of a problem on the part of the period that is solved: uniform and of its scheme, or as given."""
+    collocation = scheme(of_scheme or problem.scheme)
+    return uniform_mesh(collocation, problem.intervals, problem.gait.fraction) if edges is None else Mesh(collocation, edges)
 
 
 def problem_layout(problem: Problem, mesh: Mesh, knots: np.ndarray | None = None) -> Layout:

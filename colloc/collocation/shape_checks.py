@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,8 +10,8 @@ import casadi as ca
 import numpy as np
 
 from colloc.gaits.limits import Limit
-from colloc.mechanics.bodies import Body, Contact, Pairs
-from colloc.mechanics.contact import share_of_first, smooth_minimum, tangent_of_minimum
+from colloc.mechanics.bodies import Body, Pairs
+from colloc.mechanics.contact import Contact, tangent_of_minimum
 from colloc.numerics.constraint_rows import Group, block_group
 
 
@@ -18,23 +19,19 @@ from colloc.numerics.constraint_rows import Group, block_group
 class ShapeCheck:
     """A scalar function of the shape that admissibility bounds from above (angles also from below).
 
-    value: of the shape. share: of the shape, the weight of the first of two functions of which this is the minimum,
-    or -1. cut: of the shape and a share, the tangent plane of that weight, or the function itself where it is negative.
-    slope: its derivative with respect to the shape. row: the angle that it is, per shape coordinate; None if it is none.
-    place: which of the body's angles it is.
+    along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, the weight of the first of two functions of
+    which this is the minimum, or -1. cut: of the shape and a share, the tangent plane of that weight, or the function itself
+    where it is negative. slope: its derivative with respect to the shape. row: the angle that it is, per shape coordinate; None
+    if it is none. place: which of the body's angles it is.
     """
 
     name: str
-    value: ca.Function
-    share: ca.Function
+    along: Callable[[np.ndarray], np.ndarray]
+    share: Callable[[np.ndarray], np.ndarray]
     cut: ca.Function
     slope: ca.Function
     row: np.ndarray | None = None
     place: int = 0
-
-    def along(self, angles: np.ndarray) -> np.ndarray:
-        """Values ``(n_time,)`` at shapes ``(n_joint, n_time)``."""
-        return self.value(angles).full().ravel() if self.row is None else self.row @ angles
 
     def bounds(self, limit: Limit) -> tuple[float, float]:
         """The least and the largest value allowed, for a limit on the body's angles, or one on each."""
@@ -67,13 +64,19 @@ def shape_checks(body: Body, far: Pairs = ()) -> list[ShapeCheck]:
     angles = ca.SX.sym("q", body.n_joint)
     names = enumerate(body.limit_names)
     checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
-    return checks + [_minimum_check(contact, angles) for contact in body.contacts(angles, far)]
+    return checks + [_minimum_check(contact, angles) for contact in body.contacts(far)]
 
 
 def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> ShapeCheck:
     share, value = ca.SX.sym("share"), ca.mtimes(ca.DM(row[None]), angles)
-    none = ca.Function("share", [angles], [ca.SX(-1)])
-    return ShapeCheck(name, ca.Function("check", [angles], [value]), none, *_cut(angles, share, value), row, place)
+    return ShapeCheck(
+        name,
+        lambda shapes: row @ shapes,
+        lambda shapes: np.full(shapes.shape[1], -1.0),
+        *_cut(angles, share, value),
+        row,
+        place,
+    )
 
 
 def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:
@@ -82,12 +85,12 @@ def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Funct
 
 
 def _minimum_check(contact: Contact, angles: ca.SX) -> ShapeCheck:
-    name, first, second, width = contact
-    value, share = smooth_minimum(first, second, width), ca.SX.sym("share")
-    cut = ca.if_else(share < 0, value, tangent_of_minimum(first, second, ca.fmax(share, 0), width))
+    (first, second), share = contact.pair(angles), ca.SX.sym("share")
+    tangent = tangent_of_minimum(first, second, ca.fmax(share, 0), contact.width)
+    cut = ca.if_else(share < 0, contact.excess(angles), tangent)
     return ShapeCheck(
-        name,
-        ca.Function("check", [angles], [value]),
-        ca.Function("share", [angles], [share_of_first(first, second, width)]),
+        contact.name,
+        lambda shapes: contact.excess(shapes)[0],
+        lambda shapes: contact.share(shapes)[0],
         *_cut(angles, share, cut),
     )

@@ -82,8 +82,6 @@ def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray
 
 def held_shares(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
     """The share of the first sum to hold in the cut at each of the instants, or -1 for the check itself, ``(n_time,)``."""
-    if check.row is not None:
-        return np.full(times.size, -1.0)
-    shares = check.share(gait.angles(times)).full().ravel()
+    shares = check.share(gait.angles(times))
     both = (shares > _HELD_SHARE) & (shares < 1 - _HELD_SHARE)
     return np.where(both & (check_values(check, gait, times) > -_HELD_NEAR), shares, -1.0)

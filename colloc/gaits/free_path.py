@@ -15,7 +15,7 @@ import numpy as np
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.polygon import Corners
-from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction, imaged, reduced
+from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
 from colloc.numerics.arcs import advance, direction
 from colloc.system.arguments import check_positive, is_whole, named_arguments
 from colloc.system.errors import ProblemError
@@ -90,12 +90,13 @@ class ArcPath(UnitSpeedGait):
         h = np.diff(self.edges)[k]
         return k, h, ((t - self.edges[k]) / h)[None]
 
-    def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        phase, image = reduced(self.symmetry, t)
+    def _angles(self, phase: np.ndarray) -> np.ndarray:
         k, h, tau = self._at(phase)
-        t0, t1 = self.tangents[:, k], self.tangents[:, k + 1]
-        angles = self.shapes[:, k] + self.length * h * advance(t0, t1, tau)
-        return imaged(self.symmetry, angles, self.length * direction(t0, t1, tau), image)
+        return self.shapes[:, k] + self.length * h * advance(self.tangents[:, k], self.tangents[:, k + 1], tau)
+
+    def _rates(self, phase: np.ndarray) -> np.ndarray:
+        k, _, tau = self._at(phase)
+        return self.length * direction(self.tangents[:, k], self.tangents[:, k + 1], tau)
 
     def largest_jump(self) -> float:
         """Largest jump of the angles where arcs meet and where a symmetry continues them [rad]."""

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.symmetry import SYMMETRIES, fraction
+from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced
 from colloc.system.errors import ProblemError
 
 DELTA_START = 0.01
@@ -98,8 +98,12 @@ class UnitSpeedGait(GaitFunction):
         if self.symmetry not in SYMMETRIES:
             raise ProblemError(f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}.")
 
-    def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Angles and rates."""
+    def _angles(self, phase: np.ndarray) -> np.ndarray:
+        """At phases of the part that is stored, as `angles`."""
+        raise NotImplementedError
+
+    def _rates(self, phase: np.ndarray) -> np.ndarray:
+        """At phases of the part that is stored, as `rates`."""
         raise NotImplementedError
 
     @property
@@ -119,11 +123,13 @@ class UnitSpeedGait(GaitFunction):
 
     def angles(self, t: np.ndarray) -> np.ndarray:
         """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
-        return self._both(t)[0]
+        phase, image = reduced(self.symmetry, t)
+        return imaged(self.symmetry, self._angles(phase), image)
 
     def rates(self, t: np.ndarray) -> np.ndarray:
         """Joint rates ``(n_joint, n_time)`` per period at phases t; at a corner those of the side ahead."""
-        return self._both(t)[1]
+        phase, image = reduced(self.symmetry, t)
+        return imaged(self.symmetry, self._rates(phase), image, derivative=1)
 
 
 class ClassOfGaits:

@@ -11,7 +11,7 @@ import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, both_halves, fraction, imaged, reduced
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, both_halves, fraction
 from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -88,12 +88,18 @@ class Corners(UnitSpeedGait):
         """The polygon with corners multiplied by a matrix ``(m, n_joint)``."""
         return Corners(matrix @ self.corners, self.symmetry)
 
-    def _both(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        phase, image = reduced(self.symmetry, t)
+    def _angles(self, phase: np.ndarray) -> np.ndarray:
+        start, rates, since = self._side(phase)
+        return start + rates * since
+
+    def _rates(self, phase: np.ndarray) -> np.ndarray:
+        return self._side(phase)[1]
+
+    def _side(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where the side that each phase lies on begins, the rates on it, and how long ago it began."""
         phases, vertices = self.phases, self.vertices
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
-        slope = np.diff(vertices) / np.diff(phases)
-        return imaged(self.symmetry, vertices[:, k] + slope[:, k] * (phase - phases[k]), slope[:, k], image)
+        return vertices[:, k], (np.diff(vertices) / np.diff(phases))[:, k], phase - phases[k]
 
     def lines(self, coordinate: str = "joint") -> list[str]:
         """Length and, if they are few, corners."""

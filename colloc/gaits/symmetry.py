@@ -40,13 +40,11 @@ def both_halves(symmetry: str, phases: np.ndarray) -> np.ndarray:
     return np.unique(both[(both > 0) & (both < 1)])
 
 
-def imaged(symmetry: str, angles: np.ndarray, rates: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angles and rates ``(n_joint, n_time)``, those of the columns `image` turned into their images."""
-    if symmetry == BILATERAL:
-        return np.where(image, -angles[::-1], angles), np.where(image, rates[::-1], rates)
-    if symmetry == ANTIPODAL:
-        return np.where(image, -angles, angles), np.where(image, -rates, rates)
-    return angles, rates
+def imaged(symmetry: str, values: np.ndarray, image: np.ndarray, derivative: int = 0) -> np.ndarray:
+    """Angles ``(n_joint, n_time)``, or their first derivatives, those of the columns `image` turned into their images."""
+    if symmetry == BILATERAL:  # time runs backwards
+        return np.where(image, -((-1) ** derivative) * values[::-1], values)
+    return np.where(image, -values, values) if symmetry == ANTIPODAL else values
 
 
 def end_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Branches, Lifted, Sliding
+from colloc.mechanics.contact import Contact
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 
@@ -24,18 +25,6 @@ ARROWS = 12
 """Points along a body at which friction is usually drawn."""
 Pairs = tuple[tuple[int, int], ...]
 """Pairs of parts of a body."""
-
-
-class Contact(NamedTuple):
-    """Two parts of a body that must not cross: the smaller of two functions of shape ``(1, n_time)`` must not be positive.
-
-    `width` is that over which the minimum is smoothed.
-    """
-
-    name: str
-    first: Array
-    second: Array
-    width: float
 
 
 class Usual(NamedTuple):
@@ -173,8 +162,8 @@ class Body(Protocol):
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
         """The largest angle of the kind that is bounded, at any place of the body, ``(n_time,)``."""
 
-    def contacts(self, angles: Array, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
-        """Parts that a search keeps from crossing: near ones always, pairs `far` apart if asked for; NumPy and CasADi."""
+    def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
+        """Parts that a search keeps from crossing: near ones always, pairs `far` apart if asked for."""
 
     @property
     def far_pairs(self) -> Pairs:

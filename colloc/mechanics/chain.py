@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Self
 
 import numpy as np
 
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Branches, Lifted, Sliding
-from colloc.mechanics.bodies import ARROWS, FULL, IMPLICIT, Contact, Pairs, Usual
+from colloc.mechanics.bodies import ARROWS, FULL, IMPLICIT, Pairs, Usual
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     SMOOTHING,
+    Contact,
     crossing_sums,
-    excesses,
+    ends_and_links,
+    excess,
     far_pairs,
     intrusions,
     overlap,
@@ -150,19 +153,26 @@ class Chain(Links):
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
         return np.abs(angles).max(axis=0)
 
-    def contacts(self, angles: Array, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
+    def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
         """All links two apart, bending to either side, the pairs `far` of links farther apart, and what a width asks of all."""
+
+        def crossing(side: int, i: int, angles: Array) -> tuple[Array, Array]:
+            first, second = crossing_sums(self, angles, i)
+            return side * first - np.pi, side * second - np.pi
+
+        def lacking(end: int, link: int, angles: Array) -> tuple[Array, Array]:
+            both = excess(self, angles, end, link)
+            return both, both  # one condition alone is the smaller of two that are the same
+
         found = []
-        for i, (first, second) in enumerate(crossing_sums(self, angles)):
-            name = f"links {i + 1} and {i + 3}"
-            found.append(Contact(f"{name} (left)", first - np.pi, second - np.pi, SMOOTHING))
-            found.append(Contact(f"{name} (right)", -first - np.pi, -second - np.pi, SMOOTHING))
+        for i in range(self.n_link - 2):
+            for name, side in (("left", 1), ("right", -1)):
+                found.append(Contact(f"links {i + 1} and {i + 3} ({name})", partial(crossing, side, i), SMOOTHING))
         for i, j in far:
-            found.append(Contact(f"links {i + 1} and {j + 1}", *intrusions(self, angles, i, j), CLEARANCE_SMOOTHING))
-        if self.width:
-            for (end, link), excess in excesses(self, angles):
-                # one condition alone is the smaller of two that are the same
-                found.append(Contact(f"end {end} and link {link + 1}", excess, excess, CLEARANCE_SMOOTHING))
+            pair = partial(intrusions, self, first=i, second=j)
+            found.append(Contact(f"links {i + 1} and {j + 1}", pair, CLEARANCE_SMOOTHING))
+        for end, link in ends_and_links(self) if self.width else ():
+            found.append(Contact(f"end {end} and link {link + 1}", partial(lacking, end, link), CLEARANCE_SMOOTHING))
         return found
 
     @property

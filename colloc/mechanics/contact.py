@@ -19,7 +19,8 @@ of two segments is that of an end of one from the other:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,17 +41,14 @@ def _subtended(angle: Array, link: float, middle: float) -> Array:
     return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
 
 
-def crossing_sums(body: Links, angles: Array) -> list[tuple[Array, Array]]:
+def crossing_sums(body: Links, angles: Array, i: int) -> tuple[Array, Array]:
     """For links i and i + 2, the two sums that both exceed pi, or both fall below -pi, where they cross; ``(1, n_time)`` each.
 
     Joint angles ``(n_joint, n_time)``.
     """
-    sums = []
-    for i in range(body.n_link - 2):
-        before, middle, after = body.lengths[i : i + 3]
-        a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
-        sums.append((b + _subtended(a, before, middle), a + _subtended(b, after, middle)))
-    return sums
+    before, middle, after = body.lengths[i : i + 3]
+    a, b = angles[i : i + 1, :], angles[i + 1 : i + 2, :]
+    return b + _subtended(a, before, middle), a + _subtended(b, after, middle)
 
 
 def smooth_minimum(first: Array, second: Array, width: float = SMOOTHING) -> Array:
@@ -78,6 +76,32 @@ def tangent_of_minimum(first: Array, second: Array, share: Array, width: float =
     return share * first + share_of_second * second + width * bulge
 
 
+@dataclass(frozen=True)
+class Contact:
+    """Two parts of a body that must not cross: the smaller of two functions of the shape must not be positive.
+
+    Attributes
+    ----------
+    name : str
+    pair : callable
+        Of shapes ``(n_joint, n_time)``, the two functions, ``(1, n_time)`` each; NumPy and CasADi.
+    width : float
+        Over which the minimum is smoothed.
+    """
+
+    name: str
+    pair: Callable[[Array], tuple[Array, Array]]
+    width: float
+
+    def excess(self, angles: Array) -> Array:
+        """The smoothed minimum ``(1, n_time)``."""
+        return smooth_minimum(*self.pair(angles), self.width)
+
+    def share(self, angles: Array) -> Array:
+        """What the first function has of its derivative, ``(1, n_time)``."""
+        return share_of_first(*self.pair(angles), self.width)
+
+
 def crossing_bounds(body: Links, angles: Array) -> Array | None:
     """Smooth functions that are <= pi only at shapes where no links i and i + 2 cross, ``(2 (n_link - 2), n_time)``.
 
@@ -86,7 +110,8 @@ def crossing_bounds(body: Links, angles: Array) -> Array | None:
     if body.n_link < 3:
         return None
     rows = []
-    for first, second in crossing_sums(body, angles):
+    for i in range(body.n_link - 2):
+        first, second = crossing_sums(body, angles, i)
         rows += [smooth_minimum(first, second), smooth_minimum(-first, -second)]
     return namespace(angles).stack(rows)
 
@@ -215,11 +240,11 @@ def square_distance(body: Links, angles: Array, end: int, link: int) -> Array:
     return outside * outside + across * across
 
 
-def excesses(body: Links, angles: Array) -> list[tuple[Pair, Array]]:
-    """For every end and link a smooth function that is <= 0 where they keep the width, to first order the width that they lack
+def excess(body: Links, angles: Array, end: int, link: int) -> Array:
+    """A smooth function that is <= 0 where an end and a link keep the width, to first order the width that they lack
     [body lengths], ``(1, n_time)``; it has a derivative on the link too, where the distance has none."""
     w = body.width
-    return [(p, (w * w - square_distance(body, angles, *p)) / (2 * w)) for p in ends_and_links(body)]
+    return (w * w - square_distance(body, angles, end, link)) / (2 * w)
 
 
 def gap(body: Links, angles: np.ndarray, pairs: Sequence[Pair] | None = None) -> np.ndarray:

@@ -35,7 +35,7 @@ class HarmonicSpace:
 
     def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
         self.problem, self.far = problem, far
-        self.mesh = problem_mesh(problem.with_(scheme=scheme or problem.scheme), edges)
+        self.mesh = problem_mesh(problem, edges, scheme)
         self.checks = shape_checks(problem.body, far)
         gait, n_joint, limit = problem.gait, problem.body.n_joint, problem.joint_limit
         angles, rates = gait.angle_matrix(self.mesh.times, n_joint), gait.rate_matrix(self.mesh.times, n_joint)

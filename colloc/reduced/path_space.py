@@ -55,7 +55,7 @@ class PathSpace:
         self, problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
     ) -> None:
         self.problem, self.near, self.far = problem, near, far
-        stated = problem.with_(scheme=scheme or problem.scheme)
+        stated = problem if scheme in ("", problem.scheme) else problem.with_(scheme=scheme)
         self._fit = fit = transcribe_fit(stated, near, edges, far)
         self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
         free = fit.lower < fit.upper

@@ -43,8 +43,8 @@ from colloc.system.errors import CollocError, NotConvergedError
 STARTS = 32
 _FEWEST = 12
 """Intervals of a coarse mesh, at least."""
-_LEVELS = (1.0, 0.2)
-"""Deltas at which starts are compared, in units of the problem's first one."""
+_NEARLY_DRY = 0.2
+"""Where starts are compared, besides the problem's first delta: at this share of the usual first one, or of a smaller one."""
 _SAME_EFFICIENCY, _SAME_GAIT = 1e-3, 0.05
 _BROKEN = 1e-2
 """Violation of a row beyond which a gait is not compared with others."""
@@ -54,6 +54,8 @@ far they may be from the best at the final one to be optimised on the whole mesh
 _HOPS, _HOP_SIZES, _HOP_SEED = 0.5, (0.2, 0.4, 0.8), 1
 """The share of the starts that hop from the best gait known, and how far [rad], in turn. At 0.2 a hop mostly falls back, at 0.8
 it lands where any start would; which of them leads on differs from problem to problem."""
+_PATIENCE, _MOST = 8, 3
+"""Hops go on until so many in a row have led nowhere better; at most so many times the starts asked for are tried."""
 _SPARE = 8
 """Gaits of finite size that are followed at most, until one has not shrunk."""
 _ROUNDS = 3
@@ -106,14 +108,13 @@ def same_gait(problem: Problem, a: Found, b: Found) -> bool:
 def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch: Watch) -> tuple[list[Candidate], int]:
     """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
     coarse = problem.with_(intervals=min(problem.intervals, max(problem.gait.coarse_intervals(problem.body.n_joint), _FEWEST)))
-    deltas = [max(factor * problem.delta_start, problem.delta) for factor in _LEVELS]
+    usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)  # compared where friction is nearly dry
+    deltas = [max(delta, problem.delta) for delta in (problem.delta_start, _NEARLY_DRY * usual)]
     known: list[list[Candidate]] = [[] for _ in deltas]
-    tried, hops = 0, int(_HOPS * count)
-    starts = starting_gaits(problem, count - hops)
-    for start in range(count):
-        if start > 0 and not goes_on():
-            break
-        tried += 1
+    independent, last, tried, best = count - int(_HOPS * count), count - 1, 0, 0.0
+    starts = starting_gaits(problem, independent)
+    while tried == 0 or (tried <= min(last, _MOST * count - 1) and goes_on()):
+        start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
             gait = next(starts, None)
@@ -122,7 +123,10 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
             elif known[-1]:
                 shaken = _shaken(problem, min((c.found for c in known[-1]), key=lambda f: f.objective).gait, start)
                 _follow(*space_about(coarse, shaken), start, deltas[-1:], known[-1:])
-        watch(_step("starts", tried, count, [c.found for c in known[-1]]))
+        before, best = best, min((c.found.objective for c in known[-1]), default=0.0)
+        if start >= independent and best < before - _SAME_EFFICIENCY * abs(before):
+            last = max(last, start + _PATIENCE)
+        watch(_step("starts", tried, max(tried, count), [c.found for c in known[-1]]))
     return sorted(known[-1], key=lambda c: c.found.objective), tried
 
 

@@ -8,7 +8,8 @@ from typing import Self
 import numpy as np
 
 from colloc.mechanics.balance_results import BalancedMotion, Lifted
-from colloc.mechanics.bodies import ARROWS, IMPLICIT, Contact, Pairs
+from colloc.mechanics.bodies import ARROWS, IMPLICIT, Pairs
+from colloc.mechanics.contact import Contact
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
 from colloc.smooth.balance import SmoothSolution, solve_smooth
@@ -101,7 +102,7 @@ class SmoothBody:
         places = np.linspace(0.0, 1.0, _FINE_PLACES)[:, None] * np.ones((1, angles.shape[1]))
         return np.abs(self.tangent(places, angles)).max(axis=0)
 
-    def contacts(self, angles: Array, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
+    def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
         """None: the bound on the tangent angle excludes them."""
         return []
 

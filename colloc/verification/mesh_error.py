@@ -18,7 +18,6 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
-from colloc.mechanics.contact import smooth_minimum
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import PANEL_RULE, FineMotion, Increments, Rates, fine_motion, increments, rates_at
@@ -249,5 +248,5 @@ def constraint_violation(problem: Problem, mesh: Mesh, gait: AnyGait) -> np.ndar
         np.abs(body.limited @ stretched).max(axis=0, initial=0.0) - limit,
         body.crossing_depth(angles, body.far_pairs),
     ]
-    rows += [smooth_minimum(near.first, near.second, near.width)[0] for near in body.contacts(angles)]
+    rows += [near.excess(angles)[0] for near in body.contacts()]
     return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)

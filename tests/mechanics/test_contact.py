@@ -148,12 +148,12 @@ def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_an
 def test_a_body_in_a_mirror_meets_itself_on_the_other_side_as_deep(lengths):
     """And a contact is positive where, and only where, the links two apart cross."""
     body, angles = Chain(lengths), np.random.default_rng(8).uniform(-2.9, 2.9, (len(lengths) - 1, 400))
-    here, mirrored = ({near.name: near for near in body.contacts(sign * angles)} for sign in (1, -1))
+    here, mirrored = ({near.name: near.pair(sign * angles) for near in body.contacts()} for sign in (1, -1))
     for name, near in here.items():
         other = mirrored[name.replace("left", "RIGHT").replace("right", "left").replace("RIGHT", "right")]
-        np.testing.assert_allclose([near.first, near.second], [other.first, other.second], atol=1e-13)
+        np.testing.assert_allclose(near, other, atol=1e-13)
     pairs = [(i, i + 2) for i in range(len(lengths) - 2)]
-    crossed = np.max([np.minimum(near.first, near.second) for near in here.values()], axis=0)[0] > 0
+    crossed = np.max([np.minimum(*near) for near in here.values()], axis=0)[0] > 0
     deep = crossing_depth(body, angles, pairs)
     assert crossed[deep > 1e-9].all()
     assert deep[~crossed].max() == 0.0

@@ -54,7 +54,7 @@ def test_without_a_width_nothing_is_different():
     line, angles = Chain(), np.random.default_rng(6).uniform(-np.pi, np.pi, (2, 200))
     assert Problem("lines", body=Chain(width=0.0)).hash == Problem("lines").hash
     assert "width" not in Problem("lines").to_dict()["body"]
-    assert len(line.contacts(angles)) == 2
+    assert len(line.contacts()) == 2
     assert np.array_equal(line.crossing_depth(angles), crossing_depth(line, angles))
     wide = Problem("strips", body=Chain(width=0.02))
     assert wide.hash != Problem("strips").hash
