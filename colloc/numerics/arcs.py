@@ -41,11 +41,15 @@ def _versine(y: Array) -> Array:
     return 0.5 * half * half
 
 
-def _squared_angle(t0: Array, t1: Array) -> Array:
-    """Square of the angle between unit vectors, a row; smooth where they agree."""
-    xp = namespace(t0, t1)
+def squared_half_chord(t0: Array, t1: Array) -> Array:
+    """A quarter of the squared distance of unit vectors, a row: sin(phi/2)^2."""
     step = t1 - t0
-    m = 0.25 * xp.sum_rows(step * step)
+    return 0.25 * namespace(t0, t1).sum_rows(step * step)
+
+
+def _squared_angle(m: Array) -> Array:
+    """phi^2 where sin(phi/2)^2 = m; smooth at 0."""
+    xp = namespace(m)
     small = m < 1e-3
     safe = xp.where(small, 0.5, m)
     half = xp.arctan2(xp.sqrt(safe), xp.sqrt(xp.where(safe < 1.0, 1.0 - safe, 1e-12)))
@@ -54,25 +58,35 @@ def _squared_angle(t0: Array, t1: Array) -> Array:
     return 4.0 * xp.where(small, series, half * half)
 
 
+def tangent_weights(m: Array, tau: Array) -> tuple[Array, Array]:
+    """What of T0 and of T1 the tangent is at fractions tau of arcs of a squared half chord m."""
+    y, rest = _squared_angle(m), 1.0 - tau
+    whole = _sinc(y)
+    return rest * _sinc(rest * rest * y) / whole, tau * _sinc(tau * tau * y) / whole
+
+
+def advance_weights(m: Array, tau: Array) -> tuple[Array, Array]:
+    """The integrals of `tangent_weights`."""
+    y, rest = _squared_angle(m), 1.0 - tau
+    whole = _sinc(y)
+    # integral of sin((1 - tau) phi) is (cos((1 - tau) phi) - cos phi)/phi, of sin(tau phi) it is (1 - cos(tau phi))/phi
+    return (_versine(y) - rest * rest * _versine(rest * rest * y)) / whole, tau * tau * _versine(tau * tau * y) / whole
+
+
 def direction(t0: Array, t1: Array, tau: Array) -> Array:
     """Unit tangents ``(n_joint, n_time)`` at fractions tau of arcs between given tangents."""
-    xp = namespace(t0, t1, tau)
     if t0.shape[0] == 1:
-        psi = t0 + tau * (t1 - t0)
+        xp, psi = namespace(t0, t1, tau), t0 + tau * (t1 - t0)
         return xp.stack([xp.cos(psi), xp.sin(psi)])
-    y = _squared_angle(t0, t1)
-    rest = 1.0 - tau
-    return (rest * _sinc(rest * rest * y) * t0 + tau * _sinc(tau * tau * y) * t1) / _sinc(y)
+    of_first, of_last = tangent_weights(squared_half_chord(t0, t1), tau)
+    return of_first * t0 + of_last * t1
 
 
 def advance(t0: Array, t1: Array, tau: Array) -> Array:
     """Displacement ``(n_joint, n_time)`` up to fractions tau of arcs of unit length: the integral of `direction`."""
-    xp = namespace(t0, t1, tau)
     if t0.shape[0] == 1:
-        half = 0.5 * tau * (t1 - t0)
+        xp, half = namespace(t0, t1, tau), 0.5 * tau * (t1 - t0)
         chord = tau * _sinc(half * half)
         return xp.stack([chord * xp.cos(t0 + half), chord * xp.sin(t0 + half)])
-    y = _squared_angle(t0, t1)
-    rest = 1.0 - tau
-    # integral of sin((1 - tau) phi) is (cos((1 - tau) phi) - cos phi)/phi, of sin(tau phi) it is (1 - cos(tau phi))/phi
-    return ((_versine(y) - rest * rest * _versine(rest * rest * y)) * t0 + tau * tau * _versine(tau * tau * y) * t1) / _sinc(y)
+    of_first, of_last = advance_weights(squared_half_chord(t0, t1), tau)
+    return of_first * t0 + of_last * t1

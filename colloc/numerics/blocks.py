@@ -12,8 +12,9 @@ Hessian of the whole are constant sparse matrices times the stacked local nonzer
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -154,9 +155,7 @@ def _accumulator(
     n_source: int,
 ) -> tuple[ca.Sparsity, sparse.csr_matrix]:
     """Sparsity of the entries (rows, cols), and the matrix that sums ``values * source`` into its nonzeros."""
-    key = cols.astype(np.int64) * shape[0] + rows
-    unique, inverse = np.unique(key, return_inverse=True)
-    accumulate = sparse.csr_matrix((values, (inverse, sources)), shape=(unique.size, n_source))
+    unique, accumulate = summed(cols.astype(np.int64) * shape[0] + rows, sources, values, n_source)
     pattern = ca.Sparsity.triplet(shape[0], shape[1], (unique % shape[0]).tolist(), (unique // shape[0]).tolist())
     return pattern, accumulate
 
@@ -183,6 +182,10 @@ class Oracles:
     def parameter_vector(self, delta: float, parameters: list[np.ndarray]) -> np.ndarray:
         """The vector of delta and all instance parameters, in the order of the blocks."""
         return np.concatenate([[delta], *(np.asarray(p, dtype=float).ravel(order="F") for p in parameters)])
+
+
+Mapped = Callable[..., ca.MX]
+"""A local function of the block of a number, at all its instances, in one column."""
 
 
 def oracles(assembly: Assembly) -> Oracles:
@@ -232,17 +235,28 @@ def oracles(assembly: Assembly) -> Oracles:
     )
 
 
-def _jacobian(assembly: Assembly, blocks, mapped) -> ca.MX:
-    linear = sparse.coo_matrix(assembly.linear)
-    rows, cols = [linear.row], [linear.col]
-    sources, values = [np.zeros(linear.nnz, int)], [linear.data]
-    offset, stacked = 1, [ca.MX(1)]
-    for index, block in enumerate(blocks[1:], 1):
-        f = block.function
+class Terms(NamedTuple):
+    """Entries of a Jacobian as sums of terms: its row and column, and a weight times a source.
+
+    Sources are 1, then the nonzeros of the blocks' Jacobians, block by block and instance by instance; n_source of them.
+    """
+
+    row: np.ndarray
+    column: np.ndarray
+    source: np.ndarray
+    weight: np.ndarray
+    n_source: int
+
+
+def jacobian_terms(linear: sparse.spmatrix, blocks: Sequence[Block]) -> Terms:
+    """Those of ``linear @ x`` and the blocks' contributions."""
+    constant = sparse.coo_matrix(linear)
+    rows, columns = [constant.row], [constant.col]
+    sources, weights = [np.zeros(constant.nnz, int)], [constant.data]
+    offset = 1
+    for block in blocks:
+        f, scatter = block.function, sparse.coo_matrix(block.scatter)
         n_nonzero = f.jac_row.size
-        if n_nonzero == 0:
-            continue
-        scatter = sparse.coo_matrix(block.scatter)
         out, instance = scatter.col % f.n_out, scatter.col // f.n_out
         # every nonzero of the scatter matrix meets every Jacobian entry of its output row
         order = np.argsort(f.jac_row, kind="stable")
@@ -253,17 +267,30 @@ def _jacobian(assembly: Assembly, blocks, mapped) -> ca.MX:
         within = np.arange(which.size) - np.repeat(np.cumsum(repeat) - repeat, repeat)
         entry = order[starts[out[which]] + within]
         rows.append(scatter.row[which])
-        cols.append(block.gather[f.jac_col[entry], instance[which]])
+        columns.append(block.gather[f.jac_col[entry], instance[which]])
         sources.append(offset + entry + n_nonzero * instance[which])
-        values.append(scatter.data[which])
-        stacked.append(mapped(f.jacobian, index))
+        weights.append(scatter.data[which])
         offset += n_nonzero * block.n_instance
-    row, col, source, value = (np.concatenate(part) for part in (rows, cols, sources, values))
-    pattern, accumulate = _accumulator(row, col, source, value, (assembly.m, assembly.n), offset)
-    return ca.MX(pattern, _dm(accumulate) @ ca.vertcat(*stacked))
+    row, column, source, weight = (np.concatenate(part) for part in (rows, columns, sources, weights))
+    return Terms(row, column, source, weight, offset)
 
 
-def _hessian(assembly: Assembly, blocks, mapped, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
+def summed(key: np.ndarray, source: np.ndarray, weight: np.ndarray, n_source: int) -> tuple[np.ndarray, sparse.csr_matrix]:
+    """The different keys of terms, and the matrix that sums weights times sources for each of them."""
+    unique, inverse = np.unique(key, return_inverse=True)
+    return unique, sparse.csr_matrix((weight, (inverse, source)), shape=(unique.size, n_source))
+
+
+def _jacobian(assembly: Assembly, blocks: Sequence[Block], mapped: Mapped) -> ca.MX:
+    terms, shape = jacobian_terms(assembly.linear, blocks[1:]), (assembly.m, assembly.n)
+    pattern, accumulate = _accumulator(terms.row, terms.column, terms.source, terms.weight, shape, terms.n_source)
+    nonzeros = [
+        mapped(block.function.jacobian, index) for index, block in enumerate(blocks[1:], 1) if block.function.jac_row.size
+    ]
+    return ca.MX(pattern, _dm(accumulate) @ ca.vertcat(1, *nonzeros))
+
+
+def _hessian(assembly: Assembly, blocks: Sequence[Block], mapped: Mapped, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
     rows, cols, sources, values, stacked, offset = [], [], [], [], [], 0
     for index, block in enumerate(blocks):
         f = block.function

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
-from colloc.numerics.blocks import Assembly, LocalFunction
+from colloc.numerics.blocks import Assembly, Block, jacobian_terms, summed
 
 
 class ColumnFunction:
@@ -60,13 +59,17 @@ class ChosenRows:
     """
 
     def __init__(self, assembly: Assembly, kept: np.ndarray, parameters: list[np.ndarray]) -> None:
-        self._linear, self._parts = assembly.linear[kept], []
+        self._linear, blocks = assembly.linear[kept], []
         for block, given in zip(assembly.blocks, parameters, strict=True):
             scatter, n_out = block.scatter[kept], block.function.n_out
             used = np.unique(scatter.indices // n_out)
             if used.size:
                 columns = (used[:, None] * n_out + np.arange(n_out)).ravel()
-                self._parts.append(_Part(block.function, block.gather[:, used], given[:, used], scatter[:, columns]))
+                blocks.append(Block(block.function, block.gather[:, used], scatter[:, columns], given[:, used]))
+        terms = jacobian_terms(self._linear, blocks)
+        key = terms.row.astype(int) * assembly.n + terms.column
+        self._places, self._weights = summed(key, terms.source, terms.weight, terms.n_source)
+        self._parts = [_Part(block) for block in blocks]
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """``(n_row,)`` at the variables x."""
@@ -74,25 +77,24 @@ class ChosenRows:
 
     def slopes(self, x: np.ndarray) -> np.ndarray:
         """Derivatives ``(n_row, n_variable)``."""
-        return np.asarray(sum((part.slopes(x) for part in self._parts), start=self._linear).toarray())
+        found = np.zeros(self._linear.shape)
+        found.ravel()[self._places] = self._weights @ np.concatenate([[1.0], *(part.nonzeros(x) for part in self._parts)])
+        return found
 
 
 class _Part:
     """What the instances of a block that are asked for contribute to the rows."""
 
-    def __init__(self, function: LocalFunction, gather: np.ndarray, given: np.ndarray, scatter: sparse.csr_matrix) -> None:
-        self._given, self._no_delta, self._scatter = given, np.zeros((1, gather.shape[1])), scatter
-        self._gather, self._value, self._jacobian = gather, ColumnFunction(function.value), ColumnFunction(function.jacobian)
-        # where the Jacobian's nonzeros go: as compressed rows of the outputs, instance by instance
-        output = (function.n_out * np.arange(gather.shape[1]) + function.jac_row[:, None]).ravel()
-        self._order, n_output = np.argsort(output, kind="stable"), scatter.shape[1]
-        self._columns = gather[function.jac_col].ravel()[self._order]
-        self._ends = np.concatenate([[0], np.cumsum(np.bincount(output, minlength=n_output))])
+    def __init__(self, block: Block) -> None:
+        self._block, self._no_delta = block, np.zeros((1, block.n_instance))
+        self._value, self._jacobian = ColumnFunction(block.function.value), ColumnFunction(block.function.jacobian)
+
+    def _arguments(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return x[self._block.gather], self._block.parameters, self._no_delta
 
     def values(self, x: np.ndarray) -> np.ndarray:
-        return np.asarray(self._scatter @ self._value(x[self._gather], self._given, self._no_delta).ravel(order="F"))
+        return np.asarray(self._block.scatter @ self._value(*self._arguments(x)).ravel(order="F"))
 
-    def slopes(self, x: np.ndarray) -> sparse.csr_matrix:
-        nonzeros = self._jacobian(x[self._gather], self._given, self._no_delta).ravel()[self._order]
-        outputs = sparse.csr_matrix((nonzeros, self._columns, self._ends), shape=(self._ends.size - 1, x.size))
-        return self._scatter @ outputs
+    def nonzeros(self, x: np.ndarray) -> np.ndarray:
+        """Of the Jacobians, instance by instance."""
+        return self._jacobian(*self._arguments(x)).ravel(order="F")

@@ -23,6 +23,7 @@ from colloc.numerics.columns import ChosenRows, ColumnFunction
 from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import minimised, remembered
+from colloc.reduced.place_slopes import along_arcs, along_shape
 from colloc.system.errors import NotConvergedError
 
 _FOLLOWS = ("path", "unit tangent", "smooth closure")
@@ -88,9 +89,9 @@ class PathSpace:
         mesh, piece = self.mesh, self._geometry.piece
         out = ca.vertcat(piece.angles, piece.direction, piece.speed)
         arguments = [piece.shape, piece.given]
-        slope = ca.densify(ca.vec(ca.jacobian(out, piece.shape)))
         self._value = ColumnFunction(ca.Function("place", arguments, [out]))
-        self._slope = ColumnFunction(ca.Function("slope", arguments, [slope]))
+        n_joint = self.problem.body.n_joint
+        self._pulled = along_arcs(n_joint) if self._arcs and n_joint > 2 else along_shape(piece)
         self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
         self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
         self._scatter = selector(self._gather.ravel(), self._fixed.size)
@@ -210,10 +211,7 @@ class PathSpace:
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         """See `colloc.reduced.motion.Shapes`."""
-        n_out, n_shape = on_shape.shape[2] + 1, self._gather.shape[0]
-        slope = self._slope(self.full_parameters(v)[self._gather], self._given).T.reshape(-1, n_shape, n_out)
-        on_out = np.concatenate([on_shape, on_pace[:, :, None]], axis=2)
-        on_local = (slope @ on_out.transpose(1, 2, 0)).transpose(2, 1, 0)
+        on_local = self._pulled(self.full_parameters(v)[self._gather], self._given, on_shape, on_pace)
         return self.from_full(v, on_local.reshape(len(on_local), -1) @ self._scatter)
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
