@@ -108,6 +108,7 @@ def planned_mesh(
     tolerance: float,
     *,
     kept: np.ndarray | None = None,
+    nested: bool = False,
     aim: float = AIM,
     most_points: int = MOST_POINTS,
 ) -> MeshPlan | None:
@@ -125,6 +126,9 @@ def planned_mesh(
         Largest relative error of the objective.
     kept : array, optional
         Phases that have to be knots.
+    nested : bool
+        Whether all knots of the mesh stay. Where an optimum is flat, the gait moves far for what little it gains on the cells
+        that the mesh has resolved least; with the knots that were there it has nowhere to come back to.
     aim : float
         The planned error is this fraction of the tolerance.
     most_points : int
@@ -151,8 +155,8 @@ def planned_mesh(
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself kinked
         on_knots = kinks[:0] if switches and (rule.left or rule.right) else kinks
         # knots of a path are where its arcs and sides end: there they may be added, not moved
-        snap = _SNAP if problem.gait.moves_knots else 0.0
-        first = np.union1d(problem.gait.first_edges(mesh.edges), knots)
+        snap = _SNAP if problem.gait.moves_knots and not nested else 0.0
+        first = np.union1d(mesh.edges if nested else problem.gait.first_edges(mesh.edges), knots)
         edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
         plan = _split(problem, rule, edges, knots, on_knots, gait, delta, fine, tolerance, aim, budget)

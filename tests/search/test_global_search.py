@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem
+from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load, save
 from colloc.search import global_search
@@ -34,7 +35,9 @@ def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changed", [{}, {"intervals": 30}, {"scheme": "gauss-5"}, {"delta_start": 0.03}], ids=str)
+@pytest.mark.parametrize(
+    "changed", [{}, {"intervals": 30}, {"scheme": "gauss-5"}, {"delta_start": 0.03}, {"delta_start": 1.0}], ids=str
+)
 def test_the_answer_does_not_depend_on_what_the_search_is_given(changed):
     """Before, options decided: 0.234, 0.493 and 0.647 were each called solved."""
     solution = best_gait(UNEQUAL.with_(**changed))
@@ -56,3 +59,25 @@ def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch
     known, tried = candidates(problem, 1, lambda: True, lambda step: None)
     assert tried == 1
     assert bool(known) == kept
+
+
+@pytest.mark.parametrize(
+    ("count", "better", "tried"),
+    [
+        (8, {0: 1, 2: 2}, 8),
+        (8, {0: 1, 6: 2}, 15),
+        (8, {0: 1, 6: 2, 14: 3}, 23),
+        (4, {0: 1, 3: 2, 9: 3}, 12),
+    ],
+    ids=["independent starts alone", "a hop", "hops that lead on", "three times what was asked for"],
+)
+def test_hops_go_on_while_one_of_the_last_eight_led_on(monkeypatch, count, better, tried):
+    def follow(space, v, number, deltas, known):
+        if number in better:
+            found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0)
+            known[-1].append(global_search.Candidate(found))
+
+    monkeypatch.setattr(global_search, "_follow", follow)
+    found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, lambda step: None)
+    assert number == tried
+    assert found[0].found.objective == -max(better.values())

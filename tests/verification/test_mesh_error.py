@@ -175,6 +175,16 @@ def test_planned_meshes_are_as_accurate_as_they_say(name):
         assert again is None
 
 
+def test_a_nested_mesh_has_every_knot_of_the_one_before():
+    stated = problem("gauss-3")
+    mesh = problem_mesh(stated)
+    plan, free = (planned_mesh(stated, mesh, GAIT, DELTA, 1e-6, nested=nested) for nested in (True, False))
+    assert np.isin(mesh.edges, plan.edges).all()
+    assert not np.isin(mesh.edges, free.edges).all()
+    assert plan.reached
+    assert mesh_error(stated, Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1e-7).estimate <= 1.1e-6
+
+
 def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     stated = problem("gauss-2", mesh_tolerance=1e-7, intervals=20)
     plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, 1e-7, most_points=60)
