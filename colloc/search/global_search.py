@@ -175,23 +175,21 @@ def _follow(space: SearchSpace, v: np.ndarray, start: int, deltas: list[float], 
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """The best of many starts at the final delta, before its mesh is refined.
+    """The best of many starts at the final delta, before their meshes are refined.
 
     Attributes
     ----------
-    found : Found
-    levels : list of Found
-        That led there.
+    contenders : list of list of Found
+        Distinct gaits at the final delta, best first, each by the levels that led there.
     starts : int
         Tried in all.
     others : tuple of Alternative
-        All distinct gaits, the chosen one first.
+        All distinct gaits, the best contender first.
     finite : list of Found
-        Levels of the best gait of finite size, where the chosen one is as small as the bound on the shape speed allows.
+        Levels of the best gait of finite size, where the best one is as small as the bound on the shape speed allows.
     """
 
-    found: Found
-    levels: list[Found]
+    contenders: list[list[Found]]
     starts: int
     others: tuple[Alternative, ...]
     finite: list[Found]
@@ -247,18 +245,18 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
             with suppress(CollocError):
                 levels.append(settled_apart(*space_near(problem, last.gait), last.delta, NEXT_RADIUS, ROUGH, rounds=_ROUNDS))
     ends.sort(key=lambda end: end[1][-1].objective)
-    distinct: list[tuple[Found, list[int]]] = []
+    distinct: list[tuple[list[Found], list[int]]] = []
     for candidate, levels in ends:
-        twin = next((starts for found, starts in distinct if same_gait(problem, found, levels[-1])), None)
+        twin = next((starts for known, starts in distinct if same_gait(problem, known[-1], levels[-1])), None)
         if twin is None:
-            distinct.append((levels[-1], list(candidate.starts)))
+            distinct.append((levels, list(candidate.starts)))
         else:
             twin.extend(candidate.starts)
-    followed = [_alternative(problem, found, starts) for found, starts in distinct]
+    followed = [_alternative(problem, levels[-1], starts) for levels, starts in distinct]
     dropped = [_alternative(problem, c.found, c.starts) for c in known if not any(c is done for done, _ in ends)]
-    best = ends[0][1]
-    finite = [] if is_finite(best[-1]) else next((levels for _, levels in ends if is_finite(levels[-1])), [])
-    return Chosen(best[-1], best, tried, (*followed, *dropped), finite)
+    contenders = [levels for levels, _ in distinct]
+    finite = [] if is_finite(contenders[0][-1]) else next((levels for levels in contenders if is_finite(levels[-1])), [])
+    return Chosen(contenders, tried, (*followed, *dropped), finite)
 
 
 def _followed(problem: Problem, found: Found) -> list[Found]:

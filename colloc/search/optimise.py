@@ -32,6 +32,8 @@ TRIVIAL_ROTATION = 1e-3
 """Rotation a period [rad] from which a gait that goes nowhere turns."""
 _SADDLES = 3
 """Saddles left one after another."""
+_CONTENDERS, _REFINED = 3, 0.01
+"""Gaits that are solved for at most, until a certificate holds; what their values may lose on a refined mesh, as a share."""
 _DRIER = 2
 """Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous."""
 FINER = "a smaller mesh_tolerance"
@@ -234,16 +236,36 @@ def best_gait(
     except NotConvergedError:  # what fails with the guess alone is said in detail
         return maximise_efficiency(problem, on_level)
     objective = problem.objective
-    levels = [restated(level_found(found), unit, objective) for found in chosen.levels]
-    for level in levels:
-        if on_level is not None:
-            on_level(level)
-    solution = maximise_efficiency(problem, on_level, levels)
+    contenders = [[restated(level_found(found), unit, objective) for found in levels] for levels in chosen.contenders]
+    solution = _best_certified(problem, contenders, on_level, lambda: time.perf_counter() - begin < seconds)
     solution.starts = chosen.starts
     solution.others = tuple(replace(other, value=in_unit(other.value, unit, objective)) for other in chosen.others)
     if chosen.finite and on_speed_floor(problem, solution.gait):
         _add_finite(solution, [restated(level_found(found), unit, objective) for found in chosen.finite])
     solution.seconds = time.perf_counter() - begin
+    return solution
+
+
+def _best_certified(
+    problem: Problem, contenders: list[list[Level]], on_level: Report | None, goes_on: Callable[[], bool]
+) -> Solution:
+    """The best solution that levels lead to; the best ones come first, the next are solved for where a certificate does not hold,
+    or where a gait lost more on its refined mesh than they are behind."""
+    tried: list[Solution] = []
+    for levels in contenders[:_CONTENDERS]:
+        best = max((s.value for s in tried if s.status == SOLVED), default=-np.inf)
+        promised = levels[-1].value - _REFINED * abs(levels[-1].value)
+        if tried and (promised < best or not goes_on()):
+            break
+        for level in levels:
+            if on_level is not None:
+                on_level(level)
+        tried.append(maximise_efficiency(problem, on_level, levels))
+    solved = [s for s in tried if s.status == SOLVED]
+    if not solved or tried[0].status == SOLVED:
+        return max(solved, key=lambda s: s.value, default=tried[0])
+    solution = max(solved, key=lambda s: s.value)
+    solution.message = f"{solution.message} A gait of {tried[0].value:.4f} is not certified: {tried[0].message}".strip()
     return solution
 
 

@@ -286,8 +286,8 @@ def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
     problem, gait, aim = found.space.problem, found.gait, AIM * 0.5 ** min(max(0, count - _SAME_AIM), _HALVINGS)
     mesh, delta = found.space.phase_mesh(gait), found.delta * gait.delta_unit
     points = min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS)
-    how = {"nested": count >= _SAME_AIM, "aim": aim, "most_points": points}
-    return planned_mesh(problem, mesh, gait, delta, problem.mesh_tolerance, kept=kept, **how)
+    nested, tolerance = count >= _SAME_AIM, problem.mesh_tolerance
+    return planned_mesh(problem, mesh, gait, delta, tolerance, kept=kept, nested=nested, aim=aim, most_points=points)
 
 
 def is_viscous(found: Found) -> bool:

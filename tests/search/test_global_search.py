@@ -10,7 +10,7 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load, save
-from colloc.search import global_search
+from colloc.search import global_search, optimise
 from colloc.search.global_search import candidates
 from colloc.search.optimise import best_gait
 
@@ -81,3 +81,30 @@ def test_hops_go_on_while_one_of_the_last_eight_led_on(monkeypatch, count, bette
     found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, lambda step: None)
     assert number == tried
     assert found[0].found.objective == -max(better.values())
+
+
+@pytest.mark.parametrize(
+    ("ends", "answer", "solved_for"),
+    [
+        ([("solved", 1.0), ("solved", 0.9)], 0, 1),
+        ([("certificate failed", 1.0), ("solved", 0.9), ("solved", 0.8)], 1, 2),
+        ([("solved", 0.7), ("solved", 0.9), ("solved", 0.8)], 1, 2),
+        ([("solved", 0.7), ("certificate failed", 0.9), ("solved", 0.8)], 2, 3),
+        ([("certificate failed", 1.0), ("not converged", 0.9), ("certificate failed", 0.8), ("solved", 0.7)], 0, 3),
+    ],
+    ids=["the best", "the best certified", "the best once refined", "both", "none of the first three"],
+)
+def test_the_answer_is_the_best_gait_whose_certificate_holds(monkeypatch, ends, answer, solved_for):
+    """Gaits promise 1, 0.9, 0.8, 0.7 before their meshes are refined."""
+    asked = []
+
+    def solution(problem, on_level, levels):
+        asked.append(levels)
+        status, value = ends[len(asked) - 1]
+        return SimpleNamespace(status=status, value=value, message="", number=len(asked) - 1)
+
+    monkeypatch.setattr(optimise, "maximise_efficiency", solution)
+    contenders = [[SimpleNamespace(value=1.0 - 0.1 * k)] for k in range(len(ends))]
+    found = optimise._best_certified(UNEQUAL, contenders, None, lambda: True)
+    assert (found.number, len(asked)) == (answer, solved_for)
+    assert bool(found.message) == (answer > 0 and ends[0][0] != "solved")
