@@ -249,8 +249,8 @@ def best_gait(
 def _best_certified(
     problem: Problem, contenders: list[list[Level]], on_level: Report | None, goes_on: Callable[[], bool]
 ) -> Solution:
-    """The best solution that levels lead to; the best ones come first, the next are solved for where a certificate does not hold,
-    or where a gait lost more on its refined mesh than they are behind."""
+    """The best solution that levels lead to, best first; the next ones are solved for where a certificate does not hold, or
+    where a gait lost more on its refined mesh than they are behind."""
     tried: list[Solution] = []
     for levels in contenders[:_CONTENDERS]:
         best = max((s.value for s in tried if s.status == SOLVED), default=-np.inf)
