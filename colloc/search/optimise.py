@@ -34,8 +34,9 @@ _SADDLES = 3
 """Saddles left one after another."""
 _CONTENDERS, _REFINED = 3, 0.01
 """Gaits that are solved for at most, until a certificate holds; what their values may lose on a refined mesh, as a share."""
-_DRIER = 2
-"""Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous."""
+_DRIER, _SMALL = 2, 2.0
+"""Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous: at most so many times
+the bound on the shape speed."""
 FINER = "a smaller mesh_tolerance"
 ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
@@ -174,9 +175,9 @@ def _off_saddles(solution: Solution, on_level: Report | None) -> Solution:
 
 
 def _is_small_and_viscous(solution: Solution) -> bool:
-    """Whether nothing fails but the influence of delta, at a gait that shrank to the bound on the shape speed."""
-    failed = _failed(solution)
-    return failed == ["delta influence"] and on_speed_floor(solution.problem, solution.gait)
+    """Whether nothing fails but the influence of delta, at a gait that shrank to the bound on the shape speed, or nearly."""
+    small = solution.gait.shape_speed < _SMALL * solution.problem.smallest_shape_speed
+    return small and _failed(solution) == ["delta influence"]
 
 
 def _at_smaller_delta(solution: Solution, asked: float, on_level: Report | None) -> Solution:
