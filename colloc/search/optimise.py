@@ -48,7 +48,11 @@ Report = Callable[[Level], None]
 
 def is_trivial(solution: Solution) -> bool:
     """Whether the search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
-    if not solution.levels or abs(solution.efficiency) * solution.problem.friction.smallest >= TRIVIAL_EFFICIENCY:
+    if not solution.levels:
+        return False
+    if solution.problem.slope is not None:
+        return solution.efficiency < TRIVIAL_EFFICIENCY
+    if abs(solution.efficiency) * solution.problem.friction.smallest >= TRIVIAL_EFFICIENCY:
         return False
     theta = solution.last.x[solution.layout.theta[0]]
     return not (solution.problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
@@ -134,10 +138,15 @@ def maximise_efficiency(
     begin = time.perf_counter()
     solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
     if problem.gait.free and is_trivial(solution):
-        solution.message = (
+        nowhere = (
             "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point). Try another "
             "guess, or an imposed symmetry."
         )
+        steep = (
+            f"no gait was found that climbs a grade of {problem.grade:g}, or goes the way asked for. Try a gentler slope, more "
+            "starts, or more harmonics."
+        )
+        solution.message = nowhere if problem.slope is None else steep
     else:
         _certified(solution)
         if problem.gait.free and not literal:

@@ -22,6 +22,7 @@ from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
+from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
 FACTOR = 0.2
@@ -191,6 +192,10 @@ def settled(
 ) -> Found:
     """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
+    if space.problem.slope is not None and np.isnan(program.objective(v)):
+        raise NotConvergedError(
+            "friction does not hold the body on the slope all the way, or its joints brake: take a gentler one."
+        )
     rested = at_rest(program, v, radius, accuracy, curvature, rounds)
     v, objective, conditions, iterations, evaluations, curvature = rested
     counts = iterations, evaluations, time.perf_counter() - begin

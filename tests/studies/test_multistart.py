@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from colloc.commands import multistart
-from colloc.gaits.equivalence import distance, images, phase_distance, reversed_in_time
+from colloc.results.equivalence import distance, images, phase_distance, reversed_in_time
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
