@@ -21,7 +21,7 @@ from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
 from colloc.search.prescribed import measured
-from colloc.search.reduced_search import FACTOR, Found, descended, kink_or_not, refined, searched
+from colloc.search.reduced_search import FACTOR, NOWHERE, Found, descended, kink_or_not, refined, searched
 from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.search.saddles import below_saddle
 from colloc.system.errors import NotConvergedError
@@ -51,7 +51,8 @@ def is_trivial(solution: Solution) -> bool:
     if not solution.levels:
         return False
     if solution.problem.slope is not None:
-        return solution.efficiency < TRIVIAL_EFFICIENCY
+        _, unit = in_friction_units(solution.problem)
+        return in_unit(solution.value, 1 / unit, solution.problem.objective) < NOWHERE
     if abs(solution.efficiency) * solution.problem.friction.smallest >= TRIVIAL_EFFICIENCY:
         return False
     theta = solution.last.x[solution.layout.theta[0]]

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from colloc.results.equivalence import distance, reversed_in_time, swapped
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
+from colloc.results.equivalence import distance, reversed_in_time, swapped
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
 from colloc.smooth.balance import solve_smooth
