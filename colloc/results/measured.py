@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,8 @@ from colloc.gaits.sloped import Slope
 from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.verification.replay import MixedPath, Path, Replay
-from colloc.verification.slope_replay import replayer
+from colloc.verification.replay import MixedPath, Path, Replay, replay
+from colloc.verification.slope_replay import slope_replay
 
 PARTS_OF_DELTA = (1.0, 0.1, 0.01)
 """At which a gait's value is to be known."""
@@ -84,7 +85,7 @@ def measured(
     that turns by more depends on the point that is followed. On a slope the path is a gait that says where it points.
     """
     replays: list[Replay] = []
-    run = replayer(slope)
+    run: Callable[..., Replay] = replay if slope is None else partial(slope_replay, slope=slope)
     smoothed = friction.regularised or "driven_work" in objective.uses
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
         near = replays[-1] if replays else None
