@@ -39,7 +39,7 @@ PLAIN = {
     "actuators": "No joint has to do more than it can, at any instant.",
     "replay gap": "An independent replay of the motion finds the same value.",
     "replay error": "The replay itself is as exact as was asked for.",
-    "work = dissipation": "All work of what bends the body goes into friction, on a slope also into the climb: energy is conserved.",
+    "work = dissipation": "All work of what bends the body goes into friction and, on a slope, the climb: energy is conserved.",
     "mesh error": "More time steps would hardly change the result.",
     "delta influence": "Friction is smoothed a little at rest; that hardly changes the result.",
     "direction": "The body goes where it was asked to go.",

@@ -133,6 +133,16 @@ class ReducedProgram:
         """As `SearchSpace.move_checks`; rows of actuators stay where they are."""
         return self.space.move_checks(v, later)
 
+    def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray:
+        """What limits on actuators add to the second derivatives ``(n, n)`` of multipliers times rows, as their largest values
+        between the points move."""
+        if self.actuators is None:
+            return np.zeros((v.size, v.size))
+        first = self._own_lower.size
+        mine = on_rows[first : first + self.actuators.placed.shape[1]]
+        phases = self.space.phase_mesh(self.space.member(v))
+        return self.actuators.of_moving_peaks(v, self.delta, self.space.member, phases, mine)
+
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""
         return -float(self._objective(self.motion.values(v, self.delta)))
