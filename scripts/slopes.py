@@ -1,4 +1,4 @@
-"""How steep crawlers climb: python -m scripts.slopes [--starts 8] [--output results]
+"""How steep crawlers climb: python -m scripts.slopes [--starts 16] [--output results]
 
 For three equal links, bilateral gaits of one to three harmonics and grades up to where none is found: the gait of least work
 per climb, beside the most efficient one on the level put on the same slope. A table, slopes.md, and a figure, slopes.png, which
@@ -8,6 +8,7 @@ also shows how an antipodal gait turns on a slope by itself.
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.results.solution import Solution
 from colloc.search.optimise import best_gait
+from colloc.system.errors import NotConvergedError
 from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.slope import slope_motion
 
@@ -42,9 +44,11 @@ def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], star
     guess = None
     for grade in grades:
         problem = Problem("slope", guess, friction=friction, gait=Harmonic(harmonics, "bilateral"), grade=grade)
-        best = best_gait(problem, starts)
-        found.append(best if best.certificate.replayed else None)
-        guess = best.gait if best.certificate.replayed else guess
+        best = None
+        with suppress(NotConvergedError):
+            best = best_gait(problem, starts)
+        found.append(best if best is not None and best.certificate.replayed else None)
+        guess = guess if found[-1] is None else found[-1].gait
     return found
 
 
@@ -97,7 +101,7 @@ def figure(curves: list[Curve], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--starts", type=int, default=8, metavar="N", help="of every search")
+    parser.add_argument("--starts", type=int, default=16, metavar="N", help="of every search")
     parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
     options = parser.parse_args()
     lines, curves = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"], list[Curve]()

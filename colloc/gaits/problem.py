@@ -56,8 +56,8 @@ class Problem:
         and polygons at unit shape speed, in body lengths per radian of path. By default 1e-4 for chains; 1e-2 for smooth
         bodies, whose panels have to resolve it.
     delta_start : float
-        Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), and 0.01 where delta is measured at unit
-        shape speed.
+        Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), 0.02 on a slope, and 0.01 where delta is
+        measured at unit shape speed.
     joint_limit : float or sequence of float
         Largest |joint angle| [rad], at most pi, of all joints or of each; of a smooth body, largest |tangent angle| from its
         mean direction, at most pi/2.

@@ -84,6 +84,9 @@ class PointedSeries(Fourier):
 class SlopeHarmonic(Harmonic):
     """The class `Harmonic` on a slope: its last parameter is where the tail link points at phase 0."""
 
+    delta_start = 0.02
+    """At more the body creeps down faster than it crawls up."""
+
     @property
     def fraction(self) -> float:
         return 1.0

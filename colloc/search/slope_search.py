@@ -8,7 +8,7 @@ from colloc.search.optimise import best_gait
 
 
 def climbing_gait(problem: Problem, grade: float, *, towards: float | None = None, starts: int | None = None) -> Solution:
-    """`best_gait` of a problem with a slope put under it, on the mesh that is usual there.
+    """`best_gait` of a problem with a slope put under it, on the mesh and from the delta that are usual there.
 
     Parameters
     ----------
@@ -25,4 +25,4 @@ def climbing_gait(problem: Problem, grade: float, *, towards: float | None = Non
     >>> found.status, round(found.certificate.value, 2)
     ('solved', 0.09)
     """
-    return best_gait(problem.with_(grade=grade, towards=towards, intervals=None), starts)
+    return best_gait(problem.with_(grade=grade, towards=towards, intervals=None, delta_start=None), starts)
