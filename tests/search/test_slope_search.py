@@ -1,5 +1,7 @@
 """Problems on a slope: solved, certified, kept and shown like any other; no gait or heading beside the one found is better."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -23,7 +25,7 @@ from colloc.mechanics.bodies import FULL
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
-from colloc.results.certificate import gait_certificate
+from colloc.results.certificate import _one_motion, gait_certificate
 from colloc.search.friction_unit import in_friction_units
 from colloc.search.optimise import maximise_efficiency
 from colloc.search.slope_search import climbing_gait
@@ -116,6 +118,12 @@ def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
     space, v = space_near(PROBLEM, uphill.gait, edges)
     own = -ReducedProgram(space, 1e-2).objective(v)
     assert coarse.total == pytest.approx(own / uphill.certificate.value - 1, rel=1e-2)
+
+
+def test_a_motion_that_is_left_open_for_long_fails_its_check():
+    for several, passes in ((0.9e-3, True), (1.1e-3, False)):
+        check = _one_motion(PROBLEM, SimpleNamespace(several=several))
+        assert (check.name, check.passed) == ("one motion", passes)
 
 
 def test_friction_and_the_pull_have_one_unit():
