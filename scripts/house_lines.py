@@ -30,7 +30,8 @@ NEW = {
     "the best of many starts, and of hops from the best": "search/global_search",
     "optima, saddles and kinks told apart": "reduced/second_order search/saddles numerics/kinks",
     "slopes": (
-        "verification/gait_on_slope verification/slope verification/heading_map reduced/slope_program search/slope_search"
+        "gaits/sloped numerics/orientation verification/gait_on_slope verification/slope verification/heading_map "
+        "verification/collocated_slope verification/slope_replay reduced/sloped search/slope_search"
     ),
     "IPOPT's word on every answer": "search/full_program",
     "instants with several balanced motions": "mechanics/solution_branches verification/followed_motion",

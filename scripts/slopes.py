@@ -1,4 +1,4 @@
-"""How steep crawlers climb: python -m scripts.slopes [--starts 8] [--output results]
+"""How steep crawlers climb: python -m scripts.slopes [--starts 16] [--output results]
 
 For three equal links, bilateral gaits of one to three harmonics and grades up to where none is found: the gait of least work
 per climb, beside the most efficient one on the level put on the same slope. A table, slopes.md, and a figure, slopes.png, which
@@ -8,6 +8,7 @@ also shows how an antipodal gait turns on a slope by itself.
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.style import SERIES, save, styled, subplots
-from colloc.search.slope_search import ClimbingGait, climbing_gait
+from colloc.results.solution import Solution
+from colloc.search.optimise import best_gait
 from colloc.system.errors import NotConvergedError
 from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.slope import slope_motion
@@ -36,32 +38,40 @@ HEAD = (
 _PERIODS, _GRADE, _HEADINGS = 60, 0.05, np.pi * np.array([0.05, 0.3, 0.6, -0.2, -0.45, -0.8])
 
 
-def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], starts: int) -> list[ClimbingGait | None]:
+def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], starts: int) -> list[Solution | None]:
     """The best gait found for every grade, from the one before as a guess; None where none climbs."""
-    problem = Problem("slope", friction=friction, gait=Harmonic(harmonics, "bilateral"))
-    found: list[ClimbingGait | None] = []
+    found: list[Solution | None] = []
+    guess = None
     for grade in grades:
-        try:
-            best = climbing_gait(problem, grade, starts=starts)
-        except NotConvergedError:
-            found.append(None)
-            continue
-        found.append(best)
-        problem = problem.with_(guess=best.gait)
+        problem = Problem("slope", guess, friction=friction, gait=Harmonic(harmonics, "bilateral"), grade=grade)
+        best = None
+        with suppress(NotConvergedError):
+            best = best_gait(problem, starts)
+        found.append(best if best is not None and best.certificate.replayed else None)
+        guess = guess if found[-1] is None else found[-1].gait
     return found
 
 
-def row(scene: str, harmonics: int, grade: float, best: ClimbingGait | None, level: SlopeMotion) -> str:
+def heading(best: Solution) -> float:
+    """Direction in which a gait would go on the level, from straight uphill [deg]."""
+    if best.problem.slope is None:
+        return 0.0
+    at = best.problem.body, best.problem.friction, best.gait, best.delta_per_period, best.problem.grade
+    return float(np.degrees(np.angle(np.exp(1j * slope_motion(*at, tolerance=1e-4).headings[0]))))
+
+
+def row(scene: str, harmonics: int, grade: float, best: Solution | None, level: SlopeMotion) -> str:
     """A line of the table."""
     plain = f"{level.climb[0] / level.joint_work[0]:.4f}" if level.climb[0] > 0 else "slides back"
     if best is None:
         return f"| {scene} | {harmonics} | {grade:g} | none found | | | | {plain} | |"
-    ran, verdict = best.motion, "all hold" if best.passed else "not: " + ", ".join(c.name for c in best.checks if not c.passed)
-    numbers = f"{best.value:.4f} | {ran.climb[0]:.4f} | {ran.joint_work[0]:.4f} | {round(np.degrees(best.heading)) + 0:d}"
+    found = best.certificate
+    verdict = "all hold" if found.passed else "not: " + ", ".join(check.name for check in found.failures)
+    numbers = f"{found.value:.4f} | {found.distance:.4f} | {found.work:.4f} | {round(heading(best)) + 0:d}"
     return f"| {scene} | {harmonics} | {grade:g} | {numbers} | {plain} | {verdict} |"
 
 
-Curve = tuple[str, tuple[float, ...], list[ClimbingGait | None], list[SlopeMotion]]
+Curve = tuple[str, tuple[float, ...], list[Solution | None], list[SlopeMotion]]
 """A scene, its grades, the best gaits for them, and the gait that is best on the level at each."""
 
 
@@ -70,7 +80,7 @@ def figure(curves: list[Curve], path: Path) -> None:
     with styled():
         drawn, (left, right) = subplots(1, 2, figsize=(8.4, 3.6))
         for colour, (name, grades, found, levels) in zip(SERIES, curves, strict=False):
-            climbs = [(grade, best.value) for grade, best in zip(grades, found, strict=True) if best is not None]
+            climbs = [(grade, best.certificate.value) for grade, best in zip(grades, found, strict=True) if best is not None]
             left.plot(*zip(*climbs, strict=True), "o-", color=colour, markersize=4, label=name)
             plain: list[float] = [ran.climb[0] / ran.joint_work[0] if ran.joint_work[0] > 0 else np.nan for ran in levels]
             left.plot(grades, plain, ":", color=colour)
@@ -91,7 +101,7 @@ def figure(curves: list[Curve], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--starts", type=int, default=8, metavar="N", help="of every search")
+    parser.add_argument("--starts", type=int, default=16, metavar="N", help="of every search")
     parser.add_argument("--output", type=Path, default=Path("results"), metavar="FOLDER")
     options = parser.parse_args()
     lines, curves = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"], list[Curve]()

@@ -33,7 +33,7 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
         return None
     if not _bounded(problem):
         if compute:
-            raise ProblemError("upper bounds are of the efficiency of gaits that do not turn.")
+            raise ProblemError("upper bounds are of the efficiency, on the level, of gaits that do not turn.")
         return None
     domain, cache = (problem.body, friction, widest(problem.joint_limit)), folder / CACHE
     try:
@@ -45,7 +45,8 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
 
 def _bounded(problem: Problem) -> bool:
     """Work that depends on the pace has no bound per distance: a slow gait pays as little as it likes."""
-    return problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.friction)
+    on_level = problem.slope is None
+    return on_level and problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.friction)
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:

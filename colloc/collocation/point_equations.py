@@ -25,7 +25,9 @@ from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.objective import QUANTITIES, Objective
 from colloc.gaits.problem import Problem
+from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.actuators import driven_power
+from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, local_function, total_function
@@ -41,12 +43,12 @@ _AT_REST = 1e-12
 
 
 @lru_cache(maxsize=32)
-def point_function(formulation: str, body: Body, friction: Law) -> LocalFunction:
-    """Outputs at a mesh point: equations that must vanish, then rate of distance and power.
+def point_function(formulation: str, body: Body, friction: Law, slope: Slope | None = None) -> LocalFunction:
+    """Outputs at a mesh point: equations that must vanish, then rate of distance and power; on a slope that of the joints.
 
     Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links.
     """
-    return _full_point(body, friction) if formulation == FULL else _map_point(body, friction)
+    return _full_point(body, friction, slope) if formulation == FULL else _map_point(body, friction)
 
 
 def _symbols(body: Body) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -60,12 +62,24 @@ def forward(theta: ca.SX, centre: ca.SX) -> ca.SX:
     return ca.cos(theta) * centre[0] - ca.sin(theta) * centre[1]
 
 
-def _full_point(body: Body, friction: Law) -> LocalFunction:
+def _full_point(body: Body, friction: Law, slope: Slope | None) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
     forces = ca.SX.sym("forces", body.n_force)
-    lifted = body.with_forces(friction, angles, rates, z, forces, delta)
-    out = ca.vertcat(lifted.laws, lifted.balance, forward(theta, lifted.centre), lifted.power)
+    laws, balance, centre, power = body.with_forces(friction, angles, rates, z, forces, delta)
+    ahead = forward(theta, centre)
+    if slope is not None:
+        chain = checked_chain(body, friction, slope.grade)
+        balance += load_wrench(chain, chain.posture(angles), slope.pull(theta))
+        ahead, power = forward(theta - slope.ahead, centre), power + slope.grade * ahead
+    out = ca.vertcat(laws, balance, ahead, power)
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
+
+
+def across_point(body: Body, friction: Law, slope: Slope) -> LocalFunction:
+    """Velocity of the centre of mass to the left of the direction whose way counts."""
+    theta, angles, rates, z, delta = _symbols(body)
+    out = forward(theta - slope.ahead - 0.5 * np.pi, body.sliding(friction, angles, rates, z, delta).centre)
+    return local_function("across", ca.vertcat(theta, angles, rates, z), ca.SX(0, 1), delta, out)
 
 
 def _map_point(body: Body, friction: Law) -> LocalFunction:

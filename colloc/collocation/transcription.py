@@ -8,7 +8,9 @@ The balance itself is a step function of the tail velocity as delta goes to 0. T
 each is a variable, tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0, and the balance is linear.
 "implicit velocity" puts z - Z(angles, rates) = 0 in the place of the balance, with Z the velocity that balances the body.
 x is the displacement of the centre of mass along a fixed direction. The first orientation is free, so maximising x
-turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable.
+turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable. On a slope
+the balance contains the weight's pull, which depends on theta, the first theta is the last parameter of the gait, and x is the
+way in the direction that counts.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_m
 from colloc.collocation.point_equations import (
     N_RATE,
     BlockParts,
+    across_point,
     actuator_rows,
     driven_point,
     gait_check,
@@ -46,6 +49,7 @@ from colloc.numerics.constraint_rows import (
     quadrature_group,
     rotation_groups,
     selector,
+    zero_total_group,
 )
 from colloc.numerics.mesh import Mesh
 
@@ -73,7 +77,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body, far)
     friction = problem.friction.in_speeds_of(RADIANS)
-    point = point_function(problem.formulation, problem.body, friction)
+    point = point_function(problem.formulation, problem.body, friction, problem.slope)
     n_joint = problem.body.n_joint
     n_parameter = layout.parameters.shape[0]
 
@@ -97,6 +101,10 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         "driven_work": lambda: (driven_point(problem.body, friction), own, none),
     }
     besides = period_rows(problem, layout, mesh, densities, RADIANS) | actuator_rows(problem, layout, friction, RADIANS)
+    if problem.slope is not None and problem.towards is not None:
+        across = across_point(problem.body, friction, problem.slope)
+        parts = across, point_gather[: across.n_local], none
+        besides["across"] = parts, zero_total_group("across", mesh, layout.n)
     blocks |= {name: parts for name, (parts, _) in besides.items()}
 
     rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
@@ -127,8 +135,8 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
 
 def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
-    # a function bounded by L has Fourier coefficients of at most 4 L / pi
-    lower[layout.parameters], upper[layout.parameters] = np.array([-4.0, 4.0]) * widest(problem.joint_limit) / np.pi
+    upper[layout.parameters[:, 0]] = problem.gait.largest_parameters(problem.body.n_joint, widest(problem.joint_limit))
+    lower[layout.parameters] = -upper[layout.parameters]
     if layout.forces.size:
         limit = problem.body.largest_forces(problem.friction)
         lower[layout.forces], upper[layout.forces] = -limit, limit
@@ -147,10 +155,12 @@ def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Gr
 
 
 def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Group]:
-    """theta' = omega, and how theta closes where no symmetry does it."""
+    """theta' = omega, how theta closes where no symmetry does it, and on a slope where it begins."""
     state, rate = mesh.integration()
     linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
+    begin = selector(layout.theta[0, :1], layout.n) - selector(layout.parameters[-1], layout.n)
     return [
         equalities("orientation", linear),
-        *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n, problem.rotation),
+        *rotation_groups(problem.gait.closing_symmetry, layout.theta[0], layout.n, problem.rotation),
+        *([] if problem.slope is None else [equalities("heading", begin)]),
     ]

@@ -32,6 +32,7 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
         lines += [f"  search          {text}" for text in _search_lines(solution)]
         reason = solution.problem.paced_by
         paced = f"; run in a period of 1, as {reason}" if reason else ""
+        lines += [] if solution.problem.slope is None else [f"  ground          {solution.problem.slope.describe()}"]
         gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
         lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]

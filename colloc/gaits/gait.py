@@ -36,6 +36,8 @@ class GaitFunction:
 
     is_series = False
     """Whether it is a Fourier series of the phase."""
+    theta: float | None = None
+    """Where the tail link points at phase 0, of a gait for a slope (`colloc.gaits.sloped`)."""
 
     @property
     def n_joint(self) -> int:
@@ -164,6 +166,21 @@ class ClassOfGaits:
     def fraction(self) -> float:
         """The part of the period that has to be solved; symmetry gives the rest."""
         return fraction(self.symmetry)
+
+    @property
+    def motion_symmetry(self) -> str:
+        """That of the motion, which gives the rest of it."""
+        return self.symmetry
+
+    @property
+    def closing_symmetry(self) -> str:
+        """What is known of the net rotation of all members: that of gaits with this symmetry."""
+        return self.symmetry
+
+    @property
+    def level(self) -> Any:
+        """The class on the level."""
+        return self
 
     def describe(self) -> str:
         """The class in words, for reports."""

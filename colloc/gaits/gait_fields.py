@@ -18,6 +18,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.relaxed import Mixture, Relaxed
+from colloc.gaits.sloped import PointedSeries
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
@@ -31,21 +32,28 @@ from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
 from colloc.system.arguments import STATED_IF_SET
+from colloc.system.errors import ProblemError
 
 AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases)
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases, PointedSeries)
 CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 """Laws of friction that files can hold, Coulomb's first; a law of your own making is added to the list."""
-_AIMS = 5
+_AIMS = 7
 """The last fields of a problem say what is asked of a gait, from the objective on; what is usual of them is left out."""
 _EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
 """What earlier files call the formulations; those of paths name none."""
+
+
+def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None) -> None:
+    """A `ProblemError` for a part of a problem that is of none of some kinds, or does not answer what they do."""
+    if isinstance(value, type) or not isinstance(value, answers or tuple(kinds)):
+        raise ProblemError(f"{name} must be a {' or '.join(kind.__name__ for kind in kinds)}, not {type(value).__name__}.")
 
 
 def fields(value: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 Phase t runs over one period, 0 <= t <= 1. Symmetries of a gait q(t), joints counted from the tail:
 
 - ``bilateral``: q_j(-t) = -q_(n+1-j)(t). The body at -t, seen from its head, has the shape it has at t. For any
-  friction the net rotation vanishes (paper, appendix A; see `colloc.gaits.equivalence`) and the second half period repeats the
+  friction the net rotation vanishes (paper, appendix A; `colloc.results.equivalence`) and the second half period repeats the
   first half's displacement and work.
 - ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
 - ``none``.
@@ -226,9 +226,19 @@ class Harmonic(ClassOfGaits):
         gait = gait.resized(self.harmonics)
         if self.symmetry != "bilateral":
             gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
+        return self.nearest(gait)
+
+    def nearest(self, gait: Fourier) -> np.ndarray:
+        """The parameter vector of the class member nearest to `gait`, in its phase."""
+        gait = gait.resized(self.harmonics)
         table = np.zeros((gait.n_joint, 2 * self.harmonics + 1))
         table[:, 0], table[:, 1::2], table[:, 2::2] = gait.mean, gait.cos, gait.sin
         return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
+
+    def largest_parameters(self, n_joint: int, limit: float) -> np.ndarray:
+        """Bounds on the parameters ``(n_parameter,)`` of gaits whose angles keep a limit: a function bounded by L has Fourier
+        coefficients of at most 4 L / pi."""
+        return np.full(self.size(n_joint), 4 * limit / np.pi)
 
     def angle_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
         """``(n_time, n_joint, n_parameter)``: joint angles at phases t per parameter."""

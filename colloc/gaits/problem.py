@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from colloc.gaits import gait_fields
-from colloc.gaits.gait_fields import AnyClass, AnyGait
+from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.guesses import check_guess, travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
+from colloc.gaits.sloped import Slope, check_asked, class_on, slope_from
+from colloc.gaits.symmetry import NONE, check_symmetric
 from colloc.mechanics.actuators import ActuatorLimits
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
@@ -56,8 +56,8 @@ class Problem:
         and polygons at unit shape speed, in body lengths per radian of path. By default 1e-4 for chains; 1e-2 for smooth
         bodies, whose panels have to resolve it.
     delta_start : float
-        Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), and 0.01 where delta is measured at unit
-        shape speed.
+        Where the continuation in delta begins; by default 0.1 (smooth bodies: 0.3), 0.02 on a slope, and 0.01 where delta is
+        measured at unit shape speed.
     joint_limit : float or sequence of float
         Largest |joint angle| [rad], at most pi, of all joints or of each; of a smooth body, largest |tangent angle| from its
         mean direction, at most pi/2.
@@ -86,6 +86,11 @@ class Problem:
     torque_limit, power_limit : float or sequence of float, optional
         The most that the joints' actuators can do, all or each: magnitude of the moment [weight x body length], power
         delivered [weight x body length / period]. With a power limit the pace matters.
+    grade : float
+        Tangent of the inclination of the ground; 0 is the level (docs/howto/slopes.md). On a slope "distance" is the climb and
+        "work" that of the joints, and where the body points is sought with the gait.
+    towards : float, optional
+        Direction on a slope whose way counts instead of the climb, with none across it, from straight uphill to the left [rad].
 
     Examples
     --------
@@ -120,12 +125,17 @@ class Problem:
     at_least: tuple[tuple[Objective, float], ...] = ()
     torque_limit: Limit | None = None
     power_limit: Limit | None = None
+    grade: float = 0.0
+    towards: float | None = None
 
     def __post_init__(self) -> None:
-        self._check_body()
+        check_kind("body", self.body, gait_fields.BODIES, Body)
         schedule = self.body.schedule
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())
         self._check_parts()
+        slope = self.slope
+        object.__setattr__(self, "gait", class_on(slope, self.gait))
+        object.__setattr__(self, "grade", 0.0 if slope is None else slope.grade)
         usual = self.body.usual
         start = (self.gait.delta_start or usual.delta_start) if self.friction.regularised else usual.delta
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
@@ -133,12 +143,13 @@ class Problem:
         self._check_numbers()
         self._check_aims()
         self._check_actuators()
+        if self.slope is not None:
+            check_asked(self)
         if self.guess is None:
             free = self.gait.free
             self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
-        if not isinstance(self.guess, gait_fields.GAITS):
-            raise ProblemError(f"guess must be a {_names(gait_fields.GAITS)}, not {type(self.guess).__name__}.")
-        self._check_symmetry()
+        check_kind("guess", self.guess, gait_fields.GAITS)
+        self._check_gaits()
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
     def _fill(self, **usual: object) -> None:
@@ -147,10 +158,6 @@ class Problem:
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
 
-    def _check_body(self) -> None:
-        if isinstance(self.body, type) or not isinstance(self.body, Body):
-            raise ProblemError(f"body must be a {_names(gait_fields.BODIES)}, not {type(self.body).__name__}.")
-
     def _check_parts(self) -> None:
         if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
             raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
@@ -158,10 +165,8 @@ class Problem:
             raise ProblemError(
                 f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
             )
-        for field, kind, kinds in (("friction", Law, gait_fields.LAWS), ("gait", gait_fields.CLASSES, gait_fields.CLASSES)):
-            value = getattr(self, field)
-            if isinstance(value, type) or not isinstance(value, kind):
-                raise ProblemError(f"{field} must be a {_names(kinds)}, not {type(value).__name__}.")
+        check_kind("friction", self.friction, gait_fields.LAWS, Law)
+        check_kind("gait", self.gait, gait_fields.CLASSES)
         if self.gait.free == bool(self.body.schedule):
             what = "a prescribed motion has no class of gaits" if self.gait.free else "this body's motion is not prescribed"
             raise ProblemError(f"{what}; leave gait out, or take another body.")
@@ -226,6 +231,11 @@ class Problem:
         return ActuatorLimits(*(of_each(limit, self.body.n_joint) for limit in (self.torque_limit, self.power_limit)))
 
     @property
+    def slope(self) -> Slope | None:
+        """The slope the body is on; None on the level."""
+        return slope_from(self.body, self.friction, self.grade, self.towards)
+
+    @property
     def paced_by(self) -> str:
         """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
         if self.power_limit is not None:
@@ -252,17 +262,9 @@ class Problem:
                 f"use at least {fewest}."
             )
 
-    def _check_symmetry(self) -> None:
-        needed = {BILATERAL, ANTIPODAL} if self.gait.symmetry == BOTH else {self.gait.symmetry}
-        if not needed <= set(self.body.symmetries):
-            raise ProblemError(
-                f"a {self.gait.symmetry} gait needs a body whose lengths read the same from both ends; "
-                f"gaits of this one may have the symmetry {' or '.join(self.body.symmetries)}."
-            )
-        for name in ("joint_limit", "torque_limit", "power_limit"):
-            limit = getattr(self, name)
-            if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
-                raise ProblemError(f"a {self.gait.symmetry} gait bends mirrored joints alike: give them the same {name}.")
+    def _check_gaits(self) -> None:
+        """That the body has gaits of the class."""
+        check_symmetric(self)
         self.gait.check_joints(self.body.n_joint)
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
@@ -276,9 +278,9 @@ class Problem:
     def __repr__(self) -> str:
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
-        return (
-            f"<Problem {self.name}: {best}{coordinates}, {self.friction.label}, {self.gait.describe()}, delta {self.delta:.0e}>"
-        )
+        grade = f", grade {self.grade:g}" if self.grade else ""
+        scene = f"{coordinates}, {self.friction.label}{grade}, {self.gait.describe()}"
+        return f"<Problem {self.name}: {best}{scene}, delta {self.delta:.0e}>"
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""
@@ -306,7 +308,3 @@ class Problem:
     def hash(self) -> str:
         """SHA-256 of the fields: equal problems have equal hashes."""
         return gait_fields.statement_hash(self.to_dict())
-
-
-def _names(kinds: Sequence[type]) -> str:
-    return " or ".join(kind.__name__ for kind in kinds)

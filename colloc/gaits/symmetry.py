@@ -12,7 +12,11 @@ head ``(S q)_j = -q_(n+1-j)``:
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+
+from colloc.system.errors import ProblemError
 
 NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")
 BOTH = "both"
@@ -65,3 +69,18 @@ def tangent_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndar
         zero = np.zeros_like(rows)
         return np.vstack([rows, zero]), np.vstack([zero, rows])
     return (unit if symmetry == ANTIPODAL else -unit), unit
+
+
+def check_symmetric(problem: Any) -> None:
+    """A `ProblemError` if the body of a problem has no gaits with the symmetry of its class, or its limits forbid them."""
+    symmetry = problem.gait.symmetry
+    needed = {BILATERAL, ANTIPODAL} if symmetry == BOTH else {symmetry}
+    if not needed <= set(problem.body.symmetries):
+        raise ProblemError(
+            f"a {symmetry} gait needs a body whose lengths read the same from both ends; "
+            f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
+        )
+    for name in ("joint_limit", "torque_limit", "power_limit"):
+        limit = getattr(problem, name)
+        if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
+            raise ProblemError(f"a {symmetry} gait bends mirrored joints alike: give them the same {name}.")

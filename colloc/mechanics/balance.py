@@ -60,11 +60,11 @@ def net_force(posture: Posture, force: LinkForce) -> Array:
     return xp.stack([xp.sum_rows(fx), xp.sum_rows(fy), xp.sum_rows(torque)])
 
 
-def load_wrench(body: Links, posture: Posture, load: np.ndarray) -> np.ndarray:
+def load_wrench(body: Links, posture: Posture, load: Array) -> Array:
     """An outside force ``(2, n_time)``, in body-frame axes, that acts at the centre of mass: force and torque about the
     reference, ``(3, n_time)``, to be added to `net_force`."""
     x, y = body.centre_of_mass(posture)
-    return np.stack([load[0], load[1], (x * load[1] - y * load[0])[0]])
+    return namespace(load).stack([load, x * load[1:2, :] - y * load[0:1, :]])
 
 
 def load_power(body: Links, posture: Posture, velocity: LinkVelocity, load: np.ndarray) -> np.ndarray:

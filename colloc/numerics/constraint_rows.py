@@ -85,6 +85,12 @@ def total_group(name: str, variable: np.ndarray, mesh: Mesh, n: int, unit: float
     return equalities(name, selector(variable[0], n), {name: sparse.csr_matrix(-unit * rate.sum(axis=0))})
 
 
+def zero_total_group(name: str, mesh: Mesh, n: int) -> Group:
+    """The integral over the mesh of the output of the block `name` vanishes."""
+    _, rate = mesh.quadrature()
+    return equalities(name, sparse.csr_matrix((1, n)), {name: sparse.csr_matrix(rate.sum(axis=0))})
+
+
 def block_group(name: str, lower: np.ndarray | float, upper: np.ndarray | float, rows: int, n: int, block: str = "") -> Group:
     """Outputs of a block, by default of the same name, between bounds."""
     low, high = (np.full(rows, bound, dtype=float) for bound in (lower, upper))

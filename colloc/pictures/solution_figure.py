@@ -47,7 +47,7 @@ def _headline(solution: Solution) -> str:
     return (
         f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}{near}   "
         f"{problem.friction.label},  δ = {solution.last.delta:.0e}{verdict}\n"
-        f"class: {problem.gait.describe()}"
+        f"class: {problem.gait.describe()}{'' if problem.slope is None else f';  {problem.slope.describe()} (x: uphill)'}"
     )
 
 
@@ -60,7 +60,8 @@ def _of_motion(solution: Solution) -> _Panels:
     else:  # no one plane shows them all
         found["shape"] = lambda axes: draw_angles(axes, t, angles, problem.body)
     found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(axes, solution, t)
-    found[f"W = {solution.measured.work:.4f} a period (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
+    spent = "W" if problem.slope is None else "against friction; W of the joints"
+    found[f"{spent} = {solution.measured.work:.4f} a period (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
     return found
 
 

@@ -7,6 +7,8 @@ whenever the checks are moved, this leaves nothing over once the gait rests.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from colloc.collocation.point_equations import ACTUATORS
@@ -23,6 +25,8 @@ _NEAR = 0.3
 """A value that is nearer to its bound than this, over the limit, is among the rows."""
 _ZOOMS, _CLOSE = 2, 0.02
 """Samples are laid again, 8 times as densely, round the highest of an interval that is nearer than this to its limit."""
+_ZOOMS_TO_PEAK, _SHIFT, _STEP = 4, 1e-2, 1e-5
+"""A peak is known to 1e-5 of its interval; shift of it, as a share of that, and step of parameters for differences."""
 _EXACT = 3e-5
 """Excess over a limit that counts as none, relative: less than a certificate allows."""
 
@@ -79,9 +83,40 @@ class ActuatorRows:
 
     def _shares_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
         """Magnitudes at phases, ``(n_share, n_time)``."""
+        return self._magnitudes(self._signed_at(gait, delta, t))
+
+    def _signed_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
         body, at = self._motion.body, (self._motion.friction, gait.angles(t), gait.rates(t))
-        z = body.solve(*at, delta).z
-        return self._magnitudes(self._limits.shares_in_balance(body, *at, z, delta))
+        return self._limits.shares_in_balance(body, *at, body.solve(*at, delta).z, delta)
+
+    def of_moving_peaks(
+        self, v: np.ndarray, delta: float, member: Callable[[np.ndarray], AnyGait], phases: Mesh, on_rows: np.ndarray
+    ) -> np.ndarray:
+        """What is added to the second derivatives ``(n, n)`` of multipliers times rows, as the largest values between the
+        points move with the gait (`colloc.reduced.second_order`); `member` gives gaits, `phases` is the mesh of that of v."""
+        held = np.flatnonzero(on_rows)
+        (share, point), on_rows = self.placed[:, held], on_rows[held]
+        interval = (self._motion.mesh.points[:, :, None] == point).any(axis=1).argmax(axis=0)
+        each, left, width = np.arange(held.size), phases.edges[interval], phases.h[interval]
+
+        def shares(at: np.ndarray, t: np.ndarray) -> np.ndarray:
+            """Of every row ``(n_row, k)``, for parameters and phases of that shape."""
+            gait = member(at)
+            return self._signed_at(gait, delta * gait.delta_unit, t.ravel()).reshape(-1, *t.shape)[share, each]
+
+        peak, reach = left + 0.5 * width, 0.5 * width
+        for _ in range(_ZOOMS_TO_PEAK if held.size else 0):
+            t = np.clip(peak[:, None] + reach[:, None] * (2 * _SAMPLES - 1), left[:, None], (left + width)[:, None])
+            peak = t[each, np.abs(shares(v, t)).argmax(axis=1)]
+            reach = reach / 8
+        t = peak[:, None] + _SHIFT * width[:, None] * np.array([-1.0, 0.0, 1.0])
+        low, here, high = shares(v, t).T
+        steps = _STEP * np.eye(v.size)
+        slopes = np.array([shares(v + step, t) - shares(v - step, t) for step in steps]) / (2 * _STEP)
+        bend, turning = low - 2 * here + high, 0.5 * (slopes[:, :, 2] - slopes[:, :, 0])
+        moves = (on_rows * bend < 0) & (np.abs(high - low) < np.abs(bend))  # else it lies on an edge of its interval
+        turning = turning[:, moves]
+        return -turning @ ((on_rows[moves] / bend[moves])[:, None] * turning.T)
 
     def _magnitudes(self, shares: np.ndarray) -> np.ndarray:
         """What a bound from above is laid on: moments are bounded both ways."""

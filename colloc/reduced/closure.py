@@ -21,7 +21,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 
 _ACCURACY, _STEPS, _INTERVALS = 1e-8, 30, 30
-_ELSE_FREE = {"at_least": (), "torque_limit": None, "power_limit": None}
+_ELSE_FREE = {"at_least": (), "torque_limit": None, "power_limit": None, "grade": 0.0, "towards": None}
 
 
 class _Nearest:

@@ -43,9 +43,9 @@ class HarmonicSpace:
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
-        # a function bounded by L has Fourier coefficients of at most 4 L / pi; coordinates may be larger than what is bounded
+        # coordinates may be larger than what is bounded
         largest = max(1.0, np.abs(np.linalg.pinv(problem.body.limited)).sum(axis=1).max())
-        self.upper = np.full(self.n, 4 * widest(limit) / np.pi * largest)
+        self.upper = largest * gait.largest_parameters(n_joint, widest(limit))
         self.lower = -self.upper
         self.own = np.arange(self.n)
         self.move_checks(np.zeros(self.n))
@@ -70,11 +70,11 @@ class HarmonicSpace:
 
     def remeshed(self, gait: Fourier, edges: np.ndarray, scheme: str) -> HarmonicSpace:
         """The class on another mesh."""
-        return HarmonicSpace(self.problem, edges, scheme, self.far)
+        return type(self)(self.problem, edges, scheme, self.far)
 
     def with_far(self, far: Pairs) -> HarmonicSpace:
         """The class with other pairs of links kept apart."""
-        return HarmonicSpace(self.problem, self.mesh.edges, self.mesh.scheme.name, far)
+        return type(self)(self.problem, self.mesh.edges, self.mesh.scheme.name, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""

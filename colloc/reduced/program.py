@@ -14,6 +14,7 @@ from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.actuator_rows import ActuatorRows
 from colloc.reduced.motion import ReducedMotion, Shapes
+from colloc.reduced.sloped import SlopedMotion
 
 
 class SearchSpace(Shapes, Protocol):
@@ -69,8 +70,8 @@ class SearchSpace(Shapes, Protocol):
 class ReducedProgram:
     """Maximise a problem's objective over a class of gaits on a mesh, at one delta.
 
-    Rows: net rotation where it is prescribed and no symmetry closes it, what must be reached at least, what actuators can do,
-    the space's.
+    Rows: net rotation where it is prescribed and no symmetry closes it, on a slope the way across a direction that is asked
+    for, what must be reached at least, what actuators can do, the space's.
 
     Attributes
     ----------
@@ -85,11 +86,14 @@ class ReducedProgram:
         self.space, self.delta = space, delta
         problem = space.problem
         besides = [name for name in ("length", "driven_work") if problem.uses(name)]
-        self.motion = ReducedMotion(problem.body, problem.friction, problem.gait.symmetry, space.mesh, space, besides)
-        turns = [problem.rotation] if problem.gait.symmetry == NONE and problem.rotation is not None else []
-        least = [value for _, value in problem.at_least]
-        self._objective, self._closes, self._reached = problem.objective, bool(turns), [aim for aim, _ in problem.at_least]
-        self._own_lower, self._own_upper = np.array([*turns, *least]), np.array([*turns, *np.full(len(least), np.inf)])
+        at = problem.body, problem.friction, problem.gait.motion_symmetry, space.mesh, space, besides
+        self.motion = ReducedMotion(*at) if problem.slope is None else SlopedMotion(*at, problem.slope)
+        held = {"rotation": problem.rotation} if problem.gait.closing_symmetry == NONE else {}
+        held |= {} if problem.towards is None else {"across": 0.0}
+        self._held = [name for name, value in held.items() if value is not None]
+        equal, least = [held[name] for name in self._held], [value for _, value in problem.at_least]
+        self._objective, self._reached = problem.objective, [aim for aim, _ in problem.at_least]
+        self._own_lower, self._own_upper = np.array([*equal, *least]), np.array([*equal, *np.full(len(least), np.inf)])
         limits = problem.actuator_limits
         self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
@@ -129,6 +133,16 @@ class ReducedProgram:
         """As `SearchSpace.move_checks`; rows of actuators stay where they are."""
         return self.space.move_checks(v, later)
 
+    def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray:
+        """What limits on actuators add to the second derivatives ``(n, n)`` of multipliers times rows, as their largest values
+        between the points move."""
+        if self.actuators is None:
+            return np.zeros((v.size, v.size))
+        first = self._own_lower.size
+        mine = on_rows[first : first + self.actuators.placed.shape[1]]
+        phases = self.space.phase_mesh(self.space.member(v))
+        return self.actuators.of_moving_peaks(v, self.delta, self.space.member, phases, mine)
+
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""
         return -float(self._objective(self.motion.values(v, self.delta)))
@@ -149,12 +163,12 @@ class ReducedProgram:
     def rows(self, v: np.ndarray) -> np.ndarray:
         """Values of the rows."""
         values = self.motion.values(v, self.delta) if self._own_lower.size else {}
-        own = [values["rotation"]] if self._closes else []
+        own = [values[name] for name in self._held]
         done = np.empty(0) if self.actuators is None else self.actuators.values(v, self.delta)
         return np.concatenate([own, [aim(values) for aim in self._reached], done, self.space.rows(v)])
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
-        own = [self._slopes(v)["rotation"]] if self._closes else []
+        own = [self._slopes(v)[name] for name in self._held]
         done = np.empty((0, v.size)) if self.actuators is None else self.actuators.slopes(v, self.delta)
         return np.vstack([*own, *(self._slope(aim, v) for aim in self._reached), *done, self.space.row_slopes(v)])

@@ -68,6 +68,9 @@ class CheckedProgram(NonlinearProgram, Protocol):
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> object:
         """Place every check at the worst instants of v, or so much later as a share of its stretch; rows may appear and go."""
 
+    def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray:
+        """The same curvature ``(n, n)`` of rows that no such move reaches, from the multipliers of all rows at v."""
+
 
 class Lagrangian:
     """Objective plus multipliers times rows near a point v.
@@ -103,7 +106,7 @@ class Lagrangian:
         # an instant on the edge of its cell stays there
         turns = (on_rows != 0) & (on_rows * bend < 0) & (np.abs(high - low) < np.abs(bend))
         w = (above - below)[turns] / 2
-        return -w.T @ ((on_rows[turns] / bend[turns])[:, None] * w)
+        return program.of_moving_peaks(v, on_rows) - w.T @ ((on_rows[turns] / bend[turns])[:, None] * w)
 
     def value(self, at: np.ndarray) -> float:
         """Its value with every check at the worst instant that it has at this point."""

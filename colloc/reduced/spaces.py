@@ -17,11 +17,13 @@ from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
+from colloc.gaits.sloped import SlopeHarmonic
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
+from colloc.reduced.sloped import SlopeSpace
 from colloc.system.errors import ProblemError
 
 
@@ -45,8 +47,9 @@ _LINEAR = Searched(
     lambda problem, gait, edges, scheme: HarmonicSpace(problem, edges, scheme),
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
-SEARCHED: dict[type, Searched] = {FreePath: _ALONG_PATHS, Polygon: _ALONG_PATHS}
-"""Of classes whose angles are not linear in their parameters."""
+_ON_SLOPE = Searched(_LINEAR.program, lambda problem, gait, edges, scheme: SlopeSpace(problem, edges, scheme))
+SEARCHED: dict[type, Searched] = {FreePath: _ALONG_PATHS, Polygon: _ALONG_PATHS, SlopeHarmonic: _ON_SLOPE}
+"""Of classes whose angles are not linear in their parameters, or that have other parameters besides."""
 
 
 def _searched(problem: Problem) -> Searched:
@@ -69,7 +72,7 @@ def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
     The first orientation of an antipodal gait is minus the last, or, where it travels the other way along its axis, pi more:
     their sum is a whole number of turns.
     """
-    if program.problem.gait.symmetry != ANTIPODAL:
+    if program.problem.gait.closing_symmetry != ANTIPODAL:
         return program
     theta, rows = x[program.layout.theta[0]], np.zeros(program.constraint_lower.size)
     rows[program.groups["rotation"]] = 2 * np.pi * np.round((theta[0] + theta[-1]) / (2 * np.pi))

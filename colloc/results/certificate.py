@@ -20,6 +20,9 @@ change is the body's own (`colloc.mechanics.bodies.Usual`)."""
 MOTIONS = 1e-2
 """Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
+ASTRAY, SEVERAL = 1e-3, 1e-3
+"""On a slope: angle off the direction that was asked for; part of the period at which the motion is left open."""
+
 SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
 """Curvatures of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
 5e-5, what the mesh may be wrong by; less than FLAT is called flat. NEAR: largest gradient at which they mean anything."""
@@ -105,7 +108,7 @@ def gait_certificate(
     """
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
-    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits}
+    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "slope": problem.slope}
     known = measured(problem.body, problem.friction, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
@@ -113,6 +116,7 @@ def gait_certificate(
         *_motion(problem, path, fine, breaks, tolerance, claimed),
         *_reached(problem, fine),
         *_actuators(problem, fine),
+        *_direction(problem, fine),
         _one_motion(problem, fine),
         *after,
         *_delta(problem, fine, known.limit.value),
@@ -199,10 +203,11 @@ def _motion(
     if claimed is not None:
         gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
+    spent = "friction" if problem.slope is None else "friction and climb"
     return [
         *checks,
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
-        Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, "work of the joints over friction, less 1"),
+        Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, f"work of the joints over {spent}, less 1"),
     ]
 
 
@@ -233,6 +238,13 @@ def _actuators(problem: Problem, fine: Replay) -> list[Check]:
     return [Check("actuators", excess, GAP, f"excess over a limit, relative, in replay; nearest to its own: {most}")]
 
 
+def _direction(problem: Problem, fine: Replay) -> list[Check]:
+    """Where the way leads, if that is asked for."""
+    if problem.towards is None:
+        return []
+    return [Check("direction", fine.across / fine.distance, ASTRAY, "of the way, off the one that was asked for [rad]")]
+
+
 def _beyond(value: float, unknown: float) -> float:
     """The part of a difference that something of unknown sign does not explain."""
     return float(np.copysign(max(abs(value) - unknown, 0.0), value))
@@ -240,6 +252,9 @@ def _beyond(value: float, unknown: float) -> float:
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
     """How far the objective depends on which of several balanced motions the body takes."""
+    if problem.slope is not None:
+        meaning = "part of the period at which several motions are balanced; what they would change is not measured"
+        return Check("one motion", fine.several, SEVERAL, meaning)
     if problem.friction.associated:
         meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:

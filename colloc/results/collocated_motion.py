@@ -10,7 +10,9 @@ import numpy as np
 from colloc.collocation.layout import Layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, reduced
+from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
 from colloc.results.motion import SampledMotion, turned
@@ -57,20 +59,32 @@ class CollocatedMotion:
 
     @cached_property
     def at_points(self) -> Sliding:
-        """The body at the collocation points."""
-        return self.sliding(*self._points)
+        """The body at the collocation points, with the weight's pull if it is on a slope."""
+        now, slope = self.sliding(*self._points), self.problem.slope
+        if slope is None:
+            return now
+        chain = checked_chain(self.problem.body, self.problem.friction, slope.grade)
+        pull = load_wrench(chain, chain.posture(self._points[0]), slope.pull(self._theta[None]))
+        return now._replace(force=now.force + pull)
+
+    @property
+    def _theta(self) -> np.ndarray:
+        """At the collocation points."""
+        theta = np.empty(self.mesh.n_point)
+        theta[self.mesh.points] = self.x[self.layout.theta[0]][self.mesh.sites]
+        return theta
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers; whole periods add up.
 
         Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's. The lab frame has the centre
-        of mass at the origin and the motion along +x at t = 0.
+        of mass at the origin at t = 0, and the motion along +x; on a slope +x is straight uphill.
         """
         t = np.atleast_1d(np.asarray(t, dtype=float))
         if t.ndim != 1 or not np.isfinite(t).all():
             raise ValueError("t must be finite phases, a number or a one-dimensional array.")
         period, phase = np.divmod(t, 1.0)
-        symmetry, body = self.problem.gait.symmetry, self.problem.body
+        symmetry, body = self.problem.gait.motion_symmetry, self.problem.body
         solved, second = reduced(symmetry, phase)
         z, theta, centre, end = self._interpolated(solved)
         angles, rates = self.gait(phase)
@@ -98,9 +112,7 @@ class CollocatedMotion:
         tau = (t - mesh.edges[k]) / mesh.h[k]
         value, integral = scheme.lagrange(tau), scheme.integrals(tau)
         z_points = self._points[2]
-        site_theta = np.empty(mesh.n_point)
-        site_theta[mesh.points] = x[layout.theta[0]][mesh.sites]
-        lab = turned(self.at_points.centre, site_theta)
+        lab = turned(self.at_points.centre, self._theta)
         steps = np.einsum("ks,cks,k->ck", np.broadcast_to(scheme.b, (mesh.n, scheme.s)), lab[:, mesh.points], mesh.h)
         edges = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
         points = mesh.points[k]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from colloc.gaits.equivalence import distance
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
+from colloc.results.equivalence import distance
 from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 
@@ -55,7 +55,7 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     """The distinct certified optima, best first.
 
     Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase and the
-    symmetries of body and friction (see `colloc.gaits.equivalence.images`).
+    symmetries of body and friction (see `colloc.results.equivalence.images`).
     """
     solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value)
     found: list[list[Outcome]] = []

@@ -35,6 +35,8 @@ _OF_PERIOD = {
     "driven_work": "the work of the actuators",
     "at least": "a value that has to be reached",
     "shape speed": "the lower bound on the shape speed",
+    "heading": "where the body points at the start",
+    "across": "the way across the direction that was asked for",
 }
 _SMALLEST_EIGENVALUE = 1e-12
 """Of the product of the equations, scaled to length 1, with their transpose: where it is less, they are redundant. What sums

@@ -30,7 +30,8 @@ def in_friction_units(problem: Problem) -> tuple[Problem, float]:
         return problem, 1.0
     least = tuple((aim, in_unit(value, 1 / unit, aim)) for aim, value in problem.at_least)
     limits = {name: _over(getattr(problem, name), unit) for name in ("torque_limit", "power_limit")}
-    return problem.with_(friction=problem.friction.in_units_of(unit), at_least=least, **limits), unit
+    grade = problem.grade / unit  # the weight's pull is a force, too
+    return problem.with_(friction=problem.friction.in_units_of(unit), at_least=least, grade=grade, **limits), unit
 
 
 def _over(limit: Limit | None, unit: float) -> Limit | None:

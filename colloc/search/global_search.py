@@ -16,7 +16,6 @@ from itertools import chain, islice
 
 import numpy as np
 
-from colloc.gaits.equivalence import distance
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
@@ -27,6 +26,7 @@ from colloc.mechanics.chain import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import SearchSpace
 from colloc.reduced.spaces import space_about, space_near
+from colloc.results.equivalence import distance
 from colloc.results.steps import Alternative, SearchStep
 from colloc.search.reduced_search import (
     FIRST_RADIUS,

@@ -21,7 +21,7 @@ from colloc.search.full_program import answer, level_found
 from colloc.search.global_search import STARTS, best_of
 from colloc.search.literal_search import literal_optimum
 from colloc.search.prescribed import measured
-from colloc.search.reduced_search import FACTOR, Found, descended, kink_or_not, refined, searched
+from colloc.search.reduced_search import FACTOR, NOWHERE, Found, descended, kink_or_not, refined, searched
 from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
 from colloc.search.saddles import below_saddle
 from colloc.system.errors import NotConvergedError
@@ -37,6 +37,8 @@ _CONTENDERS, _REFINED = 3, 0.01
 _DRIER, _SMALL = 2, 2.0
 """Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous: at most so many times
 the bound on the shape speed."""
+_ROUGHLY = 1e-3
+"""Relative error to which a gait is replayed that is no optimum."""
 FINER = "a smaller mesh_tolerance"
 ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
@@ -51,7 +53,12 @@ Report = Callable[[Level], None]
 
 def is_trivial(solution: Solution) -> bool:
     """Whether the search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
-    if not solution.levels or abs(solution.efficiency) * solution.problem.friction.smallest >= TRIVIAL_EFFICIENCY:
+    if not solution.levels:
+        return False
+    if solution.problem.slope is not None:
+        _, unit = in_friction_units(solution.problem)
+        return in_unit(solution.value, 1 / unit, solution.problem.objective) < NOWHERE
+    if abs(solution.efficiency) * solution.problem.friction.smallest >= TRIVIAL_EFFICIENCY:
         return False
     theta = solution.last.x[solution.layout.theta[0]]
     return not (solution.problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
@@ -137,10 +144,15 @@ def maximise_efficiency(
     begin = time.perf_counter()
     solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
     if problem.gait.free and is_trivial(solution):
-        solution.message = (
+        nowhere = (
             "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point). Try another "
             "guess, or an imposed symmetry."
         )
+        steep = (
+            f"no gait was found that climbs a grade of {problem.grade:g}, or goes the way asked for. Try a gentler slope, more "
+            "starts, or more harmonics."
+        )
+        solution.message = nowhere if problem.slope is None else steep
     else:
         _certified(solution)
         if problem.gait.free and not literal:
@@ -287,7 +299,10 @@ def _certified(solution: Solution) -> None:
     """Put the certificate into a solution, and what it says into its message."""
     problem = solution.problem
     try:
-        solution.certificate = certify(solution)
+        if solution.last.optimal:
+            solution.certificate = certify(solution)
+        else:  # it cannot pass: what it does is told roughly, for exactly may take minutes
+            solution.certificate = certify(solution, tolerance=_ROUGHLY, instants=problem.body.usual.instants)
     except NotConvergedError as error:
         solution.message = f"the replay failed: {error}"
         return

@@ -22,6 +22,7 @@ from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_near
 from colloc.search.far_contact import crossing_pairs, last_free
+from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
 FACTOR = 0.2
@@ -43,6 +44,8 @@ _ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
 _ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
 """Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
 _ADMISSIBLE, _ALIKE = 1e-8, 1e-3
+NOWHERE = 1e-4
+"""Value of the objective on a slope up to which a gait goes nowhere."""
 _SWINGS = 0.1
 """Part of the way of a round that the gait does not come back in the next, where it only goes to and fro."""
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
@@ -191,6 +194,10 @@ def settled(
 ) -> Found:
     """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
     begin, program = time.perf_counter(), ReducedProgram(space, delta)
+    if space.problem.slope is not None and np.isnan(program.objective(v)):
+        raise NotConvergedError(
+            "friction does not hold the body on the slope all the way, or its joints brake: take a gentler one."
+        )
     rested = at_rest(program, v, radius, accuracy, curvature, rounds)
     v, objective, conditions, iterations, evaluations, curvature = rested
     counts = iterations, evaluations, time.perf_counter() - begin
@@ -262,6 +269,8 @@ def refined(found: Found, report: Report) -> tuple[Found, str]:
     """
     refines, kept = found.space.problem.mesh_tolerance > 0, np.empty(0)
     count = 0
+    if found.space.problem.slope is not None and found.objective > -NOWHERE:
+        return found, ""  # relative to nothing, no mesh is fine enough
     while True:
         finer = finer_body(found) if refines else None
         plan = _plan(found, kept, count) if refines and finer is None else None

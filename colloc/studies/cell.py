@@ -10,18 +10,18 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.gaits.equivalence import phase_distance
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.spaces import space_near
 from colloc.results.distinct_optima import fourier_series
+from colloc.results.equivalence import phase_distance
 from colloc.results.outcome import ERROR, Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import run_guess
 from colloc.system.errors import CollocError
-from colloc.verification.replay import replay
+from colloc.verification.slope_replay import replayer
 
 Index = tuple[int, ...]
 _INSTANTS = 200
@@ -138,7 +138,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
     200 instants are within 3e-4 of 1,600 for the ellipse of efficiency 0.26 and delta from 1e-2 to 1e-4.
     """
     try:
-        found = replay(
+        found = replayer(problem.slope)(
             problem.body,
             problem.friction,
             gait,

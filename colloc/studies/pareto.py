@@ -20,7 +20,7 @@ from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait, maximise_efficiency
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
-from colloc.verification.replay import replay
+from colloc.verification.slope_replay import replayer
 
 POINTS = 9
 _SAME = 1e-6
@@ -153,4 +153,4 @@ def _value(solution: Solution, aim: Objective) -> float:
         return value
     problem, gait = solution.problem, solution.gait
     at = (problem.body, problem.friction, gait, solution.delta_per_period)
-    return replay(*at, breaks=gait.corner_phases, objective=aim).value
+    return replayer(problem.slope)(*at, breaks=gait.corner_phases, objective=aim).value

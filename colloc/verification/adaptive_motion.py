@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +55,14 @@ def rates_at(
     delivered = driven_power_in_balance(body, friction, angles, rates, now.z, delta) if driven else np.zeros(t.size)
     rows = (now.centre[0] + 1j * now.centre[1], now.power, delivered)
     return Rates(now.z.reshape(3, *t.shape), *(row.reshape(t.shape) for row in rows))
+
+
+def path_lengths(gait: Any, left: np.ndarray, right: np.ndarray, pieces: int) -> np.ndarray:
+    """Length of the path over intervals, ``(n,)``, by Gauss quadrature on so many pieces of each."""
+    h = (right - left) / pieces
+    starts = left[:, None] + h[:, None] * np.arange(pieces)
+    t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
+    return h * (np.linalg.norm(gait.rates(t.ravel()), axis=0).reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
 
 
 Increments = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]

@@ -22,8 +22,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import OdeSolution, solve_ivp
 
+from colloc.gaits.sloped import Slope
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.fixed_point import solve_balance
@@ -118,8 +119,11 @@ class GaitOnSlope(NamedTuple):
         way = fine_motion(self.body, self.friction, self.path, self.delta, edges, tolerance, lambda period: _OF_WAY).path[-1]
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
-    def followed(self, state: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Phases ``(n,)`` and unknowns ``(6, n)`` at the solver's steps through a period."""
+    def followed(
+        self, state: np.ndarray, tolerance: float, longest: float = np.inf
+    ) -> tuple[np.ndarray, np.ndarray, list[OdeSolution]]:
+        """Phases ``(n,)`` and unknowns ``(6, n)`` at the solver's steps through a period, none longer than `longest`; and the
+        unknowns as functions of the phase, between breaks."""
         near: np.ndarray | None = None
 
         def slope(t: float, state: np.ndarray) -> np.ndarray:
@@ -128,20 +132,21 @@ class GaitOnSlope(NamedTuple):
             found, near = self._rates(one_sided, state[0], near)
             return found
 
-        phases, states = [], []
+        phases, states, between = [], [], []
         for first, last in pairwise([0.0, *self.breaks, 1.0]):
-            run = solve_ivp(slope, (first, last), state, method="LSODA", rtol=1e-13, atol=_STEP * tolerance * _UNKNOWNS)
+            accuracy = {"rtol": 1e-13, "atol": _STEP * tolerance * _UNKNOWNS, "max_step": longest}
+            run = solve_ivp(slope, (first, last), state, method="LSODA", dense_output=True, **accuracy)
             if not run.success:
                 raise NotConvergedError(f"the motion on the slope could not be followed beyond phase {run.t[-1]:.4f}.")
             state = run.y[:, -1]
             phases.append(run.t)
             states.append(run.y)
-        return np.concatenate(phases), np.concatenate(states, axis=1)
+            between.append(run.sol)
+        return np.concatenate(phases), np.concatenate(states, axis=1), between
 
     def pull(self, theta: np.ndarray) -> np.ndarray:
         """Of the weight, in the body's axes, ``(2, n)``."""
-        pull = -self.grade * np.exp(-1j * theta)
-        return np.stack([pull.real, pull.imag])
+        return Slope(self.grade).pull(theta[None])
 
     def several(self, ran: SlopeMotion) -> float:
         """Part of the time of a run at which several motions are balanced."""
@@ -152,12 +157,12 @@ class GaitOnSlope(NamedTuple):
         several = all_balanced_velocities(self.body, self.friction, angles, rates, self.delta, load).number > 1
         return float(np.diff(ran.phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(ran.phases[-1])
 
-    def run(self, course: float, heading: float, periods: int, tolerance: float) -> SlopeMotion:
-        """The motion through periods from a heading, without its error."""
+    def run(self, course: float, heading: float, periods: int, tolerance: float, longest: float = np.inf) -> SlopeMotion:
+        """The motion through periods from a heading, without its error; no step is longer than `longest`."""
         state = np.array([heading - course, 0.0, 0.0, 0.0, 0.0, 0.0])
         ends, phases, states = [state], [], []
         for period in range(periods):
-            t, through = self.followed(ends[-1], tolerance)
+            t, through, _ = self.followed(ends[-1], tolerance, longest)
             ends.append(through[:, -1])
             phases.append(period + t)
             states.append(through)

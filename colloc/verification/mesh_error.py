@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,10 +20,13 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import PANEL_RULE, FineMotion, Increments, Rates, fine_motion, increments, rates_at
+from colloc.verification.adaptive_motion import FineMotion, Increments, Rates, fine_motion, increments, path_lengths, rates_at
+from colloc.verification.collocated_slope import slope_course, slope_defects
 
 FINER = 0.05
 """The panels are refined until what they may still miss is this fraction of the error they measure or of the tolerance."""
+_OF_WAY = 0.1
+"""A way on a slope is usually no less: its error over a relative one."""
 _SAMPLES = 32
 _LENGTH_PIECES = 200
 
@@ -73,8 +76,10 @@ class MeshError:
         return float(np.abs(self.value).sum() + self.unresolved)
 
 
-def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> FineMotion:
-    """The gait's motion on adaptive panels, see `adaptive_motion`."""
+def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> Any:
+    """The gait's motion on adaptive panels, a `FineMotion`; on a slope a `SlopeCourse`."""
+    if problem.slope is not None:
+        return slope_course(problem, gait, delta, _OF_WAY * tolerance)
     length = _whole_length(problem, gait)
 
     def shares(part: Mapping[str, float]) -> dict[str, float]:
@@ -100,19 +105,11 @@ def _whole_length(problem: Problem, gait: AnyGait) -> float:
     """Length of the path over a period [rad]; 1 where nobody asks for it."""
     if not problem.uses("length"):
         return 1.0
-    return gait.length if problem.gait.unit_speed else float(_lengths(gait, np.zeros(1), np.ones(1), _LENGTH_PIECES)[0])
-
-
-def _lengths(gait: AnyGait, left: np.ndarray, right: np.ndarray, pieces: int) -> np.ndarray:
-    """Length of the path over intervals, ``(n,)``, by Gauss quadrature on so many pieces of each."""
-    h = (right - left) / pieces
-    starts = left[:, None] + h[:, None] * np.arange(pieces)
-    t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
-    return h * (np.linalg.norm(gait.rates(t.ravel()), axis=0).reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
+    return gait.length if problem.gait.unit_speed else float(path_lengths(gait, np.zeros(1), np.ones(1), _LENGTH_PIECES)[0])
 
 
 def mesh_error(
-    problem: Problem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float = 1e-6, fine: FineMotion | None = None
+    problem: Problem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float = 1e-6, fine: Any = None
 ) -> MeshError:
     """Errors of collocating `gait` on `mesh`.
 
@@ -125,7 +122,7 @@ def mesh_error(
         Regularisation speed, per period.
     tolerance : float
         Relative error of interest; smaller ones need not be exact.
-    fine : FineMotion, optional
+    fine : FineMotion or SlopeCourse, optional
         The gait's motion, if known.
 
     Raises
@@ -135,6 +132,9 @@ def mesh_error(
     """
     if fine is None:
         fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
+    if problem.slope is not None:
+        off, violation = slope_defects(problem, mesh, gait, delta, fine), constraint_violation(problem, mesh, gait)
+        return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
     own = _collocated_intervals(problem, mesh.scheme, mesh.edges[:-1], mesh.edges[1:], gait, delta, fine)
     return MeshError(
         own.rotation,
@@ -187,7 +187,7 @@ def _collocated_intervals(
     direction, length = _direction(problem, fine.path[-1], fine.theta[-1]), np.zeros(left.size)
     if problem.uses("length") and not problem.gait.unit_speed:  # else arc length is the clock, and exact
         pace = np.linalg.norm(gait.rates(nodes.ravel()), axis=0).reshape(nodes.shape)
-        length = (right - left) * (pace @ rule.b) - _lengths(gait, left, right, 4)
+        length = (right - left) * (pace @ rule.b) - path_lengths(gait, left, right, 4)
     shares = _shares(problem, _fine_part(problem, fine), _whole_length(problem, gait))
     ahead = (pull * np.conj(direction)).real
     value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length

@@ -24,6 +24,7 @@ from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.adaptive_motion import FineMotion
+from colloc.verification.collocated_slope import SlopeCourse
 from colloc.verification.kinks import kink_phases
 from colloc.verification.mesh_error import FINER, MeshError, gait_motion, interval_shares, mesh_error
 
@@ -45,6 +46,8 @@ _ONE_KINK = 0.02 / 16
 _LEFT = 0.2
 """How far, in mean intervals, a kink can have moved from the knot that it left."""
 _NARROWEST = 1e-7
+_WORST = 0.1
+"""Of the largest error of an interval on a slope: others are not cut with it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +150,8 @@ def planned_mesh(
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
+    if problem.slope is not None:
+        return _split_on_slope(problem, mesh.scheme, knots, gait, delta, fine, tolerance, aim, most_points)
     given = scheme(problem.scheme)
     kinks = kink_knots(problem, gait, delta, fine)
     switches = not problem.friction.reversible
@@ -230,6 +235,30 @@ def _split(
         )
     estimate = float(shares.sum() + unresolved)
     return MeshPlan(rule.name, np.sort(np.append(left, right.max())), estimate, estimate <= tolerance, kept)
+
+
+def _split_on_slope(
+    problem: Problem,
+    rule: Scheme,
+    kept: np.ndarray,
+    gait: AnyGait,
+    delta: float,
+    fine: SlopeCourse,
+    tolerance: float,
+    aim: float,
+    most_points: int,
+) -> MeshPlan:
+    """A uniform mesh whose intervals with the largest errors are halved until all together are small enough."""
+    edges = np.union1d(np.linspace(0.0, 1.0, problem.intervals + 1), kept)
+    while True:
+        error = mesh_error(problem, Mesh(rule, edges), gait, delta, tolerance, fine)
+        shares = np.abs(error.value)
+        if shares.sum() <= aim * tolerance or edges.size * rule.s > most_points or np.isnan(shares).any():
+            return MeshPlan(rule.name, edges, error.estimate, error.estimate <= tolerance, kept)
+        order = np.argsort(shares)[::-1]
+        excess = np.cumsum(shares[order]) < shares.sum() - 0.3 * aim * tolerance
+        chosen = order[excess & (shares[order] > _WORST * shares.max())] if excess.any() else order[:1]
+        edges = np.sort(np.concatenate([edges, 0.5 * (edges[chosen] + edges[chosen + 1])]))
 
 
 def _cut(left: np.ndarray, right: np.ndarray, kinks: np.ndarray) -> np.ndarray:

@@ -72,6 +72,8 @@ class Replay:
         Phases and tail velocities there.
     objective : Objective
         That the replay is to measure; the efficiency unless another was asked for.
+    across : float
+        On a slope the way across the direction that counts.
     """
 
     distance: float
@@ -96,6 +98,7 @@ class Replay:
     instants: int
     tail: tuple[np.ndarray, np.ndarray] = field(repr=False, compare=False)
     objective: Objective = EFFICIENCY
+    across: float = 0.0
 
     def tail_velocity(self, t: np.ndarray) -> np.ndarray:
         """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""

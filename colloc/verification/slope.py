@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from colloc.gaits.sloped import checked_chain
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.law import Law, rate_independent
+from colloc.mechanics.law import Law
 from colloc.system.errors import ProblemError
 from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion
 from colloc.verification.replay import Path
@@ -22,20 +22,6 @@ def check_finite(positive: bool = False, **numbers: object) -> None:
         usable = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
         if not usable or (positive and not value > 0):  # type: ignore[operator]
             raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
-
-
-def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
-    """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
-    if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
-        raise ProblemError(f"only a Chain, whose joints are its own, can be put on a slope, not {type(body).__name__}.")
-    if isinstance(grade, bool) or not isinstance(grade, (int, float, np.number)) or not 0 <= grade < np.inf:
-        raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
-    if rate_independent(friction) and grade >= friction.largest:
-        raise ProblemError(
-            f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most {friction.largest:g} times "
-            "the force that presses it on the ground."
-        )
-    return body
 
 
 def gait_on_slope(
@@ -55,7 +41,7 @@ def slope_motion(
     delta: float,
     grade: float,
     *,
-    heading: float = 0.0,
+    heading: float | None = None,
     theta: float | None = None,
     periods: int = 1,
     tolerance: float = 1e-6,
@@ -75,9 +61,10 @@ def slope_motion(
         Regularisation speed, per period. A body at rest creeps down at about delta x grade / mu.
     grade : float
         Tangent of the inclination, from 0.
-    heading : float
+    heading : float, optional
         At the start: the direction in which the gait would go on the level, from straight uphill, positive to the left [rad].
-        Of a gait that goes nowhere on the level, the direction of its tail link at phase 0.
+        Of a gait that goes nowhere on the level, the direction of its tail link at phase 0. By default 0, or of a solution's
+        gait for a slope its own.
     theta : float, optional
         The same by the direction of the tail link at phase 0 from straight uphill; instead of a heading.
     periods : int
@@ -107,12 +94,14 @@ def slope_motion(
     [0.091] [1.048]
     """
     on = gait_on_slope(body, friction, gait, delta, grade, breaks)
-    check_finite(heading=heading, theta=0.0 if theta is None else theta)
+    if heading is None and theta is None:
+        theta = getattr(gait, "theta", None)
+    check_finite(heading=0.0 if heading is None else heading, theta=0.0 if theta is None else theta)
     check_finite(positive=True, tolerance=tolerance)
     if not isinstance(periods, (int, np.integer)) or periods < 1:
         raise ProblemError(f"periods must be a whole number from 1, not {periods!r}.")
     course = on.course(tolerance)
-    heading = heading if theta is None else theta + course
+    heading = (heading or 0.0) if theta is None else theta + course
     loose = on.run(course, heading, periods, _LOOSER * tolerance).states[:5, -1]
     ran = on.run(course, heading, periods, tolerance)
     return replace(ran, error=float(np.abs(ran.states[:5, -1] - loose).max()), several=on.several(ran))

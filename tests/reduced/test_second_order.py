@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
-from colloc import Friction, Harmonic, Problem, ellipse
+from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import space_near
@@ -48,6 +49,9 @@ class Quadratic:
     def move_checks(self, v, later=0.0):
         pass
 
+    def of_moving_peaks(self, v, on_rows):
+        return np.zeros((v.size, v.size))
+
 
 class Touching(Quadratic):
     """Minimise x^2 + b y^2 - p x with x cos t + y sin t <= 1 at all t: rows at the worst t, which turns with y.
@@ -85,6 +89,40 @@ def test_the_worst_instant_moves_with_the_gait(b):
     found = curvature(Touching(b, 3.0), np.array([1.0, 0.0]))
     assert found.n_free == 1
     assert found.smallest == pytest.approx(2 * b + 1, abs=1e-4)
+
+
+def test_the_peak_of_a_moment_moves_with_the_gait():
+    """The second derivative of the largest moment over time is that at its instant and what the move of the instant adds."""
+    problem = Problem("weak", body=Chain((0.25,) * 4), gait=Harmonic(1, "bilateral"), torque_limit=0.06, delta=1e-2)
+    space, v = space_near(problem, problem.guess)
+    program = ReducedProgram(space, problem.delta)
+    program.place_rows(v)
+    (shares, points), names = program.actuators.placed, problem.actuator_limits.names
+    row = int(np.argmax(np.where(shares == names.index("torque of joint 2"), program.actuators.values(v, problem.delta), -1)))
+    cell = points[row] // space.mesh.scheme.s
+    left, right = space.mesh.edges[cell : cell + 2]
+
+    def moment(at, t):
+        gait, body, t = space.member(at), problem.body, np.atleast_1d(t)
+        angles, rates = gait(t)
+        z = body.solve(problem.friction, angles, rates, problem.delta).z
+        return problem.actuator_limits.shares_in_balance(body, problem.friction, angles, rates, z, problem.delta)[1, 0]
+
+    def peak(at):
+        reach = {"bounds": (2 * left - right, 2 * right - left), "method": "bounded", "options": {"xatol": 1e-12}}
+        return minimize_scalar(lambda t: -moment(at, t), **reach).x
+
+    here, on_rows = peak(v), np.zeros(program.row_lower.size)
+    assert left < here < right
+    on_rows[row] = 1.0
+    added, rng = program.of_moving_peaks(v, on_rows), np.random.default_rng(0)
+    for z in rng.normal(size=(3, v.size)):
+        step = 1e-3 * z / np.linalg.norm(z)
+        largest = [moment(at, peak(at)) for at in (v - step, v, v + step)]
+        there = [moment(at, here) for at in (v - step, v, v + step)]
+        moved = (largest[0] - 2 * largest[1] + largest[2] - there[0] + 2 * there[1] - there[2]) / 1e-6
+        assert moved > 1e-3
+        assert step @ added @ step / 1e-6 == pytest.approx(moved, rel=1e-2)
 
 
 class Kinked(Quadratic):

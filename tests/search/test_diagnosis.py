@@ -15,6 +15,8 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.mechanics.chain import Chain
 from colloc.reduced.spaces import transcribed
+from colloc.results.checks import UNCERTIFIED
+from colloc.search import optimise
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.nlp import Solver
 
@@ -114,3 +116,17 @@ def test_a_delta_that_rounding_hides_is_named():
     result = replace(result, excess=np.zeros_like(result.excess))
     assert "at least 1e-09, below which rounding" in explanation(solver.transcription, result, 1e-10)
     assert "rounding" not in explanation(solver.transcription, result, 1e-9)
+
+
+def test_rows_of_a_slope_have_a_meaning():
+    transcription = transcribe(stated(grade=0.1, towards=0.3))
+    meanings = {row_meaning(transcription, transcription.groups[name].start)[0] for name in ("heading", "across")}
+    assert meanings == {"where the body points at the start", "the way across the direction that was asked for"}
+
+
+def test_what_is_no_optimum_is_replayed_roughly(unsolved, monkeypatch):
+    """It cannot be certified, and its mesh may ask for a replay of minutes."""
+    asked = {}
+    monkeypatch.setattr(optimise, "certify", lambda solution, **settings: asked.update(settings) or UNCERTIFIED)
+    optimise._certified(unsolved(Problem("guess", gait=Harmonic(1, "bilateral"), delta=1e-2)))
+    assert asked == {"tolerance": 1e-3, "instants": 1600}

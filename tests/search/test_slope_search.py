@@ -1,45 +1,152 @@
-"""Gaits that climb: on the level the most efficient one, on a slope one that none beside it betters by the replay."""
+"""Problems on a slope: solved, certified, kept and shown like any other; no gait or heading beside the one found is better."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from colloc import (
     Chain,
+    CrawlerBody,
     Fourier,
     FreePath,
     Friction,
     Harmonic,
-    NotConvergedError,
     Problem,
     ProblemError,
-    climbing_gait,
+    Viscous,
     ellipse,
+    load,
+    save,
 )
+from colloc.commands import report, solve, verify
+from colloc.gaits.sloped import PointedSeries
+from colloc.mechanics.bodies import FULL
+from colloc.numerics.mesh import Mesh
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near
+from colloc.results.certificate import _one_motion, gait_certificate
+from colloc.search.friction_unit import in_friction_units
+from colloc.search.optimise import maximise_efficiency
+from colloc.search.slope_search import climbing_gait
+from colloc.verification.mesh_error import mesh_error
 from colloc.verification.slope import slope_motion
 
-PROBLEM = Problem("climber", gait=Harmonic(1, "bilateral"), delta=1e-2, guess=ellipse(0, 2.8, 1.3))
+PROBLEM = Problem("climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, grade=0.1)
 
 
-def test_on_the_level_it_is_the_most_efficient_gait(three_link):
-    found = climbing_gait(three_link.problem.with_(guess=three_link.gait), 0.0, starts=1)
-    assert found.passed, str(found)
-    assert found.value == pytest.approx(three_link.efficiency, rel=1e-4)
-    assert abs(found.heading) < 1e-3
+@pytest.fixture(scope="module")
+def uphill():
+    return maximise_efficiency(PROBLEM)
 
 
-def test_no_gait_and_no_heading_beside_it_climbs_better():
-    found = climbing_gait(PROBLEM, 0.1, starts=1)
-    assert found.passed, str(found)
-    gait, theta, rng = found.gait, found.heading - found.motion.course, np.random.default_rng(2)
-    own = PROBLEM.gait
+def run(body, gait, grade=0.1, **settings):
+    ran = slope_motion(body, Friction(), gait, 1e-2, grade, tolerance=1e-4, **settings)
+    return ran.climb[0] / ran.joint_work[0]
+
+
+def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
+    assert uphill.status == "solved", uphill.message
+    assert uphill.last.program == FULL
+    theta = uphill.last.x[uphill.layout.theta[0]]
+    assert uphill.gait.theta == pytest.approx(theta[0], abs=1e-9)
+    ran = slope_motion(Chain(), Friction(), uphill.gait, 1e-2, 0.1)
+    assert uphill.certificate.distance == pytest.approx(ran.climb[0], abs=1e-5)
+    assert uphill.certificate.work == pytest.approx(ran.joint_work[0], abs=1e-5)
+    assert uphill.certificate.work == pytest.approx(ran.friction_work[0] + 0.1 * ran.climb[0], abs=1e-5)
+
+
+def test_no_gait_and_no_heading_beside_it_climbs_better(uphill):
+    own, gait, rng = PROBLEM.gait, uphill.gait, np.random.default_rng(2)
+    v = own.parameters(gait)
     for size in (0.03, 0.1):
         for _ in range(2):
-            v = own.parameters(gait)
-            moved = own.fourier(v - size * np.abs(rng.normal(size=v.size)) * np.sign(v), 2)  # folded links may not cross
-            ran = slope_motion(Chain(), Friction(), moved, 1e-2, 0.1, theta=theta + size * rng.normal(), tolerance=1e-3)
-            assert ran.climb[0] / ran.joint_work[0] < found.value
-    level = slope_motion(Chain(), Friction(), PROBLEM.guess, 1e-2, 0.1, tolerance=1e-4)
-    assert found.value > 1.05 * level.climb[0] / level.joint_work[0]
+            step = np.append(-np.abs(rng.normal(size=v.size - 1)) * np.sign(v[:-1]), rng.normal())  # folded links may not cross
+            assert run(Chain(), own.fourier(v + size * step, 2)) < uphill.certificate.value
+    assert uphill.certificate.value > 1.05 * run(Chain(), ellipse(0, 2.8, 1.3))
+
+
+def test_whole_periods_add_up_along_the_fall_line(uphill):
+    motion = uphill.sample([0.0, 1.0, 2.5])
+    np.testing.assert_allclose(motion.centre[0, 1], uphill.certificate.distance, rtol=1e-4)
+    np.testing.assert_allclose(motion.theta[1], motion.theta[0], atol=1e-5)
+    half = uphill.sample([0.5])
+    np.testing.assert_allclose(motion.centre[:, 2], half.centre[:, 0] + 2 * motion.centre[:, 1], atol=1e-9)
+
+
+def test_it_is_kept_verified_reported_and_summarised_like_any_other(uphill, tmp_path, capsys):
+    path = save(uphill, tmp_path / "climber.h5")
+    again = load(path)
+    assert again.certificate == uphill.certificate
+    assert again.problem.hash == PROBLEM.hash
+    assert again.gait.theta == uphill.gait.theta
+    assert verify.main([str(path)]) == 0
+    assert "certified" in capsys.readouterr().out
+    assert report.main([str(path)]) == 0
+    assert "slope of grade 0.1" in path.with_suffix(".html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
+    file = tmp_path / "up.py"
+    file.write_text(
+        "from colloc import Harmonic, Problem, ellipse\n"
+        "PROBLEM = Problem('up', ellipse(0, 2.8, 1.3), gait=Harmonic(1, 'bilateral'), delta=1e-2, grade=0.1)\n"
+    )
+    assert solve.main([str(file), "--starts", "2", "--output", f"{tmp_path}/"]) == 0
+    out = capsys.readouterr().out
+    assert "slope of grade 0.1: d is the climb, W the work of the joints" in out
+    assert (tmp_path / "up.png").exists()
+
+
+def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
+    gait = uphill.gait
+    turns = PointedSeries(gait.mean + np.array([0.1, 0.2]), gait.cos, gait.sin, gait.theta + 0.02)  # no gait of the class
+    found = gait_certificate(PROBLEM.with_(towards=0.05), turns, 1e-2, np.empty(0), tolerance=1e-4, claimed=uphill.value)
+    assert {"replay gap", "net rotation", "direction"} <= {check.name for check in found.failures}
+    assert {"work = dissipation", "balance in replay", "replay error"} <= {c.name for c in found.checks if c.passed}
+
+
+def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
+    fine, coarse = (
+        mesh_error(PROBLEM, Mesh(uphill.mesh.scheme, edges), uphill.gait, 1e-2)
+        for edges in (uphill.mesh.edges, np.linspace(0.0, 1.0, 21))
+    )
+    assert fine.estimate < PROBLEM.mesh_tolerance < 0.1 * coarse.estimate
+    assert coarse.total == pytest.approx(coarse.value.sum(), rel=0.05)
+    edges = np.linspace(0.0, 1.0, 21)
+    space, v = space_near(PROBLEM, uphill.gait, edges)
+    own = -ReducedProgram(space, 1e-2).objective(v)
+    assert coarse.total == pytest.approx(own / uphill.certificate.value - 1, rel=1e-2)
+
+
+def test_a_motion_that_is_left_open_for_long_fails_its_check():
+    for several, passes in ((0.9e-3, True), (1.1e-3, False)):
+        check = _one_motion(PROBLEM, SimpleNamespace(several=several))
+        assert (check.name, check.passed) == ("one motion", passes)
+
+
+def test_friction_and_the_pull_have_one_unit():
+    heavy = PROBLEM.with_(friction=Friction(100, 100, 100), grade=10.0)
+    scaled, unit = in_friction_units(heavy)
+    assert (unit, scaled.grade, scaled.friction) == (100.0, PROBLEM.grade, PROBLEM.friction)
+
+
+def test_the_level_is_stated_as_before():
+    level = PROBLEM.with_(grade=0.0)
+    assert not {"grade", "towards"} & set(level.to_dict())
+    assert type(level.gait) is Harmonic
+    assert PROBLEM.gait.fraction == 1.0
+    again = Problem.from_dict(PROBLEM.to_dict())
+    assert again.hash == PROBLEM.hash != level.hash
+    assert "grade 0.1" in repr(again)
+
+
+@pytest.mark.slow
+def test_climbing_gait_is_the_same_search(uphill):
+    found = climbing_gait(PROBLEM.with_(grade=0.0), 0.1, starts=2)
+    assert found.status == "solved"
+    assert found.certificate.value == pytest.approx(uphill.certificate.value, rel=1e-5)
 
 
 @pytest.mark.slow
@@ -47,42 +154,57 @@ def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     free = PROBLEM.with_(
         gait=Harmonic(1), guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]), friction=Friction(3, 1, 2), delta=1e-3
     )
-    found = climbing_gait(free, 0.1, starts=1)
-    assert found.passed, str(found)
-    assert abs(found.motion.turn) < 1e-5
+    found = maximise_efficiency(free)
+    assert found.status == "solved", found.message
+    assert abs(found.certificate.rotation) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_gait_goes_across_the_slope_if_it_is_asked_to():
-    across = climbing_gait(PROBLEM.with_(gait=Harmonic(2, "bilateral")), 0.1, towards=np.pi / 2, starts=1)
-    assert across.passed, str(across)
-    assert abs(across.motion.climb[0]) < 1e-3 * across.way
-    assert across.way == pytest.approx(across.motion.aside[0], rel=1e-6)
-    assert 0 < across.heading < np.pi / 2  # it points uphill of where it goes
-    assert across.motion.joint_work[0] == pytest.approx(across.motion.friction_work[0], abs=1e-4)
+    across = maximise_efficiency(PROBLEM.with_(gait=Harmonic(2, "bilateral"), towards=np.pi / 2))
+    assert across.status == "solved", across.message
+    ran = slope_motion(Chain(), Friction(), across.gait, 1e-2, 0.1)
+    assert abs(ran.climb[0]) < 1e-3 * ran.aside[0]
+    assert across.certificate.distance == pytest.approx(ran.aside[0], rel=1e-4)
+    assert 0 < ran.headings[0] < np.pi / 2  # it points uphill of where it goes
+    assert ran.joint_work[0] == pytest.approx(ran.friction_work[0], abs=1e-4)
+
+
+@pytest.mark.slow
+def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
+    literal = maximise_efficiency(PROBLEM, literal=True)
+    assert literal.status == "solved", literal.message
+    assert literal.certificate.value == pytest.approx(uphill.certificate.value, rel=1e-5)
 
 
 @pytest.mark.parametrize(
-    ("changed", "grade", "said"),
+    ("changed", "said"),
     [
-        ({"gait": FreePath()}, 0.1, "in a class Harmonic"),
-        ({"objective": "speed"}, 0.1, "climb/work is maximised"),
-        ({"torque_limit": 1.0}, 0.1, "climb/work is maximised"),
-        ({}, 1.0, "slides down for ever"),
-        ({}, -1.0, "grade must be"),
+        ({"gait": FreePath()}, "gaits are sought in a class Harmonic, not FreePath"),
+        ({"body": CrawlerBody(), "gait": None, "guess": None}, "only a Chain"),
+        ({"objective": "turning"}, "the objective speaks of the rotation"),
+        ({"objective": "driven efficiency"}, "on a slope the driven_work of a period is not known"),
+        ({"gait": Harmonic(1), "rotation": 0.1}, "on a slope a period must not turn the body"),
+        ({"torque_limit": 1.0}, "leave limits of actuators out"),
+        ({"formulation": "implicit velocity"}, "only the formulation 'full'"),
+        ({"scheme": "trapezoid"}, "a gauss-N or radau-N scheme is needed"),
+        ({"grade": 1.0}, "slides down for ever"),
+        ({"grade": -1.0}, "grade must be"),
+        ({"grade": "steep"}, "grade must be"),
+        ({"towards": "up"}, "towards must be a finite angle"),
+        ({"grade": 0.0, "towards": 1.0}, "towards is a direction on a slope"),
     ],
 )
-def test_what_cannot_be_asked_is_named(changed, grade, said):
+def test_what_cannot_be_asked_is_named(changed, said):
     with pytest.raises(ProblemError, match=said):
-        climbing_gait(PROBLEM.with_(**changed), grade)
+        PROBLEM.with_(**changed)
 
 
-def test_a_gait_that_shrinks_to_the_bound_says_so():
-    small = PROBLEM.with_(smallest_shape_speed=1.5, guess=ellipse(1.0, 0.9, 1.3))
-    found = climbing_gait(small, 0.0, starts=1)
-    assert found.smallest
-    assert "shrank to the bound smallest_shape_speed" in str(found)
+def test_a_viscous_body_may_be_on_any_slope():
+    assert PROBLEM.with_(friction=Viscous(2.0, 1.0), grade=3.0).slope.grade == 3.0
 
 
-def test_a_slope_that_no_start_climbs_is_said_so():
-    with pytest.raises(NotConvergedError, match=r"no gait was found that climbs a grade of 0\.9"):
-        climbing_gait(PROBLEM, 0.9, starts=1)
+def test_a_slope_that_is_not_climbed_is_said_so():
+    found = maximise_efficiency(PROBLEM.with_(grade=0.9))
+    assert found.status == "not converged"
+    assert "no gait was found that climbs a grade of 0.9" in found.message

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from colloc.commands import multistart
-from colloc.gaits.equivalence import distance, images, phase_distance, reversed_in_time
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
@@ -24,6 +23,7 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
 from colloc.results.distinct_optima import basins
+from colloc.results.equivalence import distance, images, phase_distance, reversed_in_time
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise

@@ -1,0 +1,193 @@
+"""A problem on a slope: how steep it is, gaits that know where the body points, and what can be asked there.
+
+On a plane whose inclination has the tangent g, the *grade*, the weight pulls the body down the fall line with g, in units of
+the force that presses it on the ground. The motion depends on where the body points, so where it points at the start is a
+parameter of the gait, and no half of a period follows from the other. What a period comes to keeps its names: its *distance* is
+the climb of the centre of mass, or its way in the direction asked for; its *work* is that of the joints, against friction and
+the weight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colloc.gaits.gait import finite_array
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.symmetry import BILATERAL, NONE
+from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.law import Law, rate_independent
+from colloc.numerics.arrays import Array, namespace
+from colloc.numerics.schemes import scheme
+from colloc.system.arguments import is_number, named_arguments
+from colloc.system.errors import ProblemError
+
+_ANY_ANGLE = 100.0
+"""Bound on where a body may point [rad]: none."""
+_SAME_START = 1e-9
+"""Sine of the first joint's first harmonic up to which a gait starts where those of its class do."""
+
+
+class Slope(NamedTuple):
+    """A slope: the tangent of its inclination, and the direction whose way counts, from straight uphill to the left [rad];
+    None: the climb counts, whatever the way aside."""
+
+    grade: float
+    towards: float | None = None
+
+    @property
+    def ahead(self) -> float:
+        """The direction whose way counts."""
+        return self.towards or 0.0
+
+    def pull(self, theta: Array) -> Array:
+        """Of the weight, in the body's axes, ``(2, n_time)``, with its tail link at angles theta ``(1, n_time)`` from straight
+        uphill; NumPy and CasADi."""
+        xp = namespace(theta)
+        return xp.stack([-self.grade * xp.cos(theta), self.grade * xp.sin(theta)])
+
+    def describe(self) -> str:
+        """In words, for reports."""
+        way = "the climb" if self.towards is None else f"the way {np.degrees(self.towards):.4g}° to the left of straight uphill"
+        return f"slope of grade {self.grade:g}: d is {way}, W the work of the joints"
+
+
+@named_arguments
+@dataclass(frozen=True, eq=False, repr=False)
+class PointedSeries(Fourier):
+    """A Fourier series of a body on a slope.
+
+    Parameters
+    ----------
+    mean, cos, sin
+        As of a `Fourier`.
+    theta : float
+        Angle of the tail link at phase 0 from straight uphill, positive to the left [rad].
+    """
+
+    theta: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "theta", float(finite_array("guess.theta", self.theta, 0)))
+
+    def lines(self, coordinate: str = "joint") -> list[str]:
+        """The formula, and where the body points."""
+        turned = np.degrees(np.angle(np.exp(1j * self.theta)))
+        where = f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)"
+        return [*super().lines(coordinate), where]
+
+
+class SlopeHarmonic(Harmonic):
+    """The class `Harmonic` on a slope: its last parameter is where the tail link points at phase 0."""
+
+    delta_start = 0.02
+    """At more the body creeps down faster than it crawls up."""
+
+    @property
+    def fraction(self) -> float:
+        return 1.0
+
+    @property
+    def motion_symmetry(self) -> str:
+        return NONE
+
+    @property
+    def closing_symmetry(self) -> str:
+        """Bilateral gaits keep every heading (docs/howto/slopes.md), others have to be told to."""
+        return BILATERAL if self.symmetry == BILATERAL else NONE
+
+    @property
+    def level(self) -> Harmonic:
+        return Harmonic(self.harmonics, self.symmetry)
+
+    def series(self, harmonics: int) -> Harmonic:
+        return self.level
+
+    def _basis(self, n_joint: int) -> np.ndarray:
+        """No angle depends on where the body points."""
+        basis = super()._basis(n_joint)
+        return np.column_stack([basis, np.zeros(len(basis))])
+
+    def largest_parameters(self, n_joint: int, limit: float) -> np.ndarray:
+        return np.append(super().largest_parameters(n_joint, limit)[:-1], _ANY_ANGLE)
+
+    def fourier(self, parameters: np.ndarray, n_joint: int) -> Fourier:
+        """The gait of a parameter vector, which points nowhere yet if that does not."""
+        gait = super().fourier(np.append(parameters[:-1], 0.0), n_joint)
+        return gait if np.isnan(parameters[-1]) else PointedSeries(gait.mean, gait.cos, gait.sin, parameters[-1])
+
+    def parameters(self, gait: Fourier) -> np.ndarray:
+        """The parameter vector of the member nearest to a gait; its last one is NaN if that does not say where it points, or
+        would, started in another phase."""
+        in_phase = self.symmetry == BILATERAL or abs(gait.sin[0, 0]) < _SAME_START
+        if gait.theta is None or not in_phase:
+            return np.append(super().parameters(gait)[:-1], np.nan)
+        return np.append(self.nearest(gait)[:-1], gait.theta)
+
+
+def class_on(slope: Slope | None, gait_class: Any) -> Any:
+    """A class of gaits on a slope, or on the level.
+
+    Raises
+    ------
+    ProblemError
+        If it has no gaits for slopes.
+    """
+    if slope is None:
+        return gait_class.level
+    if not isinstance(gait_class, Harmonic):
+        raise ProblemError(f"on a slope gaits are sought in a class Harmonic, not {type(gait_class).__name__}.")
+    return SlopeHarmonic(gait_class.harmonics, gait_class.symmetry)
+
+
+def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
+    """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
+    if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
+        raise ProblemError(f"only a Chain, whose joints are its own, can be put on a slope, not {type(body).__name__}.")
+    if isinstance(grade, bool) or not isinstance(grade, (int, float, np.number)) or not 0 <= grade < np.inf:
+        raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
+    if rate_independent(friction) and grade >= friction.largest:
+        raise ProblemError(
+            f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most {friction.largest:g} times "
+            "the force that presses it on the ground."
+        )
+    return body
+
+
+def slope_from(body: Body, friction: Law, grade: object, towards: object) -> Slope | None:
+    """The slope that a problem states; None for the level.
+
+    Raises
+    ------
+    ProblemError
+        If there is none like it, or the body cannot be on it.
+    """
+    if not is_number(grade) or grade < 0:
+        raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
+    if towards is not None and not is_number(towards):
+        raise ProblemError(f"towards must be a finite angle from straight uphill, or None, not {towards!r}.")
+    if grade == 0:
+        if towards is not None:
+            raise ProblemError("towards is a direction on a slope: give a grade, or leave it out.")
+        return None
+    checked_chain(body, friction, grade)
+    return Slope(float(grade), None if towards is None else float(towards))
+
+
+def check_asked(problem: Any) -> None:
+    """A `ProblemError` for what cannot be asked of a problem on a slope."""
+    if problem.rotation != 0:
+        raise ProblemError("on a slope a period must not turn the body: leave rotation at 0.")
+    for quantity in ("rotation", "driven_work"):
+        if problem.uses(quantity):
+            raise ProblemError(f"on a slope the {quantity} of a period is not known: ask for distance, work and length.")
+    if problem.actuator_limits.names:
+        raise ProblemError("on a slope what the single joints have to do is not known: leave limits of actuators out.")
+    if problem.formulation != FULL:
+        raise ProblemError(f"on a slope there is only the formulation {FULL!r}.")
+    if scheme(problem.scheme).left:
+        raise ProblemError(f"on a slope a gauss-N or radau-N scheme is needed, not {problem.scheme}.")

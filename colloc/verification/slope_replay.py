@@ -1,0 +1,109 @@
+"""Independent replay of a gait on a slope: the differential equation of its heading, by Adams' method with steps of its own.
+
+It shares nothing with collocation but the law of friction (`colloc.verification.gait_on_slope`). The equation is solved with
+ever smaller errors a step until the last tenth of them changes the objective by less than is allowed. The work of the joints is
+taken from work against friction and the climb, and beside it from the moments in the joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.gaits.sloped import Slope
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.law import Law
+from colloc.system.errors import NotConvergedError
+from colloc.verification.adaptive_motion import path_lengths
+from colloc.verification.gait_on_slope import SlopeMotion
+from colloc.verification.replay import Replay, replay
+from colloc.verification.slope import gait_on_slope
+
+_FIRST, _TENTH, _LEAST = 0.1, 0.1, 1e-12
+"""Error of the first run over the relative one that is asked for, of each next over the last, and the smallest tried."""
+_LONGEST = 4.0
+"""Longest step, in instants of a uniform grid."""
+_PIECES = 400, 200
+
+
+def replayer(slope: Slope | None) -> Callable[..., Replay]:
+    """What replays a gait: `colloc.verification.replay.replay`, or on a slope `slope_replay`."""
+    return replay if slope is None else partial(slope_replay, slope=slope)
+
+
+def slope_replay(
+    body: Body,
+    friction: Law,
+    gait: Any,
+    delta: float,
+    *,
+    slope: Slope,
+    instants: int = 1600,
+    tolerance: float = 1e-6,
+    breaks: np.ndarray | tuple[float, ...] = (),
+    objective: Objective = EFFICIENCY,
+    **_: object,
+) -> Replay:
+    """A period of a gait that says where it points, on a slope: arguments as of `colloc.verification.replay.replay`.
+
+    Of the result the distance is the way in the direction that counts, the work that of the joints; what other balanced motions
+    would change is not known, only for which part of the time there are any.
+
+    Raises
+    ------
+    NotConvergedError
+        If no balance is found at some instant, or rounding hides the accuracy that is asked for.
+    """
+    on, aim = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), _FIRST * tolerance
+    length, rougher = (float(path_lengths(gait, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
+
+    def run(aim: float) -> tuple[SlopeMotion, complex, dict[str, float]]:
+        ran = on.run(0.0, gait.theta, 1, aim, _LONGEST / instants)
+        way = complex(ran.climb[0], ran.aside[0]) * complex(np.exp(-1j * slope.ahead))
+        work = float(ran.friction_work[0] + slope.grade * ran.climb[0])
+        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn, "length": length, "driven_work": np.nan}
+
+    before = run(aim)[2]
+    while True:
+        if aim < _LEAST:
+            raise NotConvergedError(f"the motion on the slope cannot be replayed to a relative error of {tolerance:.0e}.")
+        aim *= _TENTH
+        ran, way, period = run(aim)
+        errors = {name: abs(period[name] - before[name]) for name in ("distance", "work", "rotation")}
+        error, before = float(objective.relative_error(period, errors)), period
+        if not error > tolerance:
+            break
+    phases = ran.phases % 1.0
+    angles, rates = gait(phases)
+    solved = solve_balance(on.body, friction, angles, rates, delta, load=on.pull(ran.states[0]))
+    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
+    return Replay(
+        distance=period["distance"],
+        work=period["work"],
+        rotation=period["rotation"],
+        length=length,
+        driven_work=np.nan,
+        lever=float(np.hypot(x - gx, y - gy).max()),
+        actuator_work=float(ran.joint_work[0]),
+        residual=float(solved.residual.max()),
+        error=error,
+        distance_error=errors["distance"],
+        work_error=errors["work"],
+        rotation_error=errors["rotation"],
+        length_error=abs(length - rougher),
+        driven_work_error=0.0,
+        several=on.several(ran),
+        other_distance=0.0,
+        other_work=0.0,
+        other_rotation=0.0,
+        shares=np.empty(0),
+        instants=ran.phases.size,
+        tail=(phases, solved.z),
+        objective=objective,
+        across=way.imag,
+    )
