@@ -95,6 +95,8 @@ class ActuatorRows:
         """What is added to the second derivatives ``(n, n)`` of multipliers times rows, as the largest values between the
         points move with the gait (`colloc.reduced.second_order`); `member` gives gaits, `phases` is the mesh of that of v."""
         held = np.flatnonzero(on_rows)
+        if held.size == 0:
+            return np.zeros((v.size, v.size))
         (share, point), on_rows = self.placed[:, held], on_rows[held]
         interval = (self._motion.mesh.points[:, :, None] == point).any(axis=1).argmax(axis=0)
         each, left, width = np.arange(held.size), phases.edges[interval], phases.h[interval]
@@ -105,7 +107,7 @@ class ActuatorRows:
             return self._signed_at(gait, delta * gait.delta_unit, t.ravel()).reshape(-1, *t.shape)[share, each]
 
         peak, reach = left + 0.5 * width, 0.5 * width
-        for _ in range(_ZOOMS_TO_PEAK if held.size else 0):
+        for _ in range(_ZOOMS_TO_PEAK):
             t = np.clip(peak[:, None] + reach[:, None] * (2 * _SAMPLES - 1), left[:, None], (left + width)[:, None])
             peak = t[each, np.abs(shares(v, t)).argmax(axis=1)]
             reach = reach / 8
