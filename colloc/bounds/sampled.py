@@ -2,7 +2,7 @@
 
 The bound is the value of a convex problem: choose a potential over shape and heading (`colloc.bounds.potential`) so that the
 largest (gain / power) over all shapes, headings and rate directions is smallest. It is solved by exchange of samples
-(`bounds.cutting_plane`). What comes out is a *sampled* bound; `bounds.guaranteed` guarantees one for isotropic friction.
+(`bounds.cutting_plane`). What comes out is a *sampled* bound; `bounds.guaranteed` guarantees one for associated friction.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class Bound:
 
 MISSING_MARGIN = "sampled at {samples} motions: not certified between them"
 MISSING_LAW = (
-    "sampled at {samples} motions: for unequal coefficients the balance has no convex potential, so neither uniqueness of the "
+    "sampled at {samples} motions: for this law the balance has no convex potential, so neither uniqueness of the "
     "motion nor a margin between samples is known"
 )
 
@@ -153,7 +153,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         starts=budget.starts,
         tolerance=budget.tolerance,
     )
-    missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW
+    missing = MISSING_MARGIN if domain.friction.associated else MISSING_LAW
     return Bound(
         sampled=found.top,
         floor=found.floor,
@@ -212,7 +212,7 @@ def efficiency_bound(
     body : Chain
         Two or three links; four are possible with a coarse budget.
     friction : Friction
-        Coulomb friction, delta -> 0 (docs/bound.md states what finite delta changes).
+        Coulomb friction or the elliptic law, delta -> 0 (docs/bound.md states what finite delta changes).
     joint_limit : float
         At most pi.
     budget : Budget
