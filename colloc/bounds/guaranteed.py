@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -32,6 +33,8 @@ _FIRST = 0.07
 _LAYERS = (1e-9, 1e-6, 1e-4, 1e-3, 4e-3, 8.75e-3, 0.0175, 0.035)
 """Rates of angle 2 between 0 and the first cells' size. Where one joint turns alone two links rest, and slide with the other
 joint however slowly it turns. The motion there is homogeneous: what a cell may not know of it is in proportion to its speed."""
+_THIN = 0.5
+"""Size in s over that in the angles below which s is not halved: so slow a joint moves all in proportion."""
 _LOAD = 4.0
 """Times the root of the cell's size: 1/multiplier of the loads. It balances what they move with what interpolation loses."""
 
@@ -64,26 +67,41 @@ class Guarantee:
 
 @dataclass(frozen=True)
 class _Lattice:
-    """Points between given edges, each interval halved so many times; cells are named by integers."""
+    """Points between given edges, each interval of an axis halved so many times; cells are named by integers."""
 
     edges: tuple[np.ndarray, ...]
-    level: int
+    levels: tuple[int, int, int]
 
     def coordinate(self, axis: int, index: np.ndarray) -> np.ndarray:
-        edges, parts = self.edges[axis], 1 << self.level
+        edges, parts = self.edges[axis], 1 << self.levels[axis]
         interval = np.minimum(index // parts, edges.size - 2)
         return edges[interval] + (edges[interval + 1] - edges[interval]) * ((index - interval * parts) / parts)
 
-    def cells(self, index: np.ndarray) -> Cells:
-        """The cells with low corners ``(3, n)``."""
+    def box(self, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Low corners and sizes of cells, ``(3, n)`` each."""
         low = np.stack([self.coordinate(axis, index[axis]) for axis in range(3)])
-        size = np.stack([self.coordinate(axis, index[axis] + 1) for axis in range(3)]) - low
+        return low, np.stack([self.coordinate(axis, index[axis] + 1) for axis in range(3)]) - low
+
+    def cells(self, index: np.ndarray) -> Cells:
+        """The cells of some names ``(3, n)``."""
+        low, size = self.box(index)
         corner = (index[:, :, None] + CORNERS.T[:, None, :]).reshape(3, -1)
-        extent = [(edges.size << self.level) + 1 for edges in self.edges]
+        extent = [(edges.size << level) + 1 for edges, level in zip(self.edges, self.levels, strict=True)]
         code = (corner[0] * extent[1] + corner[1]) * extent[2] + corner[2]
         _, first, back = np.unique(code, return_index=True, return_inverse=True)
         points = np.stack([self.coordinate(axis, corner[axis, first]) for axis in range(3)])
         return Cells(low, size, points, back.reshape(-1, 8))
+
+    def halved(self, index: np.ndarray, parents: np.ndarray) -> list[tuple[_Lattice, np.ndarray, np.ndarray]]:
+        """Lattices with parts of some cells, and what is known of each; cells that are thin in s are halved in angles only."""
+        size, found = self.box(index)[1], []
+        thin = size[2] < _THIN * size[:2].min(axis=0)
+        for cells, cut in ((thin, np.array([1, 1, 0])), (~thin, np.ones(3, dtype=int))):
+            parts = CORNERS[(cut >= CORNERS).all(axis=1)].T
+            halves = ((1 + cut)[:, None, None] * index[:, cells, None] + parts[:, None, :]).reshape(3, -1)
+            levels = tuple((np.array(self.levels) + cut).tolist())
+            found.append((_Lattice(self.edges, levels), halves, np.repeat(parents[cells], parts.shape[1])))
+        return found
 
 
 def cell_bounds(body: Chain, friction: Friction, potential: PotentialRange, cells: Cells, goal: float) -> np.ndarray:
@@ -210,13 +228,14 @@ class _Cover:
         edges = _first_edges(self.potential.spline.knots, self.friction.reversible)
         index = np.stack([a.ravel() for a in np.meshgrid(*(np.arange(e.size - 1) for e in edges), indexing="ij")])
         index = np.array_split(index, part[1], axis=1)[part[0] - 1]
-        parents, examined, level = np.full(index.shape[1], np.inf), 0, 0
+        work = deque([(_Lattice(edges, (0, 0, 0)), index, np.full(index.shape[1], np.inf))])
+        left, examined, level = [np.empty(0)], 0, 0
         with ThreadPoolExecutor(available_threads()) as pool:
-            while True:
-                lattice = _Lattice(edges, level)
-                low, high = (np.stack([lattice.coordinate(k, index[k] + more) for k in (0, 1)]) for more in (0, 1))
-                kept = _uncrossed(self.body, low, high)
-                index, values = index[:, kept], parents[kept]
+            while work:
+                lattice, index, values = work.popleft()
+                low, size = lattice.box(index)
+                kept = _uncrossed(self.body, low[:2], low[:2] + size[:2])
+                index, values, level = index[:, kept], values[kept], lattice.levels[0]
 
                 def bounds(first: int, lattice: _Lattice = lattice, index: np.ndarray = index) -> np.ndarray | None:
                     if time.process_time() > self.end:
@@ -224,20 +243,17 @@ class _Cover:
                     cells = lattice.cells(index[:, first : first + _CHUNK])
                     return cell_bounds(self.body, self.friction, self.potential, cells, self.goal)
 
-                out_of_time = False
                 starts = range(0, index.shape[1], _CHUNK)
                 for first, found in zip(starts, pool.map(bounds, starts), strict=True):
-                    if found is None:
-                        out_of_time = True
-                    else:
+                    if found is not None:
                         values[first : first + _CHUNK] = np.fmin(values[first : first + _CHUNK], found)
                         examined += found.size
                 still = ~(values <= self.goal)
-                index, parents = index[:, still], values[still]
-                if out_of_time or not still.any() or level == self.deepest:
-                    return parents, examined, level
-                index = (2 * index[:, :, None] + CORNERS.T[:, None, :]).reshape(3, -1)
-                parents, level = np.repeat(parents, 8), level + 1
+                if level == self.deepest or time.process_time() > self.end:
+                    left.append(values[still])
+                elif still.any():
+                    work.extend(lattice.halved(index[:, still], values[still]))
+        return np.concatenate(left), examined, level
 
 
 def with_guarantee(bound: Bound, certificate: Guarantee) -> Bound:

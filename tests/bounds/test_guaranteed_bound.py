@@ -382,10 +382,10 @@ def test_no_box_is_left_out_that_holds_a_shape_without_crossing(body):
 
 def test_cells_know_the_places_of_their_corners_and_share_each():
     edges = np.array([0.0, 0.3, 1.0]), np.array([-1.0, -0.2, 0.5, 2.0]), np.array([-1.0, 0.0, 0.1, 0.4, 1.0])
-    for level in (0, 2):
-        counts = [(each.size - 1) << level for each in edges]
+    for levels in ((0, 0, 0), (2, 2, 2), (2, 2, 1)):
+        counts = [(each.size - 1) << level for each, level in zip(edges, levels, strict=True)]
         index = np.stack([a.ravel() for a in np.meshgrid(*map(np.arange, counts), indexing="ij")])
-        cells = guaranteed._Lattice(edges, level).cells(index)
+        cells = guaranteed._Lattice(edges, levels).cells(index)
         places = cells.low[:, :, None] + cells.size[:, :, None] * CORNERS.T[:, None]
         np.testing.assert_allclose(cells.points[:, cells.at], places, atol=1e-15)
         assert cells.points.shape[1] == np.prod(np.array(counts) + 1)
