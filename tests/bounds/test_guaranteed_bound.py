@@ -392,6 +392,24 @@ def test_cells_know_the_places_of_their_corners_and_share_each():
         assert np.prod(cells.size, axis=0).sum() == pytest.approx(1.0 * 3.0 * 2.0)
 
 
+def test_halves_of_cells_fill_them_and_thin_ones_keep_their_rates():
+    edges = np.linspace(0, 1, 4), np.linspace(-1, 1, 5), np.array([0.0, 1e-6, 1e-3, 0.2, 1.0])
+    lattice = guaranteed._Lattice(edges, (1, 1, 0))
+    index = np.stack([a.ravel() for a in np.meshgrid(np.arange(6), np.arange(8), np.arange(4), indexing="ij")])
+    parents = np.arange(index.shape[1], dtype=float)
+    low, size = lattice.box(index)
+    volume = np.zeros(parents.size)
+    for finer, parts, of in lattice.halved(index, parents):
+        inside, extent = finer.box(parts)
+        k = of.astype(int)
+        assert np.all((inside >= low[:, k] - 1e-15) & (inside + extent <= low[:, k] + size[:, k] + 1e-15))
+        np.add.at(volume, k, extent.prod(axis=0))
+        thin = finer.levels[2] == 0
+        assert np.all((size[2, k] < 0.5 * size[:2, k].min(axis=0)) == thin)
+        np.testing.assert_allclose(extent[2], size[2, k] * (1.0 if thin else 0.5))
+    np.testing.assert_allclose(volume, size.prod(axis=0))
+
+
 def test_out_of_time_says_what_is_proved_so_far(bound):
     certificate = certify(*stated(bound), 0.5, seconds=0.0)
     assert certificate.open_cells > 0

@@ -271,5 +271,5 @@ def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_pa
     usual = {"guess": None, "body": Chain(), "friction": Friction(), "gait": Harmonic(1, "antipodal")}
     problem = Problem("other", **(usual | changes))
     assert upper_bound(problem, tmp_path, compute=False) is None
-    with pytest.raises(ProblemError, match="chains of links under Coulomb friction only"):
+    with pytest.raises(ProblemError, match="chains of links under Coulomb friction, or the elliptic law, only"):
         upper_bound(problem, tmp_path, compute=True)
