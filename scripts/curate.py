@@ -51,7 +51,7 @@ KEPT = {
     "frontier.md": "python -m scripts.frontier",
     "frontier.json": "python -m scripts.frontier",
     "potentials.json": "python -m scripts.check_potential",
-    "guaranteed.json": "python -m scripts.bound_guaranteed --target 0.47",
+    "guaranteed.json": "python -m scripts.bound_guaranteed (docs/bound.md, section 5)",
     "without_contact.md": "python -m scripts.without_contact",
     "several_motions.md": "python -m scripts.several_motions",
     "several_motions.png": "python -m scripts.several_motions",
