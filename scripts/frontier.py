@@ -30,7 +30,7 @@ import numpy as np
 
 from colloc.bounds.infinitesimal import best_small_gait, small_gait
 from colloc.bounds.recheck import largest_ratio
-from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.bounds.sampled import FOUR_LINKS, Budget, efficiency_bound
 from colloc.gaits.guesses import largest_factor
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
@@ -201,7 +201,7 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
             seconds = time.process_time() - begin
             return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
     friction = Friction(*row.mu)
-    budget = BUDGET if friction.reversible else replace(BUDGET, harmonics=DIRECTED)
+    budget = FOUR_LINKS if row.links == 4 else BUDGET if friction.reversible else replace(BUDGET, harmonics=DIRECTED)
     found = efficiency_bound(row.body, friction, row.limit, budget=budget)
     return {
         "sampled": found.sampled, "floor": found.floor, "converged": found.converged, "unknowns": len(found.coefficients),

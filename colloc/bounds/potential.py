@@ -22,6 +22,7 @@ from colloc.numerics.spline import TensorSpline
 
 _HEADINGS = 48
 _NEWTON_STEPS = 3
+_AT_ONCE = 50000
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,12 @@ class Samples:
             full = sparse.diags(along) @ slope + sparse.diags(across * k * spin) @ value
             blocks.append(full @ self.space.bases[part])
         return sparse.hstack(blocks, format="csr"), constant
+
+
+def largest_ratios(space: PotentialSpace, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
+    """Largest (gain over heading) / power of each motion, ``(n,)``; `Samples` of a part at a time, as they are large."""
+    parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
+    return np.concatenate([Samples(space, motion.take(part)).ratio(free)[0] for part in parts])
 
 
 def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -52,6 +52,8 @@ class Budget:
     first : int
         Even intervals to begin with; more knots are inserted where they are worth most (`colloc.bounds.knots`). As many as
         `intervals` keep the knots even.
+    smoothing : float
+        Weight of the roughness of the potential.
     """
 
     intervals: int = 12
@@ -62,10 +64,13 @@ class Budget:
     starts: int = 250
     tolerance: float = 5e-4
     first: int = 6
+    smoothing: float = 1e-5
 
 
 QUICK = Budget()
 THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4)
+FOUR_LINKS = Budget(3, (1,), shapes=6, directions=40, rounds=40, starts=100, tolerance=1e-2, first=3, smoothing=1e-2)
+"""A loose bound in three or four minutes: shapes fill three dimensions."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +157,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         rounds=budget.rounds,
         starts=budget.starts,
         tolerance=budget.tolerance,
+        smoothing=budget.smoothing,
     )
     missing = MISSING_MARGIN if domain.friction.associated else MISSING_LAW
     return Bound(
@@ -210,7 +216,7 @@ def efficiency_bound(
     Parameters
     ----------
     body : Chain
-        Two or three links; four are possible with a coarse budget.
+        Two or three links, or four with a coarse budget (`FOUR_LINKS`).
     friction : Friction
         Coulomb friction or the elliptic law, delta -> 0 (docs/bound.md states what finite delta changes).
     joint_limit : float
