@@ -19,8 +19,6 @@ from colloc.bounds.recheck import near_the_top, summits_met
 from colloc.bounds.sampling import Domain
 from colloc.numerics.minimax_program import Minimax, smallest_maximum
 
-_EARLY, _EARLY_ROUNDS = 10.0, 4
-"""Times the weight of the roughness, in so many rounds."""
 _LARGEST_CUT = 1500
 _INNER_ROUNDS = 15
 _HELD = 2e-4
@@ -161,12 +159,10 @@ def exchanged_optimum(
     seed : int
     """
     rng = np.random.default_rng(seed)
-    program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng, _EARLY * smoothing)
+    program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng, smoothing)
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
     seen, quiet, surprise = program.samples.motion.size, 0, 0.1
     for count in range(1, rounds + 1):
-        if count == _EARLY_ROUNDS:
-            program.smoothing = smoothing
         # a potential that the next climbs will refute need not be exact
         held = program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
         free = program.best.x
