@@ -50,6 +50,8 @@ KEPT = {
     "measure.png": "python -m scripts.measure_to_gait",
     "frontier.md": "python -m scripts.frontier",
     "frontier.json": "python -m scripts.frontier",
+    "plane_from_both_sides.md": "python -m scripts.plane_from_both_sides",
+    "plane_from_both_sides.png": "python -m scripts.plane_from_both_sides",
     "potentials.json": "python -m scripts.check_potential",
     "guaranteed.json": "python -m scripts.bound_guaranteed (docs/bound.md, section 5)",
     "without_contact.md": "python -m scripts.without_contact",

@@ -128,13 +128,14 @@ def finite(body: Chain, solution: Solution, seconds: float) -> dict[str, Any]:
 
 
 def nearest(row: Row) -> list[Row]:
-    """The rows with as many links whose gaits are kept, those of the nearest laws and then limits first."""
+    """The rows with as many links whose gaits are kept, one a law, of the nearest limit; the nearest laws first."""
 
     def distance(other: Row) -> tuple[float, float]:
         return float(np.abs(np.log(np.divide(row.mu, other.mu))).sum()), abs(row.limit - other.limit)
 
     rows = {row_of(key)[0] for key in read() if key.endswith(" gait")}
-    return sorted((r for r in rows if r.links == row.links and r.file("gait").exists()), key=distance)
+    kept = sorted((r for r in rows if r.links == row.links and r.file("gait").exists()), key=distance)
+    return list({r.mu: r for r in reversed(kept)}.values())[::-1]
 
 
 def gait(row: Row, starts: int) -> dict[str, Any]:
