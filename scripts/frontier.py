@@ -139,9 +139,12 @@ def nearest(row: Row) -> list[Row]:
 
 
 def gait(row: Row, starts: int) -> dict[str, Any]:
-    """The best relaxed gait that travels, begun also from two that are kept: those nearest in law and limit."""
+    """The best relaxed gait that travels, begun also from two kept ones of the nearest laws, both ways round: a gait may travel
+    backwards where mu_b exceeds mu_f."""
     begin = time.process_time()
-    first = [relaxation(other.file("gait")).gait.mean.realised() for other in nearest(row)[:2]]
+    near = [relaxation(other.file("gait")).gait.mean.realised() for other in nearest(row)[:2]]
+    senses = (1,) if Friction(*row.mu).reversible else (1, -1)
+    first = [replace(one, corners=one.corners[:, ::sense]) for one in near for sense in senses]
     ends = []
     for symmetry in SYMMETRIES:
         problem = Problem(

@@ -20,7 +20,7 @@ from colloc.pictures.style import SEQUENTIAL, save, styled, subplots
 from scripts.frontier import Row, best_held, compute_missing, read, smallest_bound
 from scripts.panel_marks import letter
 
-MU_T, MU_B = (0.3, 1.0, 3.0, 10.0), (1.0, 1.7, 3.0)
+MU_T, MU_B = (1.0, 3.0, 10.0), (1.0, 1.7, 3.0)
 """Over mu_f; exchanging head and tail exchanges mu_f and mu_b, so mu_b >= mu_f is all there is."""
 LIMIT = 2.5
 OUT = Path("results/curated")
@@ -31,7 +31,7 @@ travels through shapes, at delta = 1e-5, and its distance a period [body lengths
 tend to for delta -> 0 (a star: its own certificate fails a check); *small*: the best gait of no size at one shape;
 *bound*: sampled, with the number of its unknowns (in brackets the program's value where climbs still found more than is
 tolerated); *gap*: from the better of relaxed and small to the bound, relative. Where nothing else is kept: one start and
-two neighbours a gait, and 8 knot intervals a bound, so both sides can still move.
+two neighbours a gait, and 8 knot intervals a bound, so both sides can still move. An empty place is not computed.
 
 | mu_t | mu_b | gait | distance | relaxed | small | bound | unknowns | gap |
 |---|---|---|---|---|---|---|---|---|
@@ -52,7 +52,8 @@ def value(row: Row, known: dict) -> float:
 
 def line(row: Row, known: dict) -> str:
     """A row of the table."""
-    gait, small, bound = (best_held(row, part, known) for part in ("gait", "small", "bound"))
+    gait, small = (best_held(row, part, known) for part in ("gait", "small"))
+    bound = known.get(f"{row.name} bound", {})
     least = smallest_bound(row, known)
 
     def cell(of: dict, key: str, form: str, mark: str = "") -> str:
@@ -63,7 +64,8 @@ def line(row: Row, known: dict) -> str:
         f"{row.mu[0]:g}", f"{row.mu[2]:g}", cell(gait, "efficiency", ".4f", "" if gait.get("passed") else " (not certified)"),
         cell(gait, "distance", ".3f"), cell(gait, "relaxed", ".4f", "" if gait.get("sharp") else "*"),
         cell(small, "efficiency", ".4f"),
-        f"{least:.4f}{program}", cell(bound, "unknowns", "d"), f"{100 * (1 - value(row, known) / least):.1f} %",
+        f"{least:.4f}{program}" if np.isfinite(least) else "", cell(bound, "unknowns", "d"),
+        f"{100 * (1 - value(row, known) / least):.1f} %" if np.isfinite(least) else "",
     ]  # fmt: skip
     return f"| {' | '.join(cells)} |"
 
@@ -99,7 +101,8 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=1, help="of relaxed gaits, beside those of two neighbours")
     parser.add_argument("--parts", nargs="+", default=["gait", "bound"], choices=["gait", "bound", "small"])
     options = parser.parse_args()
-    compute_missing(rows(), options.parts, options.starts, options.seconds)
+    for part in options.parts:
+        compute_missing(rows(), [part], options.starts, options.seconds)
     known = read()
     lines = [line(row, known) for row in sorted(rows())]
     (OUT / "plane_from_both_sides.md").write_text(HEAD + "\n".join(lines) + "\n", encoding="utf-8")
