@@ -1,6 +1,7 @@
-"""Guarantee an upper bound for the isotropic three-link body; writes what was proved as JSON.
+"""Guarantee an upper bound for a three-link body under associated friction; writes what was proved as JSON.
 
-python -m scripts.bound_guaranteed --target 0.47 [--limit 3.14159265] [--seconds 1200] [--part 1 1] [--out results]
+python -m scripts.bound_guaranteed --target 0.47 [--limit 3.14159265] [--lengths L1 L2 L3]
+    [--friction 2 1 1 --law Elliptic] [--seconds 1200] [--part 1 1] [--out results]
 
 The potential is the kept one for that limit (`scripts.check_potential`), or one made anew. Seconds are of processor time, of
 all threads (`OMP_NUM_THREADS`, else as many as there are processors). `--part 2 4` does the second of four parts: the bound
@@ -19,22 +20,19 @@ import numpy as np
 
 from colloc.bounds.guaranteed import certify
 from colloc.bounds.sampled import efficiency_bound
-from colloc.bounds.sampling import Domain
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
-from scripts.check_potential import potentials
+from scripts.check_potential import add_domain, domain_of, potentials
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--target", type=float, required=True)
     parser.add_argument("--seconds", type=float, default=1200.0)
-    parser.add_argument("--limit", type=float, default=float(np.pi))
+    add_domain(parser, float(np.pi))
     parser.add_argument("--part", type=int, nargs=2, default=[1, 1], metavar=("K", "N"))
     parser.add_argument("--out", type=Path, default=Path("results"))
     arguments = parser.parse_args()
-    domain = Domain(Chain(), Friction(), arguments.limit)
-    same = [each for each in potentials() if each.domain.friction.isotropic]
+    domain = domain_of(arguments)
+    same = [each for each in potentials() if (each.domain.body, each.domain.friction) == (domain.body, domain.friction)]
     kept = [each for each in same if abs(each.domain.joint_limit - domain.joint_limit) < 1e-8]
     if kept:
         space, free = kept[0].space, kept[0].free
@@ -47,8 +45,10 @@ def main() -> None:
     certificate = certify(domain, space, free, arguments.target, seconds=arguments.seconds, part=part)
     print(certificate, f"wall time {time.perf_counter() - begin:.0f} s")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    name = f"guaranteed-{arguments.limit:.4f}-{arguments.target:g}-{part[0]}-of-{part[1]}.json"
-    (arguments.out / name).write_text(json.dumps(asdict(certificate), indent=1) + "\n")
+    stated = {"lengths": arguments.lengths, "law": arguments.law, "mu": arguments.friction, "joint_limit": arguments.limit}
+    numbers = "-".join(f"{x:g}" for x in (*arguments.lengths, *arguments.friction, round(arguments.limit, 4), arguments.target))
+    name = f"guaranteed-{arguments.law}-{numbers}-{part[0]}-of-{part[1]}.json"
+    (arguments.out / name).write_text(json.dumps(stated | {"part": part} | asdict(certificate), indent=1) + "\n")
 
 
 if __name__ == "__main__":

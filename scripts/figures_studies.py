@@ -1,4 +1,4 @@
-"""The friction plane: which kind of gait is best, how efficient it is, and how far that is from what any gait could do."""
+"""The friction plane: which kind of gait is best, and how efficient it is."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from colloc.pictures.style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, styled, subplots
+from colloc.pictures.style import GREEN, ORANGE, SEQUENTIAL, SKY, styled, subplots
 from colloc.studies.gait_class import DIRECT, RETROGRADE, STANDING
 from scripts.panel_marks import letter
 
@@ -38,7 +38,6 @@ def friction_plane_figure(
     kind: np.ndarray,
     symmetry: np.ndarray,
     small: np.ndarray,
-    bound: np.ndarray,
 ) -> Any:
     """Three panels over the plane.
 
@@ -52,8 +51,6 @@ def friction_plane_figure(
         "retrograde", "standing" or "direct"; "both", "bilateral", "antipodal" or "none". "" where there is none.
     small : (n, m) of bool
         Gaits at the smallest shape speed that was allowed.
-    bound : (n, m)
-        Upper bounds computed for the body; NaN where none was.
     """
     x, y = _edges(mu_t), _edges(mu_b)
     with styled():
@@ -82,12 +79,7 @@ def friction_plane_figure(
         trivial = 1.0 / np.minimum(1.0, np.minimum.outer(mu_t, mu_b))
         gap = right.pcolormesh(x, y, (efficiency / trivial).T, cmap=SEQUENTIAL, vmin=0, vmax=1)
         figure.colorbar(gap, ax=right, label=r"efficiency $\times\ \min(\mu)/\mu_f$")
-        for i, j in zip(*np.nonzero(np.isfinite(bound)), strict=True):
-            value = efficiency[i, j] / bound[i, j]
-            if np.isfinite(value):
-                box = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": BLUE, "lw": 0.6}
-                right.text(mu_t[i], mu_b[j], f"{value:.2f}", ha="center", va="center", fontsize=6.5, bbox=box)
-        right.set_title("over the bound 1/min($\\mu$); boxes: over\nthe bound for every gait of this body")
+        right.set_title("over the bound 1/min($\\mu$)")
         for axes, name in zip((left, middle, right), "abc", strict=True):
             _plane(axes, mu_t, mu_b)
             letter(axes, name)

@@ -1,9 +1,8 @@
-"""Figure and table of the friction plane: python -m scripts.friction_plane [--results FOLDER] [--bounds N] [--output FOLDER]
+"""Figure and table of the friction plane: python -m scripts.friction_plane [--results FOLDER] [--output FOLDER]
 
 Reads what ``colloc sweep studies/friction_plane.py`` left in FOLDER/friction_plane.nc, takes the best gait
-over the classes searched, and writes friction_plane.png, .pdf and .md. With ``--bounds N`` an upper bound for every gait of
-the body is computed first on a subset of N x N points (sampled, with a small spline basis: see docs/bound.md), kept in
-FOLDER/bounds.sqlite; nothing is interpolated between them.
+over the classes searched, and writes friction_plane.png, .pdf and .md. Bounds for every gait of the body, and the best gaits of
+any class, are those of `scripts.plane_from_both_sides`.
 """
 
 from __future__ import annotations
@@ -14,15 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.bounds.sampled import Bound, Budget, efficiency_bound, known_bound
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.pictures.style import save
 from colloc.studies.store import StudyFile, load_study
 from colloc.system.errors import StoreError
 from scripts.figures_studies import friction_plane_figure
 
-SMALL_BASIS = Budget(intervals=6, shapes=12, directions=24, rounds=12, starts=60, tolerance=5e-3)
 COMMAND = "colloc sweep studies/friction_plane.py && python -m scripts.friction_plane"
 
 
@@ -32,25 +27,6 @@ def best_over(table_values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarr
     where = filled.argmax(axis=axis)
     best = filled.max(axis=axis)
     return np.where(np.isfinite(best), best, np.nan), where
-
-
-def bounds(mu_t: np.ndarray, mu_b: np.ndarray, count: int, cache: Path) -> np.ndarray:
-    """Upper bounds on a count x count subset, (n, m), NaN elsewhere; those in the cache are always used."""
-    found = np.full((mu_t.size, mu_b.size), np.nan)
-    rows, columns = (set(np.unique(np.linspace(0, v.size - 1, count).round().astype(int))) for v in (mu_t, mu_b))
-    for i, t in enumerate(mu_t):
-        for j, b in enumerate(mu_b):
-            law = Friction(float(t), 1.0, float(b))
-            bound: Bound | None
-            if count and i in rows and j in columns:
-                bound = efficiency_bound(Chain(), law, budget=SMALL_BASIS, cache=cache)
-                doubt = "" if bound.converged else ", not converged"
-                print(f"bound at mu_t {t:.3f}, mu_b {b:.3f}: {bound.sampled:.4f} ({bound.seconds:.0f} s{doubt})", flush=True)
-            else:
-                bound = known_bound(Chain(), law, budget=SMALL_BASIS, cache=cache) if cache.exists() else None
-            if bound is not None:
-                found[i, j] = bound.sampled
-    return found
 
 
 def winners(study: StudyFile) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -63,7 +39,7 @@ def winners(study: StudyFile) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     return efficiency, rest
 
 
-def table(mu_t: np.ndarray, mu_b: np.ndarray, efficiency: np.ndarray, rest: dict, bound: np.ndarray) -> list[str]:
+def table(mu_t: np.ndarray, mu_b: np.ndarray, efficiency: np.ndarray, rest: dict) -> list[str]:
     """Markdown for people: counts, then a row for each of some points."""
     kinds = Counter(np.where(np.isfinite(efficiency), rest["gait_class"], "no certified gait").ravel())
     lines = ["# The friction plane of the three-link crawler", "", f"Written by `{COMMAND}`."]
@@ -73,16 +49,15 @@ def table(mu_t: np.ndarray, mu_b: np.ndarray, efficiency: np.ndarray, rest: dict
     lines += [f"| {name} | {n} |" for name, n in kinds.most_common()]
     lines += [
         "",
-        "| mu_t/mu_f | mu_b/mu_f | efficiency | kind, symmetry | winding | small strokes | 1/min(mu) | bound, sampled |",
+        "| mu_t/mu_f | mu_b/mu_f | efficiency | kind, symmetry | winding | small strokes | 1/min(mu) |",
     ]
-    lines += ["|---|---|---|---|---|---|---|---|"]
+    lines += ["|---|---|---|---|---|---|---|"]
     for i in range(0, mu_t.size, 2):
         for j in range(0, mu_b.size, 7):
             limit = 1.0 / min(1.0, mu_t[i], mu_b[j])
-            sampled = f"{bound[i, j]:.4f}" if np.isfinite(bound[i, j]) else ""
             lines.append(
                 f"| {mu_t[i]:.3f} | {mu_b[j]:.3f} | {efficiency[i, j]:.4f} | {rest['gait_class'][i, j]} "
-                f"| {rest['winding'][i, j]} | {'yes' if rest['at_slowest'][i, j] else ''} | {limit:.3f} | {sampled} |"
+                f"| {rest['winding'][i, j]} | {'yes' if rest['at_slowest'][i, j] else ''} | {limit:.3f} |"
             )
     return lines
 
@@ -91,7 +66,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path("results"))
     parser.add_argument("--output", type=Path, help="folder (default: the same)")
-    parser.add_argument("--bounds", type=int, default=0, metavar="N")
     options = parser.parse_args()
     try:
         study = load_study(options.results / "friction_plane.nc")
@@ -99,13 +73,12 @@ def main() -> None:
         parser.error(f"{error} colloc sweep studies/friction_plane.py makes it.")
     mu_t, mu_b = study.coordinates["mu_t"], study.coordinates["mu_b"]
     efficiency, rest = winners(study)
-    bound = bounds(mu_t, mu_b, options.bounds, options.results / "bounds.sqlite")
     parts = [text.split(", ") if text else ("", "") for text in rest["gait_class"].ravel()]
     kind, symmetry = (np.array([p[k].split(" ")[0] for p in parts]).reshape(efficiency.shape) for k in (0, 1))
-    figure = friction_plane_figure(mu_t, mu_b, efficiency, kind, symmetry, rest["at_slowest"].astype(bool), bound)
+    figure = friction_plane_figure(mu_t, mu_b, efficiency, kind, symmetry, rest["at_slowest"].astype(bool))
     folder = options.output or options.results
     print(*save(figure, folder / "friction_plane"), sep="\n")
-    text = "\n".join(table(mu_t, mu_b, efficiency, rest, bound)) + "\n"
+    text = "\n".join(table(mu_t, mu_b, efficiency, rest)) + "\n"
     (folder / "friction_plane.md").write_text(text, encoding="utf-8")
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -30,7 +30,7 @@ import numpy as np
 
 from colloc.bounds.infinitesimal import best_small_gait, small_gait
 from colloc.bounds.recheck import largest_ratio
-from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.bounds.sampled import FOUR_LINKS, Budget, efficiency_bound
 from colloc.gaits.guesses import largest_factor
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
@@ -127,11 +127,24 @@ def finite(body: Chain, solution: Solution, seconds: float) -> dict[str, Any]:
     }
 
 
+def nearest(row: Row) -> list[Row]:
+    """The rows with as many links whose gaits are kept, one a law, of the nearest limit; the nearest laws first."""
+
+    def distance(other: Row) -> tuple[float, float]:
+        return float(np.abs(np.log(np.divide(row.mu, other.mu))).sum()), abs(row.limit - other.limit)
+
+    rows = {row_of(key)[0] for key in read() if key.endswith(" gait")}
+    kept = sorted((r for r in rows if r.links == row.links and r.file("gait").exists()), key=distance)
+    return list({r.mu: r for r in reversed(kept)}.values())[::-1]
+
+
 def gait(row: Row, starts: int) -> dict[str, Any]:
-    """The best relaxed gait that travels, begun also from two that are kept: of the row, equal coefficients, other limits."""
+    """The best relaxed gait that travels, begun also from two kept ones of the nearest laws, both ways round: a gait may travel
+    backwards where mu_b exceeds mu_f."""
     begin = time.process_time()
-    others = [row._replace(limit=limit, mu=mu) for limit in (row.limit, *LIMITS) for mu in (row.mu, COEFFICIENTS[0])]
-    first = [relaxation(other.file("gait")).gait.mean.realised() for other in others if other.file("gait").exists()][:2]
+    near = [relaxation(other.file("gait")).gait.mean.realised() for other in nearest(row)[:2]]
+    senses = (1,) if Friction(*row.mu).reversible else (1, -1)
+    first = [replace(one, corners=one.corners[:, ::sense]) for one in near for sense in senses]
     ends = []
     for symmetry in SYMMETRIES:
         problem = Problem(
@@ -192,7 +205,7 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
             seconds = time.process_time() - begin
             return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
     friction = Friction(*row.mu)
-    budget = BUDGET if friction.reversible else replace(BUDGET, harmonics=DIRECTED)
+    budget = FOUR_LINKS if row.links == 4 else BUDGET if friction.reversible else replace(BUDGET, harmonics=DIRECTED)
     found = efficiency_bound(row.body, friction, row.limit, budget=budget)
     return {
         "sampled": found.sampled, "floor": found.floor, "converged": found.converged, "unknowns": len(found.coefficients),
@@ -298,9 +311,23 @@ def line(row: Row, known: dict) -> str:
 
 
 def rows_of(known: dict) -> list[Row]:
-    """The rows of which something is known, in the order of the table."""
+    """The rows of the six laws of which something is known, in the order of the table."""
     order = {tuple(map(float, mu)): k for k, mu in enumerate(COEFFICIENTS)}
-    return sorted({row_of(key)[0] for key in known}, key=lambda r: (r.links, r.width, r.limit, order[r.mu]))
+    rows = {row_of(key)[0] for key in known}
+    return sorted((row for row in rows if row.mu in order), key=lambda r: (r.links, r.width, r.limit, order[r.mu]))
+
+
+def compute_missing(rows: Iterable[Row], parts: Iterable[str], starts: int, seconds: float) -> None:
+    """Compute and keep what can be and is not known; begin nothing after so much processor time."""
+    GAITS.mkdir(parents=True, exist_ok=True)
+    for row, part in product(rows, parts):
+        if time.process_time() < seconds and wanted(row, part, read()):
+            try:
+                put(f"{row.name} {part}", COMPUTE[part](row, starts))
+            except CollocError as error:
+                print(f"{row.name}, {part}: {error}")
+                continue
+            print(part, line(row, read()), flush=True)
 
 
 def main() -> None:
@@ -313,16 +340,7 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=4, help="of relaxed gaits, beside the one found for equal coefficients")
     parser.add_argument("--seconds", type=float, default=np.inf)
     options = parser.parse_args()
-    GAITS.mkdir(parents=True, exist_ok=True)
-    for row in asked(options):
-        for part in options.parts:
-            if time.process_time() < options.seconds and wanted(row, part, read()):
-                try:
-                    put(f"{row.name} {part}", COMPUTE[part](row, options.starts))
-                except CollocError as error:
-                    print(f"{row.name}, {part}: {error}")
-                    continue
-                print(part, line(row, read()), flush=True)
+    compute_missing(asked(options), options.parts, options.starts, options.seconds)
     known = read()
     lines = [f"| {' | '.join(COLUMNS)} |", "|" + "---|" * len(COLUMNS), *(line(row, known) for row in rows_of(known))]
     TABLE.write_text(HEAD + "\n".join(lines) + "\n")

@@ -1,7 +1,7 @@
 """From the bound to the gait: the multipliers of the bound's program as a measure, drawn, and a start for a relaxed gait.
 
 python -m scripts.measure_to_gait [--out results] [--friction 1 1 1] [--limit 2.5] [--intervals 8] [--first 8] [--no-gait]
-    [--harmonics 1 3] [--keep]
+    [--harmonics 1 3] [--lengths L1 L2 L3] [--law Elliptic] [--keep]
 
 Writes measure.png, and prints what the program says and what the search makes of it, with no other start. With `--no-gait` it
 prints only what the program says, its unknowns and its knots; with `--keep` the potential joins those kept.
@@ -13,25 +13,22 @@ import argparse
 import time
 from pathlib import Path
 
+from colloc.bounds.coulomb_motion import swaps_ends
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
-from colloc.bounds.sampling import Domain
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
 from colloc.pictures.style import save
 from colloc.search.relaxed_search import best_relaxed_gait
-from scripts.check_potential import Kept, keep
+from scripts.check_potential import Kept, add_domain, domain_of, keep
 from scripts.figures_measure import measure_figure
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("results"))
-    parser.add_argument("--friction", type=float, nargs=3, default=[1.0, 1.0, 1.0], metavar=("MU_T", "MU_F", "MU_B"))
-    parser.add_argument("--limit", type=float, default=2.5)
+    add_domain(parser, 2.5)
     parser.add_argument("--intervals", type=int, default=8, help="knot intervals of the potential")
     parser.add_argument("--first", type=int, default=8, help="even ones to begin with; the rest goes where it is wanted")
     parser.add_argument("--harmonics", type=int, nargs="+", help="in the heading; 1 3, or 0 1 where mu_b differs from mu_f")
@@ -40,10 +37,11 @@ def main() -> None:
     parser.add_argument("--keep", action="store_true", help="add the potential to results/curated/potentials.json")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    body, friction = Chain(), Friction(*options.friction)
-    harmonics = tuple(options.harmonics or ((1, 3) if friction.reversible else (0, 1)))
-    space = PotentialSpace(TensorSpline(2, options.limit, min(options.first, options.intervals)), harmonics, True)
-    domain = Domain(body, friction, options.limit)
+    domain = domain_of(options)
+    harmonics = tuple(options.harmonics or ((1, 3) if domain.friction.reversible else (0, 1)))
+    space = PotentialSpace(
+        TensorSpline(2, options.limit, min(options.first, options.intervals)), harmonics, swaps_ends(domain.body)
+    )
     lattice = {"shapes": 20, "directions": 48, "rounds": 60, "starts": 150}
     begin = time.process_time()
     bound = exchanged_optimum(domain, space, intervals=options.intervals, tolerance=options.tolerance, **lattice)
@@ -58,7 +56,9 @@ def main() -> None:
         keep(Kept(domain, bound.space, bound.free, bound.floor))
     if options.no_gait:
         return
-    problem = Problem("measure", friction=friction, gait=Relaxed(3, "both"), delta=1e-5, joint_limit=options.limit)
+    problem = Problem(
+        "measure", body=domain.body, friction=domain.friction, gait=Relaxed(3, "both"), delta=1e-5, joint_limit=options.limit
+    )
     solution = best_relaxed_gait(problem, 0, (1, 4), first=(measure.path(),))
     assert solution.relaxed is not None
     relaxed, best = solution.relaxed.certificate, solution.relaxed.best

@@ -175,9 +175,10 @@ def efficiencies(name):
 
 @pytest.mark.parametrize("page", ["README.md", *(f"docs/{name}.md" for name in ("known", "gait_classes", "bound"))])
 def test_efficiencies_are_those_of_the_curated_tables(page):
-    """Of the table that a row links to, if it does; else of gallery, gaits without contact or bounds."""
+    """Of the table that a row links to, if it does; else of gallery, gaits without contact or bounds, or kept potentials."""
     general = [row["efficiency"] for row in GALLERY.values() if "efficiency" in row]
     general += efficiencies("without_contact.md") + efficiencies("frontier.md")
+    general += [kept["program"] for kept in json.loads((ROOT / "results/curated/potentials.json").read_text())]
     general += [value for links in ("", "_4", "_5") for value in efficiencies(f"gait_classes{links}.md")]
     checked = 0
     for header, cells in rows_of(ROOT / page):

@@ -14,15 +14,11 @@ from scipy import sparse
 from colloc.bounds.coulomb_motion import CoulombMotion
 from colloc.bounds.knots import with_more_knots
 from colloc.bounds.measure import Measure
-from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.potential import PotentialSpace, Samples, largest_ratios
 from colloc.bounds.recheck import near_the_top, summits_met
 from colloc.bounds.sampling import Domain
 from colloc.numerics.minimax_program import Minimax, smallest_maximum
 
-_SMOOTHING = 1e-5
-"""Weight of the roughness, which is about 0.2: it costs 1e-6 of the bound."""
-_EARLY_SMOOTHING = 1e-4
-_EARLY_ROUNDS = 4
 _LARGEST_CUT = 1500
 _INNER_ROUNDS = 15
 _HELD = 2e-4
@@ -60,8 +56,10 @@ class Optimum(NamedTuple):
 class _Program:
     """The inequalities in use, and their optimum."""
 
-    def __init__(self, samples: Samples, held: list[tuple[np.ndarray, np.ndarray]], rng: np.random.Generator) -> None:
-        self.space, self.roughness, self.smoothing = samples.space, samples.space.roughness, _EARLY_SMOOTHING
+    def __init__(
+        self, samples: Samples, held: list[tuple[np.ndarray, np.ndarray]], rng: np.random.Generator, smoothing: float
+    ) -> None:
+        self.space, self.roughness, self.smoothing = samples.space, samples.space.roughness, smoothing
         self.samples = samples
         self.rng = rng
         self.rows, self.constants = sparse.csr_matrix((0, self.space.size)), np.empty(0)
@@ -70,15 +68,15 @@ class _Program:
         self.best = self._solved()
 
     @classmethod
-    def begun(cls, samples: Samples, rng: np.random.Generator) -> _Program:
+    def begun(cls, samples: Samples, rng: np.random.Generator, smoothing: float) -> _Program:
         """With some of the samples, chosen at random, at headings all round."""
         chosen = np.sort(rng.permutation(samples.motion.size)[: 3 * samples.space.size])
-        return cls(samples, [(chosen, np.full(chosen.size, h)) for h in np.arange(12) * (np.pi / 6)], rng)
+        return cls(samples, [(chosen, np.full(chosen.size, h)) for h in np.arange(12) * (np.pi / 6)], rng, smoothing)
 
     def moved_to(self, space: PotentialSpace) -> _Program:
         """With the same inequalities, as other potentials have them."""
         kept = self._kept()
-        return _Program(Samples(space, self.samples.motion), [(self.index[kept], self.heading[kept])], self.rng)
+        return _Program(Samples(space, self.samples.motion), [(self.index[kept], self.heading[kept])], self.rng, self.smoothing)
 
     def _kept(self) -> np.ndarray:
         """Mask of inequalities that matter."""
@@ -136,6 +134,7 @@ def exchanged_optimum(
     rounds: int,
     starts: int,
     tolerance: float,
+    smoothing: float = 1e-5,
     seed: int = 0,
 ) -> Optimum:
     """The potential of `space`, or of one with more knots, whose largest ratio over `domain` is smallest.
@@ -154,21 +153,22 @@ def exchanged_optimum(
         Climbs a round; the final check makes three times as many.
     tolerance : float
         Excess of the summits over the program's value at which it counts as converged.
+    smoothing : float
+        Weight of the roughness of the potential, which is about 0.2: 1e-5 costs 1e-6 of the bound. Coarse lattices leave more
+        of the potential unseen between the samples, and need more of it.
     seed : int
     """
     rng = np.random.default_rng(seed)
-    program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng)
+    program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng, smoothing)
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
     seen, quiet, surprise = program.samples.motion.size, 0, 0.1
     for count in range(1, rounds + 1):
-        if count == _EARLY_ROUNDS:
-            program.smoothing = _SMOOTHING
         # a potential that the next climbs will refute need not be exact
         held = program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
         free = program.best.x
 
         def ratio(motion: CoulombMotion, space: PotentialSpace = space, free: np.ndarray = free) -> np.ndarray:
-            return Samples(space, motion).ratio(free)[0]
+            return largest_ratios(space, free, motion)
 
         last = quiet > 0 or count == rounds
         fresh = domain.lattice(shapes * (1 + last), directions * (1 + last), max((count * _GOLDEN) % 1.0, 0.01))

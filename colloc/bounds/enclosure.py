@@ -1,9 +1,10 @@
 r"""How far balanced motions may be from interpolated ones, over whole cells of shapes and rates (docs/bound.md, section 3).
 
-A cell is a box of (angle 1, angle 2, s) with rates (1, s), three links and unit isotropic friction. At its eight corners the
-balance is solved; the trial motion interpolates. Two ways say what the gain of the balanced motion may have above the trial
-motion's, and its power below the interpolated power: strong convexity of the dissipation (compiled, second order in the size of
-the cell), and small loads (first order; where links begin to slide, which is where convexity fails, its excess is small).
+A cell is a box of (angle 1, angle 2, s) with rates (1, s), of three links under associated friction with mu_t = 1: dissipation
+is the integral of sqrt((sigma vs)^2 + vn^2), sigma = mu_f or mu_b. At its eight corners the balance is solved; the trial motion
+interpolates. Two ways say what the gain of the balanced motion may have above the trial motion's, and its power below the
+interpolated power: strong convexity of the dissipation (compiled, second order in the size of the cell), and small loads (first
+order; where links begin to slide, which is where convexity fails, its excess is small).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from colloc.bounds.loaded_balance import Loaded, loaded_balance
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import address, native_kernel
 
 DELTA = 1e-9
@@ -70,11 +72,11 @@ class ReferencePoint(NamedTuple):
     curvature: np.ndarray
 
 
-def corner_motions(body: Chain, cells: Cells) -> Loaded:
+def corner_motions(body: Chain, friction: Friction, cells: Cells) -> Loaded:
     """The balance at the corners."""
     start = np.zeros((3, cells.points.shape[1]))
     start[2] = (1.0 - cells.points[2]) / 3.0
-    return loaded_balance(body, cells.points[:2], cells.rates, np.zeros_like(start), start, DELTA)
+    return loaded_balance(body, friction, cells.points[:2], cells.rates, np.zeros_like(start), start, DELTA)
 
 
 def spread(values: np.ndarray, axis: int) -> np.ndarray:
@@ -83,7 +85,7 @@ def spread(values: np.ndarray, axis: int) -> np.ndarray:
     return np.sqrt(((values[:, :, ~low] - values[:, :, low]) ** 2).sum(axis=0)).max(axis=1)
 
 
-def by_convexity(body: Chain, cells: Cells, free: Loaded, reference: ReferencePoint) -> Allowance:
+def by_convexity(body: Chain, friction: Friction, cells: Cells, free: Loaded, reference: ReferencePoint) -> Allowance:
     """From strong convexity; compiled, as the motions at the corners are that it is given."""
     library = native_kernel(body)
     assert library is not None
@@ -91,6 +93,7 @@ def by_convexity(body: Chain, cells: Cells, free: Loaded, reference: ReferencePo
     point = np.stack([reference.centre.real, reference.centre.imag, reference.beside], axis=1)
     given = (
         np.array(body.lengths),
+        np.array([friction.mu_f, friction.mu_b]),
         cells.low.T,
         cells.size.T,
         free.velocity.T[cells.at],
@@ -98,27 +101,36 @@ def by_convexity(body: Chain, cells: Cells, free: Loaded, reference: ReferencePo
         free.residual[:, cells.at].max(axis=2).T,
         point,
     )
-    length, *arrays = (np.ascontiguousarray(each, dtype=float) for each in given)
+    length, stretch, *arrays = (np.ascontiguousarray(each, dtype=float) for each in given)
     found = np.empty((n, 2))
-    library.colloc_enclosure(address(length), 0, n, *map(address, arrays), DELTA, address(found))
+    library.colloc_enclosure(address(length), address(stretch), 0, n, *map(address, arrays), DELTA, address(found))
     return Allowance(found[:, 0] + _ROUNDING, found[:, 1] + _ROUNDING)
 
 
-def _unbalanced(body: Chain, cells: Cells, state: Loaded) -> tuple[np.ndarray, np.ndarray]:
+def _unbalanced(body: Chain, friction: Friction, cells: Cells, state: Loaded) -> tuple[np.ndarray, np.ndarray]:
     """What interpolated forces leave unbalanced, as a share of the dissipation; and the error of their power, ``(n,)`` each."""
     l1, l2, l3 = body.lengths
     h1, h2, hs = cells.size
+    # the dissipation of a velocity V is at least `smallest` |V|, and a force at most `largest`
+    kappa, most = friction.smallest * _KAPPA, friction.largest
     forces = state.forces[:, :, cells.at]
     left = state.residual[:, cells.at].max(axis=2)
-    share = left[0] / l2 + 4.0 * left[1] / l2**2 + _ROUNDING
+    share = (left[0] / l2 + 4.0 * left[1] / l2**2) / friction.smallest + _ROUNDING
     for link, length, h, axis in ((0, l1, h1, 0), (2, l3, h2, 1)):
-        share = share + (h * h / 8 * length + h / 4 * spread(forces[link, :2], axis)) / (_KAPPA * (length + l2))
+        share = share + (h * h / 8 * most * length + h / 4 * spread(forces[link, :2], axis)) / (kappa * (length + l2))
     # the moment about the head joint times s is bilinear
     moment = forces[2, 1] * (0.5 * l3) + forces[2, 2]
     return share, hs / 4 * spread(moment[None], 2)
 
 
-def by_loads(body: Chain, cells: Cells, free: Loaded, reference: ReferencePoint, multiplier: np.ndarray | float) -> Allowance:
+def by_loads(
+    body: Chain,
+    friction: Friction,
+    cells: Cells,
+    free: Loaded,
+    reference: ReferencePoint,
+    multiplier: np.ndarray | float,
+) -> Allowance:
     """From balances under loads of the size 1/multiplier: a minimiser cannot be changed much by a small force."""
     l1, l2, l3 = body.lengths
     h1, h2, _ = cells.size
@@ -126,15 +138,16 @@ def by_loads(body: Chain, cells: Cells, free: Loaded, reference: ReferencePoint,
     rise = np.full(cells.low.shape[1], _ROUNDING)
     for length, h, side, axis in ((l1, h1, -0.5, 0), (l3, h2, 0.5, 1)):
         joint = np.stack([z[0], z[1] + side * l2 * z[2]])
-        rise += length * (h * h / 8 * np.sqrt((joint**2).sum(axis=0)).max(axis=1) + h / 4 * spread(joint, axis))
+        moved = h * h / 8 * np.sqrt((joint**2).sum(axis=0)).max(axis=1) + h / 4 * spread(joint, axis)
+        rise += friction.largest * length * moved
     above = free.potential[cells.at] + rise[:, None]
     spins = z[2].max(axis=1) - z[2].min(axis=1)
     excess = []
     one, c = np.ones_like(cells.points[2]), reference.at
     for fx, fy, turn in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, _TORQUE), (0, 0, -_TORQUE)):
         load = np.stack([fx * one, fy * one, fy * c.real - fx * c.imag + turn])
-        state = loaded_balance(body, cells.points[:2], cells.rates, load / multiplier, free.velocity, DELTA)
-        share, bilinear = _unbalanced(body, cells, state)
+        state = loaded_balance(body, friction, cells.points[:2], cells.rates, load / multiplier, free.velocity, DELTA)
+        share, bilinear = _unbalanced(body, friction, cells, state)
         below = multiplier * (state.power + state.leftover_power) - (load * state.velocity).sum(axis=0)
         trial = (load * free.velocity).sum(axis=0)
         each = (multiplier * (1.0 + share)[:, None] * above - (below + trial)[cells.at]).max(axis=1) + multiplier * bilinear
@@ -142,7 +155,7 @@ def by_loads(body: Chain, cells: Cells, free: Loaded, reference: ReferencePoint,
         excess.append(np.maximum(each + (0.25 * reference.change * spins if turn == 0 else 0.0), 0.0))
     forward, back, left, right, spin, counter = excess
     turned = np.maximum(spin, counter) / _TORQUE
-    share, bilinear = _unbalanced(body, cells, free)
+    share, bilinear = _unbalanced(body, friction, cells, free)
     lost = np.maximum(free.potential - free.power - free.leftover_power, 0.0)[cells.at].max(axis=1)
     return Allowance(
         np.hypot(np.maximum(forward, back), np.maximum(left, right))

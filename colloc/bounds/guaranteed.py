@@ -1,6 +1,7 @@
-r"""A guaranteed upper bound for a three-link body with isotropic friction: certificates for whole cells (docs/bound.md).
+r"""A guaranteed upper bound for a three-link body under associated friction: certificates for whole cells (docs/bound.md).
 
-Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest. Over a cell, gain and power
+Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest, or the same cells of the
+body turned end for end. Over a cell, gain and power
 of the balanced motion differ from what interpolates their values at the corners by at most what `bounds.enclosure` and
 `bounds.potential_range` say, so their ratio is largest at a corner. Cells that fail are split in eight.
 """
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -20,6 +22,8 @@ from colloc.bounds.potential_range import PotentialRange
 from colloc.bounds.sampled import Bound
 from colloc.bounds.sampling import Domain
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.contact import crossing_sums
+from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.system.processors import available_threads
 
@@ -29,6 +33,8 @@ _FIRST = 0.07
 _LAYERS = (1e-9, 1e-6, 1e-4, 1e-3, 4e-3, 8.75e-3, 0.0175, 0.035)
 """Rates of angle 2 between 0 and the first cells' size. Where one joint turns alone two links rest, and slide with the other
 joint however slowly it turns. The motion there is homogeneous: what a cell may not know of it is in proportion to its speed."""
+_THIN = 0.5
+"""Size in s over that in the angles below which s is not halved: so slow a joint moves all in proportion."""
 _LOAD = 4.0
 """Times the root of the cell's size: 1/multiplier of the loads. It balances what they move with what interpolation loses."""
 
@@ -61,34 +67,49 @@ class Guarantee:
 
 @dataclass(frozen=True)
 class _Lattice:
-    """Points between given edges, each interval halved so many times; cells are named by integers."""
+    """Points between given edges, each interval of an axis halved so many times; cells are named by integers."""
 
     edges: tuple[np.ndarray, ...]
-    level: int
+    levels: tuple[int, int, int]
 
     def coordinate(self, axis: int, index: np.ndarray) -> np.ndarray:
-        edges, parts = self.edges[axis], 1 << self.level
+        edges, parts = self.edges[axis], 1 << self.levels[axis]
         interval = np.minimum(index // parts, edges.size - 2)
         return edges[interval] + (edges[interval + 1] - edges[interval]) * ((index - interval * parts) / parts)
 
-    def cells(self, index: np.ndarray) -> Cells:
-        """The cells with low corners ``(3, n)``."""
+    def box(self, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Low corners and sizes of cells, ``(3, n)`` each."""
         low = np.stack([self.coordinate(axis, index[axis]) for axis in range(3)])
-        size = np.stack([self.coordinate(axis, index[axis] + 1) for axis in range(3)]) - low
+        return low, np.stack([self.coordinate(axis, index[axis] + 1) for axis in range(3)]) - low
+
+    def cells(self, index: np.ndarray) -> Cells:
+        """The cells of some names ``(3, n)``."""
+        low, size = self.box(index)
         corner = (index[:, :, None] + CORNERS.T[:, None, :]).reshape(3, -1)
-        extent = [(edges.size << self.level) + 1 for edges in self.edges]
+        extent = [(edges.size << level) + 1 for edges, level in zip(self.edges, self.levels, strict=True)]
         code = (corner[0] * extent[1] + corner[1]) * extent[2] + corner[2]
         _, first, back = np.unique(code, return_index=True, return_inverse=True)
         points = np.stack([self.coordinate(axis, corner[axis, first]) for axis in range(3)])
         return Cells(low, size, points, back.reshape(-1, 8))
 
+    def halved(self, index: np.ndarray, parents: np.ndarray) -> list[tuple[_Lattice, np.ndarray, np.ndarray]]:
+        """Lattices with parts of some cells, and what is known of each; cells that are thin in s are halved in angles only."""
+        size, found = self.box(index)[1], []
+        thin = size[2] < _THIN * size[:2].min(axis=0)
+        for cells, cut in ((thin, np.array([1, 1, 0])), (~thin, np.ones(3, dtype=int))):
+            parts = CORNERS[(cut >= CORNERS).all(axis=1)].T
+            halves = ((1 + cut)[:, None, None] * index[:, cells, None] + parts[:, None, :]).reshape(3, -1)
+            levels = tuple((np.array(self.levels) + cut).tolist())
+            found.append((_Lattice(self.edges, levels), halves, np.repeat(parents[cells], parts.shape[1])))
+        return found
 
-def cell_bounds(body: Chain, potential: PotentialRange, cells: Cells, goal: float) -> np.ndarray:
-    """Upper bounds of gain over power in the cells, ``(n,)``, for unit friction; infinite if nothing is known.
+
+def cell_bounds(body: Chain, friction: Friction, potential: PotentialRange, cells: Cells, goal: float) -> np.ndarray:
+    """Upper bounds of gain over power in the cells, ``(n,)``, under associated friction, mu_t = 1; infinite if unknown.
 
     Loads are tried where convexity alone does not bring the bound below `goal`.
     """
-    motions = corner_motions(body, cells)
+    motions = corner_motions(body, friction, cells)
     gain, power = potential.corner_gain(cells, motions)[cells.at], (motions.potential - DELTA)[cells.at]
     beyond, reference = potential.trial_error(cells, motions), potential.reference(cells)
 
@@ -99,32 +120,42 @@ def cell_bounds(body: Chain, potential: PotentialRange, cells: Cells, goal: floa
         return np.where((below.min(axis=1) > 0) & (value >= 0), value, np.inf)
 
     everything = np.arange(cells.low.shape[1])
-    value = largest(everything, by_convexity(body, cells, motions, reference))
+    value = largest(everything, by_convexity(body, friction, cells, motions, reference))
     still = np.flatnonzero(~(value <= goal))
     if still.size:
         few, used = cells.take(still)
         some = type(motions)(*(field[..., used] for field in motions))
         multiplier = _LOAD / np.sqrt(few.size[:2].max())
-        value[still] = np.fmin(value[still], largest(still, by_loads(body, few, some, potential.reference(few), multiplier)))
+        loaded = by_loads(body, friction, few, some, potential.reference(few), multiplier)
+        value[still] = np.fmin(value[still], largest(still, loaded))
     return value
 
 
-def _touches(body: Chain, low: np.ndarray) -> np.ndarray:
-    """Mask of cells above `low`, where angle 1 is positive, that may hold a shape where links 1 and 3 do not cross."""
-    if len(set(body.lengths)) > 1:
-        return np.ones(low.shape[1], dtype=bool)
-    return np.minimum(2 * low[0] + low[1], low[0] + 2 * low[1]) <= 2 * np.pi + 1e-9
+def _uncrossed(body: Chain, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Mask of boxes of angles ``(2, n)``, none of which holds both signs of an angle, that may hold a shape without crossing.
+
+    Links cross where two sums exceed pi (`colloc.mechanics.contact`). The first rises with angle 2, and with angle 1 it rises,
+    or rises and then falls: over a box of positive angles it is least at a corner. So is the second.
+    """
+    low, high = np.where(low.sum(axis=0) < 0, (-high, -low), (low, high))
+    near, turned = (crossing_sums(body, np.stack(each))[0] for each in ((low[0], low[1]), (high[0], low[1])))
+    other = crossing_sums(body, np.stack([low[0], high[1]]))[0]
+    crossed = (np.minimum(near[0], turned[0]) > np.pi + 1e-9) & (np.minimum(near[1], other[1]) > np.pi + 1e-9)
+    return ~(crossed[0] & (low >= 0.0).all(axis=0))
 
 
-def _first_edges(knots: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Of angle 1, which is not negative, of angle 2 and of s: with all knots, and no interval longer than `_FIRST`."""
+def _first_edges(knots: np.ndarray, reversible: bool) -> tuple[np.ndarray, ...]:
+    """Of angle 1, of angle 2 and of s: with all knots, and no interval longer than `_FIRST`.
+
+    Mirror image and reversal in time together change the signs of the angles and not of their rates.
+    """
     knots = np.unique(np.concatenate([knots, [0.0]]))
     counts = np.ceil(np.diff(knots) / _FIRST).astype(int)
     edges = np.concatenate([np.linspace(a, b, m, endpoint=False) for a, b, m in zip(knots, knots[1:], counts, strict=False)])
     edges = np.append(edges, knots[-1])
     thin = np.array(_LAYERS)
     rates = np.concatenate([thin, np.linspace(_FIRST, 1.0, int(np.ceil(1.0 / _FIRST)))])
-    return edges[edges >= 0.0], edges, np.concatenate([-rates[::-1], [0.0], rates])
+    return edges[edges >= 0.0] if reversible else edges, edges, np.concatenate([-rates[::-1], [0.0], rates])
 
 
 def certify(
@@ -142,7 +173,7 @@ def certify(
     Parameters
     ----------
     domain : Domain
-        Three links, the outer ones of the same length; isotropic friction.
+        Three links, and associated friction: equal coefficients, or `colloc.laws.elliptic.Elliptic`.
     space, free
         The potential, as `colloc.bounds.sampled.Bound` or a kept one has it.
     target : float
@@ -160,46 +191,69 @@ def certify(
         For a body or friction without a proof, or without a C compiler.
     """
     body, friction = domain.body, domain.friction
-    odd = 1 in space.harmonics and all(k % 2 for k in space.harmonics)
-    if not friction.isotropic or body.n_link != 3 or body.weights or not space.end_swap or not odd:
+    odd = not friction.reversible or all(k % 2 for k in space.harmonics)
+    if not friction.associated or body.n_link != 3 or body.weights or not (odd and 1 in space.harmonics):
         raise ProblemError(
-            "a bound is guaranteed only for three links, the outer ones alike, without weights of their own; isotropic "
-            "friction and odd harmonics from 1 on; "
-            "otherwise the sampled value stands."
+            "a bound is guaranteed only for three links without weights of their own, associated friction (equal coefficients, "
+            "or the elliptic law), and harmonics from 1 on, odd ones where mu_b = mu_f; otherwise the sampled value stands."
         )
-    begin, goal = time.process_time(), target * friction.mu_t
-    potential = PotentialRange(space, free)
-    edges = _first_edges(space.spline.knots)
-    index = np.stack([a.ravel() for a in np.meshgrid(*(np.arange(e.size - 1) for e in edges), indexing="ij")])
-    index = np.array_split(index, part[1], axis=1)[part[0] - 1]
-    parents, examined, level = np.full(index.shape[1], np.inf), 0, 0
-    with ThreadPoolExecutor(available_threads()) as pool:
-        while True:
-            lattice = _Lattice(edges, level)
-            kept = _touches(body, np.stack([lattice.coordinate(axis, index[axis]) for axis in (0, 1)]))
-            index, values = index[:, kept], parents[kept]
+    begin, unit = time.process_time(), friction.in_units_of(friction.mu_t)
+    views = [(body, free)]
+    if not space.end_swap:
+        views.append((Chain(body.lengths[::-1]), space.turned(free)))
+    left, examined, deepened = [np.empty(0)], 0, 0
+    for view, potential in views:
+        cover = _Cover(view, unit, PotentialRange(space, potential), target * friction.mu_t, begin + seconds, deepest)
+        values, count, level = cover.closed(part)
+        left.append(values)
+        examined, deepened = examined + count, max(deepened, level)
+    still = np.concatenate(left)
+    worst = float(still.max(initial=0.0)) / friction.mu_t
+    return Guarantee(max(target, worst), target, int(still.size), examined, deepened, time.process_time() - begin)
 
-            def bounds(first: int, lattice: _Lattice = lattice, index: np.ndarray = index) -> np.ndarray | None:
-                if time.process_time() - begin > seconds:
-                    return None
-                return cell_bounds(body, potential, lattice.cells(index[:, first : first + _CHUNK]), goal)
 
-            starts = range(0, index.shape[1], _CHUNK)
-            out_of_time = False
-            for first, found in zip(starts, pool.map(bounds, starts), strict=True):
-                if found is None:
-                    out_of_time = True
-                else:
-                    values[first : first + _CHUNK] = np.fmin(values[first : first + _CHUNK], found)
-                    examined += found.size
-            still = ~(values <= goal)
-            index, parents = index[:, still], values[still]
-            if out_of_time or not still.any() or level == deepest:
-                break
-            index = (2 * index[:, :, None] + CORNERS.T[:, None, :]).reshape(3, -1)
-            parents, level = np.repeat(parents, 8), level + 1
-    worst = float(parents.max(initial=0.0)) / friction.mu_t
-    return Guarantee(max(target, worst), target, int(parents.size), examined, level, time.process_time() - begin)
+@dataclass(frozen=True)
+class _Cover:
+    """Cells of one view of a body, under friction of mu_t = 1, and what they have to prove until when [processor time]."""
+
+    body: Chain
+    friction: Friction
+    potential: PotentialRange
+    goal: float
+    end: float
+    deepest: int
+
+    def closed(self, part: tuple[int, int]) -> tuple[np.ndarray, int, int]:
+        """What is known of the cells that stay open, the number of cells examined, and how often they were halved."""
+        edges = _first_edges(self.potential.spline.knots, self.friction.reversible)
+        index = np.stack([a.ravel() for a in np.meshgrid(*(np.arange(e.size - 1) for e in edges), indexing="ij")])
+        index = np.array_split(index, part[1], axis=1)[part[0] - 1]
+        work = deque([(_Lattice(edges, (0, 0, 0)), index, np.full(index.shape[1], np.inf))])
+        left, examined, level = [np.empty(0)], 0, 0
+        with ThreadPoolExecutor(available_threads()) as pool:
+            while work:
+                lattice, index, values = work.popleft()
+                low, size = lattice.box(index)
+                kept = _uncrossed(self.body, low[:2], low[:2] + size[:2])
+                index, values, level = index[:, kept], values[kept], lattice.levels[0]
+
+                def bounds(first: int, lattice: _Lattice = lattice, index: np.ndarray = index) -> np.ndarray | None:
+                    if time.process_time() > self.end:
+                        return None
+                    cells = lattice.cells(index[:, first : first + _CHUNK])
+                    return cell_bounds(self.body, self.friction, self.potential, cells, self.goal)
+
+                starts = range(0, index.shape[1], _CHUNK)
+                for first, found in zip(starts, pool.map(bounds, starts), strict=True):
+                    if found is not None:
+                        values[first : first + _CHUNK] = np.fmin(values[first : first + _CHUNK], found)
+                        examined += found.size
+                still = ~(values <= self.goal)
+                if level == self.deepest or time.process_time() > self.end:
+                    left.append(values[still])
+                elif still.any():
+                    work.extend(lattice.halved(index[:, still], values[still]))
+        return np.concatenate(left), examined, level
 
 
 def with_guarantee(bound: Bound, certificate: Guarantee) -> Bound:

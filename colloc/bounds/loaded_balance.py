@@ -1,8 +1,8 @@
-"""The balance of a body under isotropic friction and a small outside load: the dual certificate of the bound.
+"""The balance of a body under associated friction and a small outside load: the dual certificate of the bound.
 
-The body minimises its dissipation potential less the load's power. The friction forces found are admissible (|f| <= mu) and
-what they leave unbalanced is stated, which is all that `bounds.guaranteed` needs: a solve that stops early gives a weaker
-certificate, not a wrong one.
+The body minimises its dissipation potential less the load's power. The friction forces found are admissible (those of some
+velocity) and what they leave unbalanced is stated, which is all that `bounds.guaranteed` needs: a solve that stops early gives
+a weaker certificate, not a wrong one.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import compiled_loaded, native_kernel
 from colloc.system.errors import ProblemError
-
-_UNIT = Friction()
 
 
 class Loaded(NamedTuple):
@@ -36,9 +34,16 @@ class Loaded(NamedTuple):
 
 
 def loaded_balance(
-    body: Chain, angles: np.ndarray, rates: np.ndarray, load: np.ndarray, start: np.ndarray, delta: float, steps: int = 40
+    body: Chain,
+    friction: Friction,
+    angles: np.ndarray,
+    rates: np.ndarray,
+    load: np.ndarray,
+    start: np.ndarray,
+    delta: float,
+    steps: int = 40,
 ) -> Loaded:
-    """Balance with unit isotropic friction under `load` ``(3, n)`` (force, torque on the middle link), from `start` ``(3, n)``.
+    """Balance with associated friction under `load` ``(3, n)`` (force, torque on the middle link), from `start` ``(3, n)``.
 
     Compiled. Where Newton's method stalls on the creases of the potential, it is run again through falling delta.
 
@@ -50,4 +55,4 @@ def loaded_balance(
     library = native_kernel(body)
     if library is None:
         raise ProblemError("a guaranteed bound needs a C compiler (cc, gcc or clang): none was found.")
-    return Loaded(*compiled_loaded(library, body, _UNIT, angles, rates, load, start, delta, steps))
+    return Loaded(*compiled_loaded(library, body, friction, angles, rates, load, start, delta, steps))

@@ -21,14 +21,15 @@ CACHE = "bounds.sqlite"
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
-    None for bodies that are no chains, laws other than Coulomb's, other objectives, and gaits that turn. A cache that cannot be
-    read or written is left as it is, with a `ChangedFileWarning`: no result depends on it.
+    None for bodies that are no chains, laws that are neither Coulomb's nor the elliptic one, other objectives, and gaits that
+    turn. A cache that cannot be read or written is left as it is, with a `ChangedFileWarning`: no result depends on it.
     """
     friction = problem.friction
-    if not isinstance(problem.body, Chain) or type(friction) is not Friction:
+    if not isinstance(problem.body, Chain) or not isinstance(friction, Friction):
         if compute:
             raise ProblemError(
-                "upper bounds are computed for chains of links under Coulomb friction only; for this one there is 1/min(mu)."
+                "upper bounds are computed for chains of links under Coulomb friction, or the elliptic law, only; for this one "
+                "there is 1/min(mu)."
             )
         return None
     if not _bounded(problem):
@@ -56,6 +57,6 @@ def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
     if not _bounded(problem):
         return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.friction.smallest
-    known = isinstance(problem.body, Chain) and type(problem.friction) is Friction
+    known = isinstance(problem.body, Chain) and isinstance(problem.friction, Friction)
     tighter = "; --bound computes a tighter one" if known else ""
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

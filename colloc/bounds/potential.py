@@ -22,6 +22,7 @@ from colloc.numerics.spline import TensorSpline
 
 _HEADINGS = 48
 _NEWTON_STEPS = 3
+_AT_ONCE = 50000
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,21 @@ class PotentialSpace:
             full[k] += (1, 1j)[part] * (self.bases[part] @ free[where])
         return full
 
+    def turned(self, free: np.ndarray) -> np.ndarray:
+        """The same potential for the body turned end for end: ``c_k(q)`` becomes ``-conj(c_k(reversed q))``.
+
+        Turning the body and reversing time take angles q to -reversed q and rates r to reversed r; the velocity of the middle
+        link in its own axes and its heading stay as they are, the sense of its rotation does not. By the mirror image
+        ``c_k(-q) = conj(c_k(q))``.
+        """
+        found = np.empty_like(free)
+        for _, part, where in self.layout:
+            basis = self.bases[part]
+            table = (basis @ free[where]).reshape((self.spline.per_joint,) * self.spline.n_joint)
+            image = (-1, 1)[part] * table.transpose().ravel()
+            found[where] = (basis.T @ image) / basis.multiply(basis).sum(axis=0).A1
+        return found
+
 
 class Samples:
     """Motions with what a potential needs to be evaluated on them."""
@@ -123,6 +139,12 @@ class Samples:
             full = sparse.diags(along) @ slope + sparse.diags(across * k * spin) @ value
             blocks.append(full @ self.space.bases[part])
         return sparse.hstack(blocks, format="csr"), constant
+
+
+def largest_ratios(space: PotentialSpace, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
+    """Largest (gain over heading) / power of each motion, ``(n,)``; `Samples` of a part at a time, as they are large."""
+    parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
+    return np.concatenate([Samples(space, motion.take(part)).ratio(free)[0] for part in parts])
 
 
 def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

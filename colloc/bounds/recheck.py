@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.bounds.coulomb_motion import CoulombMotion
-from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.potential import PotentialSpace, largest_ratios
 from colloc.bounds.sampling import Domain
 
 _WINDOW = 0.03
@@ -54,7 +54,7 @@ def summits_met(
     rng = np.random.default_rng(seed)
 
     def ratio(motion: CoulombMotion) -> np.ndarray:
-        return Samples(space, motion).ratio(free)[0]
+        return largest_ratios(space, free, motion)
 
     lattice = domain.lattice(shapes, directions, float(rng.uniform(0.1, 0.9)))
     values, spacing = ratio(lattice), 2.0 * domain.joint_limit / shapes

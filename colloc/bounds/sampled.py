@@ -2,7 +2,7 @@
 
 The bound is the value of a convex problem: choose a potential over shape and heading (`colloc.bounds.potential`) so that the
 largest (gain / power) over all shapes, headings and rate directions is smallest. It is solved by exchange of samples
-(`bounds.cutting_plane`). What comes out is a *sampled* bound; `bounds.guaranteed` guarantees one for isotropic friction.
+(`bounds.cutting_plane`). What comes out is a *sampled* bound; `bounds.guaranteed` guarantees one for associated friction.
 """
 
 from __future__ import annotations
@@ -52,6 +52,8 @@ class Budget:
     first : int
         Even intervals to begin with; more knots are inserted where they are worth most (`colloc.bounds.knots`). As many as
         `intervals` keep the knots even.
+    smoothing : float
+        Weight of the roughness of the potential.
     """
 
     intervals: int = 12
@@ -62,10 +64,13 @@ class Budget:
     starts: int = 250
     tolerance: float = 5e-4
     first: int = 6
+    smoothing: float = 1e-5
 
 
 QUICK = Budget()
 THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4)
+FOUR_LINKS = Budget(3, (1,), shapes=6, directions=40, rounds=40, starts=100, tolerance=1e-2, first=3, smoothing=1e-2)
+"""A loose bound in three or four minutes: shapes fill three dimensions."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +136,7 @@ class Bound:
 
 MISSING_MARGIN = "sampled at {samples} motions: not certified between them"
 MISSING_LAW = (
-    "sampled at {samples} motions: for unequal coefficients the balance has no convex potential, so neither uniqueness of the "
+    "sampled at {samples} motions: for this law the balance has no convex potential, so neither uniqueness of the "
     "motion nor a margin between samples is known"
 )
 
@@ -152,8 +157,9 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         rounds=budget.rounds,
         starts=budget.starts,
         tolerance=budget.tolerance,
+        smoothing=budget.smoothing,
     )
-    missing = MISSING_MARGIN if domain.friction.isotropic else MISSING_LAW
+    missing = MISSING_MARGIN if domain.friction.associated else MISSING_LAW
     return Bound(
         sampled=found.top,
         floor=found.floor,
@@ -210,9 +216,9 @@ def efficiency_bound(
     Parameters
     ----------
     body : Chain
-        Two or three links; four are possible with a coarse budget.
+        Two or three links, or four with a coarse budget (`FOUR_LINKS`).
     friction : Friction
-        Coulomb friction, delta -> 0 (docs/bound.md states what finite delta changes).
+        Coulomb friction or the elliptic law, delta -> 0 (docs/bound.md states what finite delta changes).
     joint_limit : float
         At most pi.
     budget : Budget

@@ -38,7 +38,7 @@ _BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_loaded": (*_BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
-    "colloc_enclosure": (_ARRAY, _COUNT, _COUNT, *[_ARRAY] * 6, _REAL, _ARRAY),
+    "colloc_enclosure": (_ARRAY, _ARRAY, _COUNT, _COUNT, *[_ARRAY] * 6, _REAL, _ARRAY),
     "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
 }
 

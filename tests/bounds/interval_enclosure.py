@@ -1,7 +1,7 @@
 """The allowance of strong convexity for one cell, written out in interval arithmetic (mpmath): docs/bound.md, section 3.
 
-A second implementation of colloc/mechanics/native/enclosure.h. Choices that are free (nodes, the kind of a piece, tau) are made
-by midpoints; whatever is claimed is an interval that holds the exact value.
+A second implementation of colloc/mechanics/native/enclosure.h, for a dissipation sqrt((sigma vs)^2 + vn^2). Choices that are
+free (nodes, the kind of a piece, tau) are made by midpoints; whatever is claimed is an interval that holds the exact value.
 """
 
 import numpy as np
@@ -49,7 +49,7 @@ def edges(axis):
 
 
 class Link:
-    def __init__(self, i, lengths, low, size, motions, delta):
+    def __init__(self, i, lengths, sigma, low, size, motions, delta):
         self.l, self.side, self.delta = iv.mpf(lengths[i]), i - 1, iv.mpf(delta)
         self.sign = -1 if self.side < 0 else 1
         offset = (iv.mpf(1) / 2 if self.side > 0 else -iv.mpf(1) / 2) * lengths[1]
@@ -70,14 +70,31 @@ class Link:
         if axis is not None:
             change = top([norm(joint[b][0] - joint[a][0], joint[b][1] - joint[a][1]) for a, b in edges(axis)])
             self.off = self.h**2 / 8 * top([norm(*p) for p in joint]) + self.h / 4 * change
+        self.stretch([iv.mpf(x) for x in sigma])
         self.v = [sum(p[c] for p in self.hinge) / 8 for c in (0, 1)]
         self.w = sum(self.spin) / 8
         centre = iv.mpf(0) if axis is None else low[axis] + size[axis] / 2
         x, y = (iv.mpf(1), iv.mpf(0)), (iv.mpf(0), iv.mpf(1))
         columns = [x, y] if axis is None else [turned(centre, x), turned(centre, y)]
-        self.row = [[columns[0][c], columns[1][c], columns[1][c] * offset] for c in (0, 1)]
+        self.plain = [[columns[0][c], columns[1][c], columns[1][c] * offset] for c in (0, 1)]
+        self.row = [[self.sigma * x for x in self.plain[0]], self.plain[1]]
         self.moving = axis is not None
         self.find_errors()
+
+    def stretch(self, sigma):
+        """Tangential velocities count sigma times: that of the sense in which the whole link slides all over the cell."""
+        self.directed, along = mid(sigma[0]) != mid(sigma[1]), [p[0] for p in self.hinge]
+        self.sigma, self.ratio = top(sigma), iv.mpf(1)
+        if all(mid(x) > mid(self.off) for x in along):
+            self.sigma = sigma[0]
+        elif all(mid(x) < -mid(self.off) for x in along):
+            self.sigma = sigma[1]
+        elif self.directed:
+            self.ratio = top(sigma) / least(sigma)
+        self.mixed = mid(self.ratio) > 1
+        self.norm = top([self.sigma, 1])  # of the stretch, as a matrix
+        self.off *= self.norm
+        self.hinge = [(self.sigma * x, y) for x, y in self.hinge]
 
     def at(self, k, s):
         return self.hinge[k][0], self.hinge[k][1] + s * self.spin[k]
@@ -117,7 +134,13 @@ class Link:
             nearest = iv.mpf(0) if mid(ya) * mid(yb) <= 0 else least([abs(ya), abs(yb)])
             r = norm(self.v[0], nearest)
             kind, error, cone = "sliding", iv.mpf(0), None
-            if mid(spread) >= 0.3 * mid(r):
+            if self.mixed:
+                kind, bend = "loose", 2 * spread
+                if mid(r) >= 5 * mid(spread) and mid(r - spread) > 4 * mid(self.delta):
+                    bend = least([bend, self.ratio * spread**2 / (r - spread)])
+                self.gap += (bend + self.delta) * length
+                self.power += least([2 * spread, self.off + bend]) * length
+            elif mid(spread) >= 0.3 * mid(r):
                 kind, gap, power, cone = self.interpolated(sa, sb, spread, r)
                 if kind == "loose" and mid(spread) < 0.6 * mid(r):
                     kind = "sliding"
@@ -183,7 +206,10 @@ class Link:
 
     def growth(self, H, A):
         vs, vn, w, l, h = *self.v, self.w, self.l, self.h
-        hinge = self.rows(iv.mpf(0)) if self.moving else [[iv.mpf(0)] * 3] * 2
+        hinge = [[self.norm * x for x in row] for row in self.plain] if self.moving else [[iv.mpf(0)] * 3] * 2
+        along = top([abs(p[0] - vs) for p in self.hinge]) + self.off
+        if self.mixed or (self.directed and mid(abs(vs)) <= mid(along + A)):
+            return
         most = top([self.spread(iv.mpf(0)), self.spread(l)]) + A
         reach = least([abs(vn), abs(vn + w * l)])
         change = top([abs(x - w) for x in self.spin]) + 2 * A / l
@@ -193,7 +219,7 @@ class Link:
         b = [turn[i] * vs / w - self.row[0][i] for i in range(3)]
         c = [self.row[1][i] - turn[i] * vn / w for i in range(3)]
         if pivots:
-            along = top([abs(p[0] - vs) for p in self.hinge]) + self.off + A
+            along += A
             T, s0 = asinh((reach - most) / (abs(vs) + along)), -vn / w
             moved = (top([abs(self.at(k, s0)[1]) for k in CORNERS]) + self.off + A) / spin
             tilted = along / spin + abs(vs) / abs(w) * change / spin
@@ -276,10 +302,10 @@ def fourth_power_norm(forward, G):
     return iv.sqrt(iv.sqrt(iv.sqrt(sum(x**2 for row in K for x in row))))
 
 
-def allowance(lengths, low, size, motions, forces, left, point, delta):
+def allowance(lengths, sigma, low, size, motions, forces, left, point, delta):
     """Gain and power, as intervals; forces (8, 2, 2) on the outer links, left (force, torque), point (x, y, beside)."""
     low, size = [iv.mpf(float(x)) for x in low], [iv.mpf(float(x)) for x in size]
-    links = [Link(i, lengths, low, size, motions, delta) for i in range(3)]
+    links = [Link(i, lengths, sigma, low, size, motions, delta) for i in range(3)]
     turning = [iv.mpf(0)] * 3
     for i, which in ((0, 0), (2, 1)):
         f = [[iv.mpf(float(x)) for x in forces[k][which]] for k in CORNERS]
@@ -293,11 +319,11 @@ def allowance(lengths, low, size, motions, forces, left, point, delta):
             total += weight
             for row in (*k.rows(k.node[j]), *k.rows(k.node[j + 1])):
                 add(G, weight * (1 + h) / 2, row)
-            for row in k.rows(iv.mpf(0)):
-                add(G, weight * h * (1 + h), row)
+            for row in k.plain:
+                add(G, weight * h * (1 + h) * k.norm**2, row)
     gap, power = sum(k.gap for k in links), sum(k.power for k in links)
     for i in range(3):
-        if found := resting(links, i, turning, left, point, iv.mpf(delta)):
+        if found := resting(links, sigma, i, turning, left, point, iv.mpf(delta)):
             return found
     one, none = iv.mpf(1), iv.mpf(0)
     px, py, beside = (iv.mpf(float(x)) for x in point)
@@ -311,10 +337,14 @@ def allowance(lengths, low, size, motions, forces, left, point, delta):
         turn = reach_of(forward, [[none, none, one], [none] * 3])
         pull = iv.sqrt(total * fourth_power_norm(forward, G)) + torque * turn
         pull += force * reach_of(forward, [[one, none, none], [none, one, none]])
-        pull += sum(e * reach_of(forward, k.rows(none)) for e, k in zip(turning, links, strict=True))
+        pull += sum(e * reach_of(forward, k.plain) for e, k in zip(turning, links, strict=True))
         radius = iv.mpf(1.000001) * (pull + iv.sqrt(pull**2 + 4 * gap)) / 2
-        ends = [(reach_of(forward, k.rows(none)), reach_of(forward, k.rows(k.l)), k.h) for k in links]
-        moved = [iv.mpf(1.000001) * radius * top([a, b + h / 2 * a]) for a, b, h in ends]
+        moved = []
+        for k in links:
+            # a turn by h/2 changes a velocity by at most that share of it, before it is stretched
+            plain = k.norm * reach_of(forward, k.plain)
+            hinge, tip = (reach_of(forward, k.rows(s)) + k.h / 2 * plain for s in (none, k.l))
+            moved.append(iv.mpf(1.000001) * radius * top([least([plain, hinge]), tip]))
         fit = [mid(m) < mid(A) for m, A in zip(moved, allowed, strict=True)]
         if all(fit):
             at_point = reach_of(forward, [[one, none, -py], [none, one, px]])
@@ -326,11 +356,11 @@ def allowance(lengths, low, size, motions, forces, left, point, delta):
     raise AssertionError("nothing is known of this cell")
 
 
-def resting(links, i, turning, left, point, delta):
+def resting(links, sigma, i, turning, left, point, delta):
     """Where link i rests at all corners: beta int |a| <= g + |rho.d| with beta = 1 - |f|, |a| on it as large as at one end."""
-    k = links[i]
+    k, (forth, back) = links[i], [iv.mpf(x) for x in sigma]
     speed = top([norm(*k.at(corner, s)) for corner in CORNERS for s in (0, k.l)])
-    fastest = speed + k.off
+    fastest = (speed + k.off) * top([forth / back, back / forth])
     beta = 1 - fastest / norm(fastest, delta)
     if mid(speed) > 100 * mid(delta) or mid(beta) < 1e-6:
         return None
@@ -346,8 +376,12 @@ def resting(links, i, turning, left, point, delta):
     others = [j for j in range(3) if j != i]
     rho = force * far[1] + torque * 2 / k.l + sum(turning[j] * hinge[j] for j in (0, 2))
     for j in others:
-        rho += far[j] * sum(e * (b - a) for e, a, b in zip(links[j].error, links[j].node, links[j].node[1:], strict=False))
-    room = beta * (iv.sqrt(2) - 1) * k.l - rho
+        rho += (
+            links[j].norm
+            * far[j]
+            * sum(e * (b - a) for e, a, b in zip(links[j].error, links[j].node, links[j].node[1:], strict=False))
+        )
+    room = beta * least([forth, back, 1]) * (iv.sqrt(2) - 1) * k.l - rho
     if mid(room) <= 0:
         return None
     given = 3 * fastest * k.l + sum(links[j].gap for j in others)

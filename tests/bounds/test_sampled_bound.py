@@ -6,11 +6,11 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from colloc import solve_balance
-from colloc.bounds import cutting_plane
+from colloc.bounds import cutting_plane, potential
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.optimality_gap import upper_bound
-from colloc.bounds.potential import PotentialSpace, Samples, largest_gain
+from colloc.bounds.potential import PotentialSpace, Samples, largest_gain, largest_ratios
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Harmonic
@@ -31,6 +31,14 @@ def random_points(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     turn = rng.uniform(0, 2 * np.pi, n)
     return rng.uniform(-np.pi, np.pi, (2, n)), np.stack([np.cos(turn), np.sin(turn)])
+
+
+def test_ratios_of_many_motions_are_those_of_all_at_once(monkeypatch):
+    space = PotentialSpace(TensorSpline(2, np.pi, 3), (1, 3), True)
+    motion = balanced_motion(Chain(), Friction(), *random_points(5, 50))
+    free = np.random.default_rng(6).normal(size=space.size)
+    monkeypatch.setattr(potential, "_AT_ONCE", 7)
+    np.testing.assert_allclose(largest_ratios(space, free, motion), Samples(space, motion).ratio(free)[0], rtol=1e-12)
 
 
 def test_splines_add_up_to_one_and_differentiate():
@@ -271,5 +279,5 @@ def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_pa
     usual = {"guess": None, "body": Chain(), "friction": Friction(), "gait": Harmonic(1, "antipodal")}
     problem = Problem("other", **(usual | changes))
     assert upper_bound(problem, tmp_path, compute=False) is None
-    with pytest.raises(ProblemError, match="chains of links under Coulomb friction only"):
+    with pytest.raises(ProblemError, match="chains of links under Coulomb friction, or the elliptic law, only"):
         upper_bound(problem, tmp_path, compute=True)

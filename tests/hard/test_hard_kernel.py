@@ -63,7 +63,7 @@ def test_bodies_under_load_are_in_the_state_that_they_state(lengths, delta):
     rng, body, n = np.random.default_rng(6), Chain(lengths), 400
     angles, rates = rng.uniform(-3, 3, (body.n_joint, n)), rng.uniform(-1, 1, (body.n_joint, n))
     load = rng.normal(size=(3, n)) * [[0.4], [0.4], [0.1]]
-    found = loaded_balance(body, angles, rates, load, np.zeros((3, n)), delta)
+    found = loaded_balance(body, Friction(), angles, rates, load, np.zeros((3, n)), delta)
     middle = len(lengths) // 2
     lean, law = np.exp(1j * angles[:middle].sum(axis=0)), Friction()
 

@@ -139,13 +139,13 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
         chain_slopes(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
         for method in ("newton", "fixed_point"):
             solve_balance(body, law, *at, 1e-2, method=method, max_iterations=20, start=np.zeros((3, 20)))
-    loaded_balance(body, *at, 0.1 * rng.normal(size=(3, 20)), np.zeros((3, 20)), 1e-4)
+    loaded_balance(body, Friction(), *at, 0.1 * rng.normal(size=(3, 20)), np.zeros((3, 20)), 1e-4)
 size = np.full((3, 20), 0.01)
 low = rng.uniform(-1, 1, (3, 20))
 points = (low[:, :, None] + size[:, :, None] * CORNERS.T[:, None]).reshape(3, -1)
 cells = Cells(low, size, points, np.arange(160).reshape(20, 8))
 point = ReferencePoint(np.zeros(160), *np.zeros((4, 20)))
-by_convexity(Chain(), cells, corner_motions(Chain(), cells), point)
+by_convexity(Chain(), Friction(), cells, corner_motions(Chain(), Friction(), cells), point)
 """
 
 

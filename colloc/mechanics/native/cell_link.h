@@ -1,5 +1,6 @@
 /* A link of three over a cell of (angle 1, angle 2, rate of angle 2), rate 1 of angle 1: what its velocity field does there.
-   docs/bound.md, section 3, has the derivation and the names: V the trial velocity, f its direction, a a change of V. */
+   docs/bound.md, section 3, has the derivation and the names: V the trial velocity, f its direction, a a change of V. Tangential
+   velocities are stretched by sigma, so that the dissipation of a point is |V|. */
 
 #pragma once
 
@@ -31,6 +32,9 @@ typedef struct {
     double length, sign, offset; /* of the rate along the link; of the hinge from the middle link's midpoint */
     int axis;                    /* of the cell that turns the link, or -1 */
     double turned;               /* the cell's size along it */
+    double most;                 /* |V| of a stretched velocity is at most so many times that of the velocity */
+    bool directed;               /* sigma depends on the sense of sliding */
+    double uneven;               /* ratio of both sigma where both senses occur in the cell, else 1 */
     double hinge[CORNERS][2], spin[CORNERS];
     double mean_hinge[2], mean_spin;
     double off;                            /* how far the hinge's velocity may be from the interpolated one */
@@ -41,6 +45,7 @@ typedef struct {
     double cone[PIECES][2], cone_sine[PIECES], cone_speed[PIECES];
     double force_error, gap, power_error;  /* over the link */
     double hinge_row[2][3];                /* the hinge's velocity in the link's axes for a change of the middle link's motion */
+    double plain_row[2][3];                /* the same, not stretched */
     double allowed;                        /* largest |a| that `growth` holds for */
 } CellLink;
 
@@ -164,6 +169,19 @@ static inline void interpolate_forces(CellLink *k, int j, double spread, double 
     k->power_error += power * length;
 }
 
+/* A link that slides forwards and backwards within the cell, stretched by the larger sigma: the dissipation's second derivative
+   along a is at most `uneven` |a|^2/|V|, so forces of the corners lose so much, and its slope at most 1. */
+static inline void interpolate_uneven(CellLink *k, int j, double spread, double least, double delta)
+{
+    const double length = k->node[j + 1] - k->node[j], left = least - spread;
+    const bool known = left >= 4.0 * spread && left > 4.0 * delta;
+    const double bent = known ? k->uneven * spread * spread / left : INFINITY;
+    k->kind[j] = LOOSE;
+    k->error[j] = 0.0;
+    k->gap += (fmin(2.0 * spread, bent) + delta) * length;
+    k->power_error += fmin(2.0 * spread, k->off + bent) * length;
+}
+
 /* Fill in what the trial motion says: the error of interpolated forces, or the gap they leave, and the error of the power. */
 static inline void find_errors(CellLink *k, double delta)
 {
@@ -188,6 +206,10 @@ static inline void find_errors(CellLink *k, double delta)
         const double sa = k->node[j], sb = k->node[j + 1], length = sb - sa, spread = fmax(k->spread[j], k->spread[j + 1]);
         const double ya = k->mean_hinge[1] + sa * k->mean_spin, yb = k->mean_hinge[1] + sb * k->mean_spin;
         const double least = norm_of(vs, ya * yb <= 0 ? 0.0 : fmin(fabs(ya), fabs(yb)));
+        if (k->uneven > 1.0) {
+            interpolate_uneven(k, j, spread, least, delta);
+            continue;
+        }
         if (!(spread < LITTLE_SPREAD * least)) {
             const double gap = k->gap, power = k->power_error;
             interpolate_forces(k, j, spread, least, delta);

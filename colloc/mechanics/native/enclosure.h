@@ -81,8 +81,27 @@ static inline double largest_ratio(const Matrix3 L, const Matrix3 G)
     return norm * sqrt(sqrt(frobenius(K)));
 }
 
+/* Stretch the tangential velocities of a link: by the sigma of its sense of sliding, or by the larger if it slides both ways. */
+static inline void stretch_link(CellLink *k, const double sigma[2])
+{
+    double least = INFINITY, largest = -INFINITY;
+    for (int j = 0; j < CORNERS; ++j)
+        least = fmin(least, k->hinge[j][0]), largest = fmax(largest, k->hinge[j][0]);
+    const bool forwards = least > k->off, backwards = largest < -k->off;
+    const double high = fmax(sigma[0], sigma[1]), by = forwards ? sigma[0] : backwards ? sigma[1] : high;
+    k->directed = sigma[0] != sigma[1];
+    k->uneven = k->directed && !forwards && !backwards ? high / fmin(sigma[0], sigma[1]) : 1.0;
+    k->most = fmax(by, 1.0);
+    k->off *= k->most;
+    for (int j = 0; j < CORNERS; ++j)
+        k->hinge[j][0] *= by;
+    memcpy(k->plain_row, k->hinge_row, sizeof k->plain_row);
+    for (int j = 0; j < 3; ++j)
+        k->hinge_row[0][j] *= by;
+}
+
 /* The links over a cell, from the motions z (x, y, spin of the middle link) at its corners. */
-static inline void find_links(CellLink link[3], const double length[3], const double low[3], const double size[3],
+static inline void find_links(CellLink link[3], const double length[3], const double sigma[2], const double low[3], const double size[3],
                               const double (*z)[3], double delta)
 {
     for (int i = 0; i < 3; ++i) {
@@ -109,6 +128,7 @@ static inline void find_links(CellLink link[3], const double length[3], const do
         const double angle = side ? -side * (low[k->axis] + 0.5 * size[k->axis]) : 0.0, c = cos(angle), s = sin(angle);
         const double row[2][3] = {{c, -s, -s * k->offset}, {s, c, c * k->offset}};
         memcpy(k->hinge_row, row, sizeof row);
+        stretch_link(k, sigma);
         find_errors(k, delta);
     }
 }
@@ -124,10 +144,12 @@ typedef struct {
 } Allowance;
 
 /* A link that rests at all corners rests: friction on it has something in reserve. */
-static inline bool rests(const CellLink link[3], const Balance *b, double delta, Allowance *found)
+static inline bool rests(const CellLink link[3], const double sigma[2], const Balance *b, double delta, Allowance *found)
 {
+    const double least = fmin(fmin(sigma[0], sigma[1]), 1.0), ratio = fmax(sigma[0], sigma[1]) / fmin(sigma[0], sigma[1]);
     for (int i = 0; i < 3; ++i) {
-        const double l = link[i].length, fastest = link[i].fastest + link[i].off, reserve = 1.0 - fastest / norm_of(fastest, delta);
+        /* it may slide off in either sense, so its speed is that of the larger sigma */
+        const double l = link[i].length, fastest = ratio * (link[i].fastest + link[i].off), reserve = 1.0 - fastest / norm_of(fastest, delta);
         if (link[i].fastest > AT_REST_AT_ALL * delta || reserve < NEARLY_HELD)
             continue;
         /* |a| on the other links and at the hinges, in terms of its largest value on this one */
@@ -144,9 +166,9 @@ static inline bool rests(const CellLink link[3], const Balance *b, double delta,
             left += b->turning[j] * hinge[j];
             power_error += link[j].power_error;
             if (j != i)
-                left += on[j] * link[j].force_error, gap += link[j].gap;
+                left += on[j] * link[j].most * link[j].force_error, gap += link[j].gap;
         }
-        const double room = reserve * KAPPA * l - left, given = 3.0 * fastest * l + gap;
+        const double room = reserve * least * KAPPA * l - left, given = 3.0 * fastest * l + gap;
         if (!(room > 0))
             continue;
         const double moved = given / room;
@@ -170,7 +192,7 @@ static inline bool held(CellLink link[3], const Balance *b, Allowance *found)
             rows_at(k, k->node[j], row), add_gram(G, weight, row);
             rows_at(k, k->node[j + 1], row), add_gram(G, weight, row);
         }
-        rows_at(k, 0.0, row), add_gram(G, k->force_error * h * (1.0 + h), row);
+        plain_rows(k, row), add_gram(G, k->force_error * h * (1.0 + h) * k->most * k->most, row);
         force_error += k->force_error, gap += k->gap, power_error += k->power_error;
         k->allowed = FIRST_ALLOWED * fmax(k->end_spread[0], k->end_spread[1]);
     }
@@ -184,15 +206,17 @@ static inline bool held(CellLink link[3], const Balance *b, Allowance *found)
             return false;
         double pull = sqrt(force_error * largest_ratio(L, G)) + b->force * reach_of(L, place) + b->torque * reach_of(L, turn);
         for (int i = 0; i < 3; ++i)
-            rows_at(&link[i], 0.0, row), pull += b->turning[i] * reach_of(L, row);
+            plain_rows(&link[i], row), pull += b->turning[i] * reach_of(L, row);
         const double radius = ROUNDING_UP * 0.5 * (pull + sqrt(pull * pull + 4.0 * gap));
         bool within = true;
         for (int i = 0; i < 3; ++i) {
             CellLink *k = &link[i];
+            plain_rows(k, row);
+            const double most = k->most * reach_of(L, row), turned = 0.5 * k->turned * most;
             rows_at(k, 0.0, row);
-            const double first = reach_of(L, row);
+            const double hinge = fmin(most, reach_of(L, row) + turned);
             rows_at(k, k->length, row);
-            const double moved = ROUNDING_UP * radius * fmax(first, reach_of(L, row) + 0.5 * k->turned * first);
+            const double moved = ROUNDING_UP * radius * fmax(hinge, reach_of(L, row) + turned);
             within &= moved < k->allowed;
             k->allowed = fmax(MORE_ALLOWED * moved, within ? k->allowed : 0.0);
         }
@@ -205,15 +229,15 @@ static inline bool held(CellLink link[3], const Balance *b, Allowance *found)
     return false;
 }
 
-/* Cells by rows: low, size (n, 3); motions (n, 8, 3); force on the outer links at the corners (n, 8, 2, 2); force and torque left
+/* Sigma forwards and backwards. Cells by rows: low, size (n, 3); motions (n, 8, 3); force on the outer links at the corners (n, 8, 2, 2); force and torque left
    there (n, 2); the reference point (n, 3). What the gain of the interpolated motion may lack and its power exceed: (n, 2). */
 int colloc_enclosure(
-    const double *length, ptrdiff_t first, ptrdiff_t last, const double *low, const double *size, const double *motion,
+    const double *length, const double *sigma, ptrdiff_t first, ptrdiff_t last, const double *low, const double *size, const double *motion,
     const double *force, const double *left, const double *point, double delta, double *allowance)
 {
     for (ptrdiff_t c = first; c < last; ++c) {
         CellLink link[3];
-        find_links(link, length, low + 3 * c, size + 3 * c, (const double(*)[3])(motion + 24 * c), delta);
+        find_links(link, length, sigma, low + 3 * c, size + 3 * c, (const double(*)[3])(motion + 24 * c), delta);
         Balance b = {.force = left[2 * c], .torque = left[2 * c + 1]};
         memcpy(b.point, point + 3 * c, sizeof b.point);
         for (int i = 0; i < 3; i += 2) {
@@ -226,7 +250,7 @@ int colloc_enclosure(
             b.turning[i] = link[i].turned * (link[i].turned / 8.0 * largest + 0.25 * change);
         }
         Allowance found = {INFINITY, INFINITY};
-        if (!rests(link, &b, delta, &found) && !held(link, &b, &found))
+        if (!rests(link, sigma, &b, delta, &found) && !held(link, &b, &found))
             found.gain = found.power = INFINITY;
         allowance[2 * c] = found.gain, allowance[2 * c + 1] = found.power;
     }

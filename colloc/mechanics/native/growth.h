@@ -18,6 +18,12 @@ static inline void rows_at(const CellLink *k, double s, double row[2][3])
     row[1][2] += k->sign * s;
 }
 
+/* Rows of the hinge's velocity, not stretched: its length is the same at every angle. */
+static inline void plain_rows(const CellLink *k, double row[2][3])
+{
+    memcpy(row, k->plain_row, sizeof k->plain_row);
+}
+
 static inline void add_gram(Matrix3 G, double factor, double row[2][3])
 {
     add_product(G, factor, row[0], row[0]);
@@ -77,10 +83,11 @@ static inline void add_growth(const CellLink *k, Matrix3 H)
     const double most = fmax(k->end_spread[0], k->end_spread[1]) + allowed, reach = fmin(fabs(vn), fabs(vn + w * l));
     const double spin = fabs(w) - k->spin_spread - 2.0 * allowed / l;
     const bool pivots = (vn < 0) != (vn + w * l < 0) && reach > ROOM * most && spin > 0.3 * fabs(w);
-    double hinge[2][3], along[3], normal[3];
-    rows_at(k, 0.0, hinge);
-    if (k->axis < 0)
-        memset(hinge, 0, sizeof hinge);
+    double hinge[2][3] = {{0.0}}, along[3], normal[3]; /* hinge: at least what a turn by a unit angle changes */
+    if (k->uneven > 1.0 || (k->directed && !(fabs(vs) > k->along_spread + allowed)))
+        return; /* the balanced motion may slide in the other sense */
+    for (int i = 0; k->axis >= 0 && i < 6; ++i)
+        hinge[i / 3][i % 3] = k->most * k->plain_row[i / 3][i % 3];
     for (int i = 0; i < 3; ++i) { /* a.n = along tanh t + normal sech t */
         const double turn = i == 2 ? k->sign : 0.0;
         normal[i] = w == 0 ? 0.0 : k->hinge_row[1][i] - turn * vn / w;
