@@ -4,13 +4,13 @@
 
 Faults are drawn from the packages that results rest on, as many of each as it has, but at least one in twenty: an operator,
 a comparison, a constant, a sign, a condition or an `abs`, `min`, `max` is changed, in Python and in the C of the kernel. One
-run of the default suite without any fault records which tests call which functions, also in the programs that they start
-(`benchmarks.reach`). A fault meets those that call its function, of the folder that mirrors its package first, until one fails;
+run of the default suite without any fault records which tests run which lines, also in the programs that they start
+(`benchmarks.reach`). A fault meets those that run its line, of the folder that mirrors its package first, until one fails;
 as many as fit in 30 s of processor time. What takes far longer than without a fault counts as caught (it hangs). Those that
 survive are printed with their line: they are a gap of the tests, or a change without consequences. C that the compiler turns
 into the same library is no fault, and is named so.
 What the record has of the same sources is not done again, so that the same command goes on with a run that was ended; a sample
-of other sources has other mutants. Which tests call what is kept beside it.
+of other sources has other mutants. Which tests run what is kept beside it.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ import pytest
 import scipy.optimize  # noqa: F401
 
 from benchmarks.faults import faults_of
-from benchmarks.reach import Test, load, save
+from benchmarks.reach import Test, load, named_line, save
 
 ROOT = Path(__file__).resolve().parents[1]
 _LEFT_BEHIND = shutil.ignore_patterns(".*_cache", ".git", ".venv", ".hypothesis", "__pycache__", "reach-*.json")
@@ -97,13 +97,22 @@ class Mutant(NamedTuple):
         line = text.splitlines()[number - 1].strip()
         return f"{self.file}:{number}: {text[self.start : self.end]!r} -> {self.new!r} in: {line}"
 
-    def function(self, texts: dict[str, str]) -> str:
-        """``file::function`` it is in, as `benchmarks.reach` names it; ``file::`` outside all functions."""
+    def reached_by(self, texts: dict[str, str]) -> Iterator[set[str]]:
+        """What a test runs that meets it, as `benchmarks.reach` names it: its line, or else the statement, the function."""
         if not self.file.endswith(".py"):
-            return _OF_CALLS.get(Path(self.file).name, _OF_ALL_CALLS)
-        text = texts[self.file]
-        number = text.count("\n", 0, self.start) + 1
-        return f"{self.file}::{_function_at(ast.parse(text), number)}"
+            yield {_OF_CALLS.get(Path(self.file).name, _OF_ALL_CALLS)}
+            return
+        text, number = texts[self.file], texts[self.file].count("\n", 0, self.start) + 1
+        lines, tree = text.splitlines(), ast.parse(text)
+        function = f"{self.file}::{_function_at(tree, number)}"
+        around = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and n.lineno <= number <= (n.end_lineno or n.lineno)]
+        if function.endswith("::"):  # of the module: those that use what it says
+            targets = [name.id for node in around for name in ast.walk(node) if isinstance(name, ast.Name)]
+            yield {named_line(self.file, line) for line in lines if set(targets[:1]) & set(re.findall(r"\w+", line))}
+        else:
+            for line in (number, max((n.lineno for n in around), default=number)):
+                yield {named_line(self.file, lines[line - 1]), f"{function}*"}
+            yield {function, f"{function}*"}
 
 
 def _function_at(node: ast.AST, number: int, outer: str = "") -> str:
@@ -125,23 +134,19 @@ def _rank(test: Test) -> float:
 
 
 def tests_of(mutant: Mutant, texts: dict[str, str], known: dict[str, list[Test]]) -> tuple[list[str], float]:
-    """Names and processor seconds of the tests that call its function, or anything of its file where none does."""
-    function = mutant.function(texts)
-    file = function.partition("::")[0] + "::"
-    anywhere = any(function in test.calls for tests in known.values() for test in tests) and function != file
-    mirroring, chosen, spent = TESTS[file.split("/")[1]], [], 0.0
-    for folder in sorted(known, key=lambda folder: folder not in mirroring):
-        calling = [test for test in known[folder] if function in test.calls]
-        if not calling and (folder in mirroring or not anywhere):
-            calling = [test for test in known[folder] if any(name.startswith(file) for name in test.calls)]
-        by_file: dict[str, list[Test]] = {}
-        for test in sorted(calling, key=_rank):
-            by_file.setdefault(test.name.partition("::")[0], []).append(test)
-        for tests in sorted(by_file.values(), key=lambda tests: sum(map(_rank, tests))):
-            for test in tests:
-                if spent + test.seconds < (_MOST * 2 / 3 if folder in mirroring else _MOST):
-                    chosen.append(test.name)
-                    spent += test.seconds
+    """Names and processor seconds of the tests that run its line, or else its function, or anything of its file."""
+    every = [test for tests in known.values() for test in tests]
+    for reached in mutant.reached_by(texts):
+        if meeting := [test for test in every if reached & test.calls]:
+            break
+    else:
+        meeting = [test for test in every if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
+    mirroring = tuple(f"{folder}/" for folder in TESTS[mutant.package])
+    chosen, spent = [], 0.0
+    for test in sorted(meeting, key=lambda test: (not test.name.startswith(mirroring), _rank(test))):
+        if spent + test.seconds < (_MOST * 2 / 3 if test.name.startswith(mirroring) else _MOST):
+            chosen.append(test.name)
+            spent += test.seconds
     return chosen, spent
 
 
@@ -286,11 +291,11 @@ def _processor_seconds() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _recorded(copy: Path, cache: Path, beside: Path) -> dict[str, list[Test]]:
-    """What the tests of every folder call, kept beside the record under a name made of the tests' text."""
+def _recorded(copy: Path, cache: Path, beside: Path, chosen: list[str]) -> dict[str, list[Test]]:
+    """What the tests of every folder run, or of those chosen, kept beside the record under a name made of the tests' text."""
     known = {}
     places = [path for path in sorted((copy / "tests").iterdir()) if any(path.glob("test_*.py")) or path.match("test_*.py")]
-    for place in places:
+    for place in [place for place in places if not chosen or place.name in chosen]:
         files = sorted(place.rglob("*.py")) if place.is_dir() else [place]
         name = str(place.relative_to(copy))
         edition = hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:8]
@@ -310,6 +315,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
     parser.add_argument("--only", default="", metavar="TEXT", help="of the sample those in files whose path holds this")
+    parser.add_argument("--tests", nargs="*", default=[], metavar="FOLDER", help="these of the suite, and not all of it")
     options = parser.parse_args()
     texts = sources()
     found, edition = list(mutants(texts)), hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:12]
@@ -324,7 +330,7 @@ def main() -> None:
         copy, cache = Path(folder) / "colloc", Path(folder) / "cache"
         shutil.copytree(ROOT, copy, ignore=_LEFT_BEHIND)
         cache.mkdir(mode=0o700)
-        known = _recorded(copy, cache, options.record.parent)
+        known = _recorded(copy, cache, options.record.parent, options.tests)
         for index, mutant in enumerate(chosen):
             if index in done or options.only not in mutant.file or _processor_seconds() > options.seconds:
                 continue
