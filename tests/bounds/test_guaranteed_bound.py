@@ -5,7 +5,7 @@ import pytest
 
 from colloc.bounds import enclosure, guaranteed
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion
-from colloc.bounds.enclosure import _KAPPA, CORNERS, DELTA, Cells, ReferencePoint, by_convexity, by_loads, corner_motions
+from colloc.bounds.enclosure import _KAPPA, CORNERS, DELTA, by_convexity, by_loads, corner_motions
 from colloc.bounds.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from colloc.bounds.loaded_balance import loaded_balance
 from colloc.bounds.potential import PotentialSpace, Samples
@@ -19,8 +19,10 @@ from colloc.numerics.spline import DEGREE, TensorSpline
 from colloc.system.errors import ProblemError
 from tests.bounds.interval_enclosure import allowance
 from tests.bounds.load_enclosure import allowance_by_loads
+from tests.bounds.random_cells import all_cells, random_cells
 
 BODY = Chain()
+ODD_LENGTHS = Chain((0.3, 0.45, 0.25))
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 
 
@@ -46,12 +48,6 @@ def boxes(potential, size, count, seed, thin=False):
         sizes[2] = low[2] * 3.0
     inside = (np.searchsorted(knots, low[:2]) == np.searchsorted(knots, low[:2] + size)).all(axis=0)
     return all_cells(low[:, inside], sizes[:, inside])
-
-
-def all_cells(low, sizes):
-    """Cells that share no corners."""
-    points = (low[:, :, None] + sizes[:, :, None] * CORNERS.T[:, None, :]).reshape(3, -1)
-    return Cells(low, sizes, points, np.arange(points.shape[1]).reshape(-1, 8))
 
 
 def motions_inside(cells, count, seed):
@@ -144,22 +140,6 @@ def test_balanced_motions_stay_within_what_is_allowed(potential, size, thin):
     if size < 0.01:
         assert np.isfinite(known).mean() > 0.7
         assert np.median(known[np.isfinite(known)]) < 1e-3
-
-
-ODD_LENGTHS = Chain((0.3, 0.45, 0.25))
-
-
-def random_cells(body, size, seed, thin=False, count=8):
-    """Cells for any body, motions at their corners and a reference point that has nothing to do with a potential."""
-    rng = np.random.default_rng(seed)
-    low, sizes = rng.uniform(-1, 1, (3, count)) * [[2.5], [2.5], [0.9]], size * rng.uniform(0.7, 1.3, (3, count))
-    if thin:
-        low[2] = 10.0 ** rng.uniform(-9, -3, count)
-        sizes[2] = low[2] * 3.0
-    at, centre = rng.normal(size=(2, 8 * count)), rng.normal(size=(2, count))
-    reference = ReferencePoint(at[0] + 1j * at[1], centre[0] + 1j * centre[1], *rng.uniform(0.1, 1, (3, count)))
-    cells = all_cells(low, sizes)
-    return cells, corner_motions(body, cells), reference
 
 
 @needs_kernel

@@ -1,0 +1,128 @@
+"""The upper bound: lattices, climbs, potentials, mixtures, small gaits, and what is proved of whole cells."""
+
+import numpy as np
+
+from colloc import Chain, Friction
+from colloc.bounds.coulomb_motion import admissible, all_motions, balanced_motion, drawn_in, fundamental, unit_directions
+from colloc.bounds.cutting_plane import exchanged_optimum
+from colloc.bounds.enclosure import by_convexity, by_loads
+from colloc.bounds.guaranteed import certify
+from colloc.bounds.infinitesimal import best_small_gait, small_gait
+from colloc.bounds.knots import with_more_knots, worth
+from colloc.bounds.loaded_balance import loaded_balance
+from colloc.bounds.measure import Measure
+from colloc.bounds.potential import PotentialSpace, Samples
+from colloc.bounds.potential_range import PotentialRange, gain_bound
+from colloc.bounds.recheck import near_the_top
+from colloc.bounds.sampling import Domain
+from colloc.numerics.spline import TensorSpline
+from tests.bounds.random_cells import random_cells
+from tests.recorded.bodies import shapes
+
+PRECISION, FLOOR = 1e-6, 1e-10
+
+THREE, ODD = Chain(), Chain((0.3, 0.45, 0.25))
+ISOTROPIC, UNEQUAL, STEEP = Friction(), Friction(1.7, 1.0, 1.3), Friction(100.0, 1.0, 1.0)
+SPACES = {
+    "odd": PotentialSpace(TensorSpline(2, np.pi, 6), (1, 3), True),
+    "even": PotentialSpace(TensorSpline(2, 2.5, 5, (-1.0, -0.3, 0.3, 1.0)), (0, 1), False),
+}
+
+
+def _motions(law=ISOTROPIC, body=THREE, count=30):
+    angles, rates, _ = shapes(body, count, 21, 2.0)
+    return balanced_motion(body, law, angles, rates / np.linalg.norm(rates, axis=0))
+
+
+def _free(space):
+    return 0.1 * np.random.default_rng(22).normal(size=space.size)
+
+
+def motions_and_shapes():
+    angles, rates, _ = shapes(THREE, 40, 23, np.pi)
+    inside, _, _ = shapes(THREE, 40, 24, 0.5)
+    found = [all_motions(THREE, STEEP, 0.8 * angles, rates), fundamental(THREE, angles), fundamental(ODD, angles)]
+    found += [admissible(body, angles, margin) for body in (THREE, ODD) for margin in (0.0, 0.1)]
+    found += [drawn_in(THREE, angles, inside, 1e-6), drawn_in(ODD, angles, 0 * inside, 0.01)]
+    return found, [unit_directions(n, 20, half) for n in (1, 2, 3) for half in (True, False)], _motions(UNEQUAL).reversed()
+
+
+def lattices_and_climbs():
+    found = [Domain(THREE, ISOTROPIC, 2.8).lattice(7, 6, 0.3), Domain(ODD, UNEQUAL, np.pi).lattice(5, 8)]
+    domain, space = Domain(THREE, UNEQUAL, 2.5), SPACES["even"]
+    start, rng = domain.lattice(4, 6), np.random.default_rng(1)
+
+    def ratio(motion):
+        return Samples(space, motion).ratio(_free(space))[0]
+
+    hopeless = float(np.median(ratio(start)))
+    chosen = near_the_top(start, ratio(start), float(ratio(start).max()), 0.8, 12)
+    return found, chosen, domain.summits(ratio, start.take(np.arange(0, start.size, 5)), 0.2, 0.1, 6, rng, hopeless)
+
+
+def potentials():
+    found = []
+    for space in SPACES.values():
+        samples = Samples(space, _motions(UNEQUAL)).joined(_motions(ISOTROPIC, count=5))
+        rows, constants = samples.rows(np.arange(0, 30, 3), np.linspace(0, 6, 10))
+        found += [str(space.layout), space.coefficients(_free(space)), space.roughness.toarray(), samples.ratio(_free(space))]
+        found += [samples.amplitudes(_free(space)), rows.toarray(), constants]
+    return found
+
+
+def mixtures_and_knots():
+    rng, motion = np.random.default_rng(25), _motions()
+    weight = rng.uniform(size=motion.size) ** 3
+    measure = Measure(motion, rng.uniform(0, 2 * np.pi, motion.size), weight / weight.sum())
+    found = [measure.time, measure.efficiency(), measure.path().corners]
+    for space in SPACES.values():
+        found += [worth(space, measure), with_more_knots(space, measure, 11).spline.knots]
+    return found
+
+
+def small_gaits():
+    gaits = small_gait(THREE, UNEQUAL, (0.9, 0.4), 36, 6, 6), small_gait(THREE, ISOTROPIC, (2.0, 0.3), 40, 6)
+    best, shape = best_small_gait(THREE, ISOTROPIC, 2.0, steps=2, refined=1)
+    return [gait.efficiency for gait in gaits], gaits[0].path(np.array([0.9, 0.4]), 0.1), best.efficiency, shape
+
+
+def an_exchange_of_samples():
+    """The program's digits are the solver's: values alone."""
+    settings = {"shapes": 6, "directions": 8, "rounds": 2, "starts": 10, "tolerance": 1e-2}
+    found = exchanged_optimum(Domain(THREE, ISOTROPIC, 2.5), PotentialSpace(TensorSpline(2, 2.5, 4), (1, 3), True), **settings)
+    return found.rounds, found.samples, np.round([found.floor, found.top, found.measure.efficiency()], 5)
+
+
+def allowances_of_cells():
+    found = []
+    for body, size, thin in (
+        (ODD, 0.02, False),
+        (THREE, 0.01, False),
+        (ODD, 0.002, True),
+        (Chain((0.1, 0.3, 0.6)), 0.0005, True),
+    ):
+        cells, corners, reference = random_cells(body, size, 26, thin)
+        found += [by_convexity(body, cells, corners, reference), by_loads(body, cells, corners, reference, 4 / np.sqrt(size))]
+    return found
+
+
+def cells_of_a_potential():
+    space = PotentialSpace(TensorSpline(2, np.pi, 5), (1, 3), True)
+    cells, motions, _ = random_cells(THREE, 0.05, 26)
+    potential = PotentialRange(space, _free(space))
+    bounds = gain_bound({k: np.exp(1j * k * np.arange(9.0)) / k for k in (1, 3)})
+    proved = certify(Domain(THREE, ISOTROPIC, np.pi), space, _free(space), 3.0, deepest=1, part=(7, 400))
+    found = proved.guaranteed, proved.open_cells, proved.cells, proved.levels
+    return (
+        potential.corner_gain(cells, motions),
+        potential.trial_error(cells, motions),
+        potential.reference(cells),
+        bounds,
+        found,
+    )
+
+
+def balances_under_loads():
+    angles, rates, start = shapes(ODD, 12, 27, 2.0)
+    load = 0.3 * np.random.default_rng(28).normal(size=(3, 12))
+    return loaded_balance(ODD, angles, rates, load, start, 1e-3), loaded_balance(ODD, angles, rates, load, start, 1e-8, 3)

@@ -1,0 +1,125 @@
+"""Certificates, motions and files of gaits that nobody optimised: guesses in balance, of several classes, and mixtures."""
+
+import tempfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from colloc import Chain, Corners, Fourier, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
+from colloc.gaits.relaxed import Mixture
+from colloc.results.archive import StartName, save_archive
+from colloc.results.certificate import certify, gait_certificate
+from colloc.results.checks import Check
+from colloc.results.distinct_optima import basins
+from colloc.results.realisation import kept_inside, realised_gaits
+from colloc.results.relaxation import Optimality, Relaxation
+from colloc.results.store import load, save
+from tests.conftest import guess_in_balance
+from tests.shared import store_samples
+
+PRECISION, FLOOR = 1e-6, 1e-8
+
+AT = {"delta": 1e-2, "delta_start": 1e-2, "mesh_tolerance": 0.0}
+SQUARE = Corners(np.array([[0.9, -0.3, -0.9, 0.3], [0.2, 0.8, -0.2, -0.8]]))
+TRIANGLE = Mixture(
+    np.array([[0.1, 0.0, 0.2], [0.1, 0.2, 0.0], [0.0, 0.1, 0.1]]),
+    np.array(
+        [[[1.0, 0.0], [0.6, 0.8], [-1.0, 0.0]], [[1.0, 0.0], [-0.6, -0.8], [0.0, 1.0]], [[0.0, 1.0], [0.0, 1.0], [-1.0, 0.0]]]
+    ),
+    np.array([0.3, -0.2]),
+)
+
+
+@cache
+def _solutions():
+    limits = {"objective": "distance / (work + driven_work)", "torque_limit": 0.3, "power_limit": (0.5, 0.6)}
+    stated = (
+        Problem("bilateral", ellipse(0.1, 1.2, 0.8), gait=Harmonic(1, "bilateral"), intervals=6, **AT),
+        Problem("limited", ellipse(0, 1.2, 0.8), Chain((0.3, 0.3, 0.4)), Friction(1.7, 1, 1.3), Harmonic(1, "none"),
+                intervals=9, rotation=None, at_least={"distance": 0.1}, **limits, **AT),
+        Problem("smooth", Fourier(np.zeros(2), [[0.9], [0.1]], [[0.0], [0.8]]), ModalBody(2, panels=4), Friction(3, 1, 1),
+                Harmonic(1, "antipodal"), intervals=5, **AT),
+        Problem("two-links", Fourier([0.1], [[0.9]], [[0.0]]), Chain((0.4, 0.6)), Friction(1, 1, 3), Harmonic(1, "none"),
+                intervals=8, objective="distance / length", scheme="trapezoid", rotation=None, **AT),
+    )  # fmt: skip
+    return [guess_in_balance(problem) for problem in stated]
+
+
+def certificates_of_guesses():
+    found, skipped = [], Check("second order", 0.0, 1.0, "left out")
+    for k, solution in enumerate(_solutions()):
+        certificate = certify(solution, tolerance=1e-4, instants=200, second_order=skipped if k else None)
+        lines = [(check.name, check.meaning, check.threshold, check.passed) for check in certificate.checks]
+        noise = ("balance at nodes", "closure", "KKT error", "constraint violation")
+        values = {check.name: check.value for check in certificate.checks if check.name not in noise}
+        found += [lines, values, replace(certificate, checks=()), certificate.period, certificate.facts()]
+    return found
+
+
+def motions_of_guesses():
+    t, found = np.linspace(-0.3, 1.2, 23), []
+    for solution in _solutions():
+        motion = solution.sample(t)
+        data = solution.to_xarray(t)
+        found += [motion, solution.power(motion), solution.at_points()[1], solution.measured, solution.standing, repr(solution)]
+        found += [{name: (str(data[name].dims), data[name].attrs, data[name].values) for name in data.variables}]
+        found += [solution.status, solution.value, solution.delta_per_period, repr(solution.last), repr(motion)]
+        found.append([str(name) for name in solution.to_dataframe(t).columns])
+    return found
+
+
+def _contents(path):
+    """Names, dimensions and units of everything in an HDF5 file, and the numbers."""
+    found = {}
+
+    def seen(name, thing):
+        found[name] = {key: str(thing.attrs[key]) for key in sorted(thing.attrs) if key in ("units", "DIMENSION_LABELS")}
+        if isinstance(thing, h5py.Dataset) and thing.dtype.kind in "biuf" and "seconds" not in name:
+            found[name]["value"] = thing[()]
+
+    with h5py.File(path) as file:
+        file.visititems(seen)
+        found["top"] = {
+            key: str(file.attrs[key]) for key in sorted(file.attrs) if key in ("name", "kind", "version", "command")
+        }
+    return found
+
+
+def solutions_on_the_disk():
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for k, solution in enumerate(_solutions()[1:]):
+            path = save(solution, Path(folder) / f"{k}.h5")
+            again = load(path)
+            found += [_contents(path), again.last.x, again.status, again.message, again.problem.hash == solution.problem.hash]
+    return found
+
+
+def an_archive_of_gaits_of_several_lengths():
+    more = [Fourier(np.zeros(2), np.full((2, n), 0.3 / n), np.full((2, n), 0.4)) for n in (3, 1, 2)]
+    with tempfile.TemporaryDirectory() as folder:
+        archive = store_samples.archive(Path(folder) / "a.h5", range(0))
+        outcomes = [replace(store_samples.outcome(k, 0.2 - 0.01 * k), gait=gait) for k, gait in enumerate(more)]
+        archive.add({StartName("sobol", 1, k): outcome for k, outcome in enumerate(outcomes)})
+        archive.add({StartName("sobol", 0, 4): replace(outcomes[1], start=4, value=0.1901)})
+        distinct = basins(archive.problem, list(archive.outcomes.values()))
+        return _contents(save_archive(archive, "colloc multistart")), [(b.starts, b.frequency, repr(b)) for b in distinct]
+
+
+def mixtures():
+    stated = Problem("mixture", ellipse(0, 1.2, 0.8), **AT)
+    realised = realised_gaits(stated, TRIANGLE, (2, 3), tends_to=0.0)
+    optimum = Optimality(0.2, 1e-4, 1e-9, -1e-3, 12)
+    relaxed = Relaxation(TRIANGLE, optimum, realised[0].certificate, realised)
+    wide = kept_inside(stated, Corners(4.0 * SQUARE.corners))
+    found = [(r.repeats, r.sense, r.gait.corners, r.corners, r.line()) for r in realised]
+    return found, wide.corners, relaxed.message, list(relaxed.lines())
+
+
+def a_certificate_of_a_polygon():
+    stated = Problem("p", SQUARE, Chain(width=0.05), gait=Polygon(4, "none"), torque_limit=0.1, **AT)
+    certificate = gait_certificate(stated, SQUARE, 0.05, SQUARE.corner_phases, 160, 1e-3, claimed=0.1)
+    return str(certificate), repr(certificate), [check.line() for check in certificate.checks]
