@@ -4,7 +4,6 @@ import numpy as np
 
 from colloc import Chain, Friction
 from colloc.bounds.coulomb_motion import admissible, all_motions, balanced_motion, drawn_in, fundamental, unit_directions
-from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.enclosure import by_convexity, by_loads
 from colloc.bounds.guaranteed import certify
 from colloc.bounds.infinitesimal import best_small_gait, small_gait
@@ -14,6 +13,7 @@ from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.bounds.potential_range import PotentialRange, gain_bound
 from colloc.bounds.recheck import near_the_top
+from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.numerics.spline import TensorSpline
 from tests.bounds.random_cells import random_cells
@@ -86,11 +86,15 @@ def small_gaits():
     return [gait.efficiency for gait in gaits], gaits[0].path(np.array([0.9, 0.4]), 0.1), best.efficiency, shape
 
 
-def an_exchange_of_samples():
-    """The program's digits are the solver's: values alone."""
-    settings = {"shapes": 6, "directions": 8, "rounds": 2, "starts": 10, "tolerance": 1e-2}
-    found = exchanged_optimum(Domain(THREE, ISOTROPIC, 2.5), PotentialSpace(TensorSpline(2, 2.5, 4), (1, 3), True), **settings)
-    return found.rounds, found.samples, np.round([found.floor, found.top, found.measure.efficiency()], 5)
+def a_sampled_bound():
+    """The program's digits are the solver's: values alone, and few of their digits."""
+    found = []
+    for law, rounds in ((ISOTROPIC, 3), (Friction(1.0, 1.0, 3.0), 1)):
+        budget = Budget(intervals=5, shapes=5, directions=6, rounds=rounds, starts=8, tolerance=5e-2, first=3)
+        bound = efficiency_bound(Chain((0.5, 0.5)) if rounds == 1 else THREE, law, 2.5, budget=budget)
+        found += [np.round([bound.sampled, bound.floor], 4), bound.converged, bound.intervals, bound.harmonics, bound.graded]
+        found += [bound.samples, bound.report(0.2)[:40], bound.missing[:7], bound.missing[-30:]]
+    return found
 
 
 def allowances_of_cells():

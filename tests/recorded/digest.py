@@ -52,11 +52,11 @@ def digest(value: Any) -> dict[str, Any]:
 
 def assert_same(found: dict[str, Any], known: dict[str, Any], precision: float, floor: float) -> None:
     """Texts, shapes and numbers; these to a relative precision, and not below a floor."""
-    assert list(found) == list(known)
+    assert list(found) == list(known), "other parts"
     for name, (mine, theirs) in {name: (found[name], known[name]) for name in known}.items():
         if isinstance(theirs, str):
-            assert mine == theirs, name
+            assert mine == theirs, f"{name}: {mine} instead of {theirs}"
             continue
-        assert mine[:2] == theirs[:2], name
+        assert mine[:2] == theirs[:2], f"{name}: {mine} instead of {theirs}"
         allowed = precision * theirs[2] * max(1.0, np.sqrt(np.prod(theirs[0]))) + floor
         assert np.abs(np.subtract(mine[2:], theirs[2:])).max() <= allowed, f"{name}: {mine} instead of {theirs}"

@@ -43,7 +43,8 @@ def mechanics_of_prescribed_motions():
 
 
 def a_guess_for_a_crawler():
-    return CRAWLER.concertina(amplitude=1.1), CRAWLER.reach, CRAWLER.width, CRAWLER.grid.edges
+    corners = CRAWLER.concertina(amplitude=1.1, sides=9), CRAWLER.laid(np.array([0.3, 0.2, 0.5])), CRAWLER.wave(-1.0)
+    return corners, CRAWLER.reach, CRAWLER.width, CRAWLER.grid.edges
 
 
 def profiles_of_bumps():
