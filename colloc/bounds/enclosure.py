@@ -130,9 +130,9 @@ def by_loads(body: Chain, cells: Cells, free: Loaded, reference: ReferencePoint,
     above = free.potential[cells.at] + rise[:, None]
     spins = z[2].max(axis=1) - z[2].min(axis=1)
     excess = []
-    one, c = np.ones_like(cells.points[2]), reference.at
+    c = reference.at
     for fx, fy, turn in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, _TORQUE), (0, 0, -_TORQUE)):
-        load = np.stack([fx * one, fy * one, fy * c.real - fx * c.imag + turn])
+        load = np.stack(np.broadcast_arrays(fx, fy, fy * c.real - fx * c.imag + turn))
         state = loaded_balance(body, cells.points[:2], cells.rates, load / multiplier, free.velocity, DELTA)
         share, bilinear = _unbalanced(body, cells, state)
         below = multiplier * (state.power + state.leftover_power) - (load * state.velocity).sum(axis=0)

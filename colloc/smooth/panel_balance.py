@@ -170,7 +170,7 @@ def _slopes(
     stiffness = ((weight * k_ss, weight * k_sn, none), (weight * k_ns, weight * k_nn, none), (none, none, none))
     d = implicit_changes(
         (c, s, x, y), (vs, vn, turning), (weight * fs, weight * fn, none), stiffness, left, along_path,
-        dphi * np.ones(n_time), (turned - anchor) * np.ones(n_time),
+        *(np.broadcast_to(part, (*part.shape[:2], n_time)) for part in (dphi, turned - anchor)),
     )  # fmt: skip
     back = (panels.edge_path(reference)[TAIL] * panels.widths[:, 0])[:, None, None]
     full = d.w  # the change of the tangents' rotation rate, that of the anchor included

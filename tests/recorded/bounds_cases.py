@@ -98,15 +98,13 @@ def a_sampled_bound():
 
 
 def allowances_of_cells():
+    """Logarithms, as they span many orders of magnitude: of large cells, small ones, and ones where links rest."""
     found = []
-    for body, size, thin in (
-        (ODD, 0.02, False),
-        (THREE, 0.01, False),
-        (ODD, 0.002, True),
-        (Chain((0.1, 0.3, 0.6)), 0.0005, True),
-    ):
-        cells, corners, reference = random_cells(body, size, 26, thin)
-        found += [by_convexity(body, cells, corners, reference), by_loads(body, cells, corners, reference, 4 / np.sqrt(size))]
+    thin = (ODD, 0.002, True), (Chain((0.1, 0.3, 0.6)), 0.0003, True), (ODD, 0.02, True)
+    for body, size, rests in ((ODD, 0.02, False), (THREE, 0.006, False), *thin):
+        cells, corners, reference = random_cells(body, size, 26, rests, 60)
+        known = by_convexity(body, cells, corners, reference), by_loads(body, cells, corners, reference, 4 / np.sqrt(size))
+        found.append([np.log(part) for each in known for part in each])
     return found
 
 

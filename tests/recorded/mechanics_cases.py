@@ -11,6 +11,7 @@ from colloc.mechanics.contact import clearance, excesses, gap, intrusions, overl
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from tests.hard.cases import HARD
 from tests.recorded.bodies import form, mechanics, shapes
 
 PRECISION, FLOOR = 1e-7, 1e-11
@@ -62,6 +63,29 @@ def _loaded(body, law, delta):
 
 def under_loads():
     return [_loaded(body, law, 1e-4) for body, law in ((THREE, Friction()), (ODD, UNEQUAL), (FIVE, Friction(10.0, 1.0, 1.0)))]
+
+
+def _steps(count, methods=("auto",)):
+    """Iterations and velocities at hard instants and random ones, from good starts and bad ones."""
+    angles, rates, start = shapes(THREE, count, 14, np.pi)
+    hard = np.array(list(HARD.values())).transpose(1, 2, 0)
+    angles, rates = np.concatenate([angles, hard[0]], axis=1), np.concatenate([rates, hard[1]], axis=1)
+    start, found = np.concatenate([start, np.zeros((3, hard.shape[2]))], axis=1), []
+    for law, delta in ((Friction(), 1e-10), (UNEQUAL, 1e-5), (Friction(0.5, 1.0, 5.0), 1e-7), (Friction(10.0, 1.0, 1.0), 1e-4)):
+        for near in (None, start):
+            for method in methods:
+                solved = solve_balance(THREE, law, angles, rates, delta, start=near, method=method, max_iterations=300)
+                found.append({"iterations": np.log1p(solved.iterations), "anchor": solved.anchor[:count].mean()})
+    return found
+
+
+def steps_of_the_kernel():
+    return _steps(300, ("auto", "newton", "fixed_point"))
+
+
+def steps_of_numpy():
+    with numpy_instead():
+        return _steps(40)
 
 
 def by_numpy():
