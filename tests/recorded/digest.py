@@ -61,7 +61,7 @@ def assert_same(found: dict[str, Any], known: dict[str, Any], precision: float, 
             continue
         assert mine[:2] == theirs[:2], says
         if name.endswith("iterations"):
-            assert abs(mine[2] / theirs[2] - 1.0) <= 5e-3, says
+            assert abs(mine[2] - theirs[2]) <= 5e-3 * theirs[2], says
             continue
         assert abs(mine[2] - theirs[2]) <= precision * theirs[2] + floor, says
         assert abs(mine[3] - theirs[3]) <= precision * theirs[2] * np.sqrt(max(1, theirs[1])) + floor, says
