@@ -106,7 +106,7 @@ class Certificate:
     @property
     def replayed(self) -> bool:
         """Whether there was a replay at all; if not, all numbers are NaN."""
-        return self.instants > 0
+        return bool(self.instants)
 
     @property
     def passed(self) -> bool:
