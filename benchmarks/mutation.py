@@ -73,6 +73,8 @@ _OF_CALLS = {
     "dual.h": _OF_OWN_LAWS,
 }
 """The Python that calls the C of a file; any call at all for the other files."""
+_OF_CLASSES = "tests/test_data_classes.py"
+"""Looks at classes and calls nothing; for what stands outside functions."""
 _MOST = 20.0
 """Recorded processor seconds of the tests that one fault is met with; two thirds of it for those that mirror its package."""
 _LEAST_SHARE = 20
@@ -108,7 +110,7 @@ class Mutant(NamedTuple):
         around = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and n.lineno <= number <= (n.end_lineno or n.lineno)]
         if function.endswith("::"):  # of the module: those that use what it says
             targets = [name.id for node in around for name in ast.walk(node) if isinstance(name, ast.Name)]
-            yield {named_line(self.file, line) for line in lines if set(targets[:1]) & set(re.findall(r"\w+", line))}
+            yield {"*", *(named_line(self.file, line) for line in lines if set(targets[:1]) & set(re.findall(r"\w+", line)))}
         else:
             for line in (number, max((n.lineno for n in around), default=number)):
                 yield {named_line(self.file, lines[line - 1]), f"{function}*"}
@@ -138,6 +140,7 @@ def tests_of(mutant: Mutant, texts: dict[str, str], known: dict[str, list[Test]]
     every = [test for tests in known.values() for test in tests]
     for reached in mutant.reached_by(texts):
         if meeting := [test for test in every if reached & test.calls]:
+            meeting += [test for test in every if "*" in reached and test.name.startswith(_OF_CLASSES)]
             break
     else:
         meeting = [test for test in every if any(name.startswith(f"{mutant.file}::") for name in test.calls)]

@@ -59,7 +59,7 @@ class Guarantee:
     seconds: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Lattice:
     """Points between given edges, each interval halved so many times; cells are named by integers."""
 

@@ -38,7 +38,7 @@ _USUAL = {
 }
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Certificate:
     """The verdict of an independent replay.
 

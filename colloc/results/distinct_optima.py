@@ -30,7 +30,7 @@ def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
     return fourier_through(gait, series_class(problem))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Basin:
     """A distinct certified optimum and the starts that ended there.
 

@@ -42,7 +42,7 @@ _MESH, _REPLAYED, _SEVERAL, _ASTRAY, _PAID = 1e-4, 1e-3, 1e-3, 1e-3, 1e-6
 _DRIER = 0.1
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class ClimbingGait:
     """A gait for a slope, and how it was checked.
 

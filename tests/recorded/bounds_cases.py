@@ -98,12 +98,15 @@ def a_sampled_bound():
 
 
 def allowances_of_cells():
-    """Logarithms, as they span many orders of magnitude: of large cells, small ones, and ones where links rest."""
+    """Logarithms, as they span many orders of magnitude: of large cells, small ones, and ones where links rest; where the
+    solver stopped early too."""
     found = []
     thin = (ODD, 0.002, True), (Chain((0.1, 0.3, 0.6)), 0.0003, True), (ODD, 0.02, True)
     for body, size, rests in ((ODD, 0.02, False), (THREE, 0.006, False), *thin):
         cells, corners, reference = random_cells(body, size, 26, rests, 60)
-        known = by_convexity(body, cells, corners, reference), by_loads(body, cells, corners, reference, 4 / np.sqrt(size))
+        early = corners._replace(residual=np.random.default_rng(29).uniform(1e-7, 3e-4, corners.residual.shape))
+        known = [by_loads(body, cells, given, reference, 4 / np.sqrt(size)) for given in (corners, early)]
+        known += [by_convexity(body, cells, given, reference) for given in (corners, early)]
         found.append([np.log(part) for each in known for part in each])
     return found
 

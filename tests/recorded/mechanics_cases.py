@@ -61,6 +61,19 @@ def _loaded(body, law, delta):
     return solved.z, solved.iterations, solved.anchor, chain_slopes(body, law, angles, rates, delta, solved, load)
 
 
+def _at_rest():
+    angles, _, start = shapes(THREE, 4, 15, 2.0)
+    found = [solve_balance(THREE, law, angles, 0 * angles, 1e-3, start=start).z for law in (UNEQUAL, PowerLaw(0.5, 2.0))]
+    load = np.array([[0.05, 0.0, 0.1, 0.0], [0.1, 0.2, 0.0, 0.0]])
+    return found, solve_balance(THREE, UNEQUAL, angles, 0 * angles, 1e-3, load=load).z
+
+
+def bodies_whose_joints_rest():
+    with numpy_instead():
+        slow = _at_rest()
+    return _at_rest(), slow
+
+
 def under_loads():
     return [_loaded(body, law, 1e-4) for body, law in ((THREE, Friction()), (ODD, UNEQUAL), (FIVE, Friction(10.0, 1.0, 1.0)))]
 
