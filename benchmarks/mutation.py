@@ -42,8 +42,7 @@ import pytest
 from benchmarks.faults import faults_of
 from benchmarks.reach import Test, load, named_line, save
 
-_NEEDED = ("casadi", "clarabel", "filelock", "h5py", "jinja2", "matplotlib.pyplot", "mpmath", "rich.progress")
-_NEEDED += ("scipy.integrate", "scipy.optimize", "scipy.sparse.linalg", "xarray")
+_NEEDED = "casadi clarabel filelock h5py jinja2 matplotlib.pyplot mpmath rich.progress scipy.integrate scipy.optimize xarray"
 """What the children would import one after the other."""
 ROOT = Path(__file__).resolve().parents[1]
 _LEFT_BEHIND = shutil.ignore_patterns(".*_cache", ".git", ".venv", ".hypothesis", "__pycache__", "reach-*.json")
@@ -333,7 +332,7 @@ def main() -> None:
         copy, cache = Path(folder) / "colloc", Path(folder) / "cache"
         shutil.copytree(ROOT, copy, ignore=_LEFT_BEHIND)
         cache.mkdir(mode=0o700)
-        for library in _NEEDED:
+        for library in _NEEDED.split():
             importlib.import_module(library)
         known = _recorded(copy, cache, options.record.parent, options.tests)
         _in_child(

@@ -39,7 +39,7 @@ def _solutions():
     stated = (
         Problem("bilateral", ellipse(0.1, 1.2, 0.8), gait=Harmonic(1, "bilateral"), intervals=6, **AT),
         Problem("limited", ellipse(0, 1.2, 0.8), Chain((0.3, 0.3, 0.4)), Friction(1.7, 1, 1.3), Harmonic(1, "none"),
-                intervals=9, rotation=None, at_least={"distance": 0.1}, **limits, **AT),
+                intervals=9, rotation=None, at_least={"distance": 0.1, "-work": -0.01}, **limits, **AT),
         Problem("smooth", Fourier(np.zeros(2), [[0.9], [0.1]], [[0.0], [0.8]]), ModalBody(2, panels=4), Friction(3, 1, 1),
                 Harmonic(1, "antipodal"), intervals=5, **AT),
         Problem("two-links", Fourier([0.1], [[0.9]], [[0.0]]), Chain((0.4, 0.6)), Friction(1, 1, 3), Harmonic(1, "none"),
