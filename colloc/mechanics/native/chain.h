@@ -37,8 +37,8 @@ static inline void find_directions(
             phi += angle[(i - 1) * stride];
         link[i].length = length[i];
         link[i].pressure = pressure[i];
-        link[i].cos = i > 0 ? cos(phi) : 1.0;
-        link[i].sin = i > 0 ? sin(phi) : 0.0;
+        link[i].cos = cos(phi);
+        link[i].sin = sin(phi);
         link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
         link[i].load_x = link[i].load_y = 0.0;
     }

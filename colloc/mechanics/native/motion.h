@@ -56,8 +56,8 @@ static inline void find_changes(
     const int n, const Link *link, const Sliding *k, const int anchor, const int joint, const bool of_rate, Change *d)
 {
     for (int i = 0; i < n; ++i) {
-        d[i].phi = !of_rate && i > joint ? 1.0 : 0.0;
-        d[i].w = of_rate ? (double)((i > joint) - (anchor > joint)) : 0.0;
+        d[i].phi = !of_rate && i > joint;
+        d[i].w = of_rate * ((i > joint) - (anchor > joint));
     }
     d[anchor].vx = d[anchor].vy = d[anchor].x = d[anchor].y = 0.0;
     for (int side = -1; side <= 1; side += 2)
