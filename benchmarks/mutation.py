@@ -318,6 +318,9 @@ def main() -> None:
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
     parser.add_argument("--only", default="", metavar="TEXT", help="of the sample those in files whose path holds this")
     parser.add_argument("--tests", nargs="*", default=[], metavar="FOLDER", help="these of the suite, and not all of it")
+    parser.add_argument(
+        "--part", nargs=2, type=int, default=(1, 1), metavar=("K", "N"), help="the K-th of N that share the work"
+    )
     options = parser.parse_args()
     texts = sources()
     found, edition = list(mutants(texts)), hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:12]
@@ -339,7 +342,8 @@ def main() -> None:
             copy, lambda: int(pytest.main(["-n", "0", "-p", "no:cacheprovider", "--collect-only", *known]))
         )  # compiles them
         for index, mutant in enumerate(chosen):
-            if index in done or options.only not in mutant.file or _processor_seconds() > options.seconds:
+            elsewhere = index % options.part[1] != options.part[0] - 1 or options.only not in mutant.file
+            if index in done or elsewhere or _processor_seconds() > options.seconds:
                 continue
             before = _processor_seconds()
             tests, seconds = tests_of(mutant, texts, known)
