@@ -68,7 +68,8 @@ class Mutant(NamedTuple):
     def reached_by(self, texts: dict[str, str]) -> Iterator[set[str]]:
         """What a test runs that meets it, as `benchmarks.reach` names it: its line, or else the statement, the function."""
         if not self.file.endswith(".py"):
-            yield {_OF_CALLS.get(Path(self.file).name, _OF_ALL_CALLS)}
+            function = _OF_CALLS.get(Path(self.file).name, _OF_ALL_CALLS)
+            yield {function, f"{function}*"}
             return
         text, number = texts[self.file], texts[self.file].count("\n", 0, self.start) + 1
         lines, tree = text.splitlines(), ast.parse(text)

@@ -9,6 +9,7 @@ import numpy as np
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law, rate_independent
+from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion
 from colloc.verification.replay import Path
@@ -19,8 +20,7 @@ _LOOSER = 30.0
 def check_finite(positive: bool = False, **numbers: object) -> None:
     """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
     for name, value in numbers.items():
-        usable = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
-        if not usable or (positive and not value > 0):  # type: ignore[operator]
+        if not is_number(value) or (positive and not value > 0):
             raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
 
 
@@ -28,7 +28,7 @@ def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
     """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
         raise ProblemError(f"only a Chain, whose joints are its own, can be put on a slope, not {type(body).__name__}.")
-    if isinstance(grade, bool) or not isinstance(grade, (int, float, np.number)) or not 0 <= grade < np.inf:
+    if not (is_number(grade) and grade >= 0):
         raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
     if rate_independent(friction) and grade >= friction.largest:
         raise ProblemError(

@@ -4,6 +4,7 @@ import numpy as np
 
 from colloc import Chain, Friction
 from colloc.bounds.coulomb_motion import admissible, all_motions, balanced_motion, drawn_in, fundamental, unit_directions
+from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.enclosure import by_convexity, by_loads
 from colloc.bounds.guaranteed import certify
 from colloc.bounds.infinitesimal import best_small_gait, small_gait
@@ -95,6 +96,12 @@ def a_sampled_bound():
         found += [np.round([bound.sampled, bound.floor], 4), bound.converged, bound.intervals, bound.harmonics, bound.graded]
         found += [bound.samples, bound.report(0.2)[:40], bound.missing[:7], bound.missing[-30:]]
     return found
+
+
+def an_exchange_of_samples():
+    settings = {"shapes": 4, "directions": 6, "rounds": 1, "starts": 4, "tolerance": 1e-1}
+    found = exchanged_optimum(Domain(THREE, ISOTROPIC, 2.5), PotentialSpace(TensorSpline(2, 2.5, 3), (1, 3), True), **settings)
+    return found.rounds, found.samples, found.measure.weight.size, np.round([found.floor, found.measure.efficiency()], 4)
 
 
 def allowances_of_cells():
