@@ -5,6 +5,7 @@ import numpy as np
 from colloc import Chain, Friction
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.power_law import PowerLaw
+from colloc.laws.viscous import Viscous
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power
 from colloc.mechanics.chain_motion import chain_slopes
 from colloc.mechanics.contact import clearance, excesses, gap, intrusions, overlap, share_of_first, tangent_of_minimum
@@ -48,6 +49,19 @@ def contact():
 def mechanics_of_chains():
     laws = Friction(), UNEQUAL, Friction(0.5, 1.0, 5.0)
     return [mechanics(body, law, 1e-3, 2.0) for body, law in zip((THREE, ODD, FIVE), laws, strict=True)]
+
+
+def laws_of_friction():
+    vs, vn, w = np.random.default_rng(16).normal(size=(3, 3, 9))
+    length, found = np.array([[0.2], [0.5], [0.3]]), []
+    for law in (Friction(), UNEQUAL, Elliptic(1.7, 1.0, 1.3), PowerLaw(0.5, 2.0, 1.0), Viscous(1.7, 1.0, 1.3)):
+        found += [getattr(law, name)(vs, vn, 0.1) for name in ("density", "density_secant", "density_jacobian")]
+        found += [getattr(law, name)(vs, vn, w, length, 0.1) for name in ("link_force", "link_jacobian", "link_secant")]
+        if law.associated:
+            found += [law.density_potential(vs, vn, 0.1), law.link_potential(vs, vn, w, length, 0.1)]
+        found += [law.smallest, law.largest, law.degree, law.regularised, law.reversible, law.label, law.describe()]
+        found += [law.largest_link_forces(length), law.kernel_numbers, law.in_units_of(2.0), law.in_speeds_of(2.0)]
+    return found
 
 
 def mechanics_under_other_laws():

@@ -7,15 +7,21 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 
 from colloc import Chain, Corners, Fourier, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
+from colloc.bounds.optimality_gap import gap_line, upper_bound
+from colloc.bounds.sampled import Bound
 from colloc.gaits.relaxed import Mixture
+from colloc.reduced import second_order
+from colloc.reduced.second_order import Curvature
 from colloc.results.archive import StartName, save_archive
-from colloc.results.certificate import certify, gait_certificate
-from colloc.results.checks import Check
+from colloc.results.certificate import _second_order, certify, gait_certificate
+from colloc.results.checks import UNCERTIFIED, Check
 from colloc.results.distinct_optima import basins
 from colloc.results.realisation import kept_inside, realised_gaits
 from colloc.results.relaxation import Optimality, Relaxation
+from colloc.results.steps import Alternative, SearchStep
 from colloc.results.store import load, save
 from tests.conftest import guess_in_balance
 from tests.shared import store_samples
@@ -123,3 +129,37 @@ def a_certificate_of_a_polygon():
     stated = Problem("p", SQUARE, Chain(width=0.05), gait=Polygon(4, "none"), torque_limit=0.1, **AT)
     certificate = gait_certificate(stated, SQUARE, 0.05, SQUARE.corner_phases, 160, 1e-3, claimed=0.1)
     return str(certificate), repr(certificate), [check.line() for check in certificate.checks]
+
+
+# fmt: off
+CURVATURES = (
+    (0.5, 0.01, 3, 0), (1e-5, 1e-6, 3, 0), (0.02, 0.03, 2, 0), (-0.02, 1e-4, 3, 0), (-0.0101, 2e-4, 3, 0), (1.0, 0.0, 0, 0),
+    (1.0, 0.1, 3, 0.011), (1.0, 0.1, 3, 0.009),
+)
+# fmt: on
+
+
+def verdicts_of_second_order():
+    """The same solution with curvatures of every kind."""
+    solution, found = _solutions()[0], []
+    size = abs(solution.last.value)
+    with pytest.MonkeyPatch.context() as patch:
+        for smallest, error, free, slope in CURVATURES:
+            known = Curvature(
+                smallest=smallest * size, error=error * size, n_free=free, direction=np.zeros(2), kkt_error=slope * size
+            )
+            patch.setattr(second_order, "curvature", lambda program, v, known=known: known)
+            found.append(_second_order(solution))
+    return found
+
+
+def words():
+    """What is said of bounds, levels, steps of a search and other optima."""
+    bilateral, limited, smooth, _ = _solutions()
+    bound = Bound(0.3, 0.29, True, None, "sampled", (0.1,), (1.0,), 2.0, 4, (1, 3), (0.0,), 12, 1.0)
+    cases = ((bilateral.problem, bound), (bilateral.problem, replace(bound, guaranteed=0.31)), (bilateral.problem, None))
+    said = [gap_line(problem, 0.26, known) for problem, known in (*cases, (limited.problem, None), (smooth.problem, None))]
+    said += [str(SearchStep("starts", 3, 10, 0.25, delta)) for delta in (0.0, 1e-3)]
+    said += [str(Alternative(0.25, 1e-3, n, floor, bilateral.gait)) for n, floor in ((1, False), (2, True))]
+    said += [upper_bound(each.problem, Path("/nowhere"), compute=False) for each in (limited, smooth)]
+    return [*said, repr(UNCERTIFIED), str(UNCERTIFIED), str(UNCERTIFIED.facts())]
