@@ -21,8 +21,8 @@ def replayed(instants):
     return replay(Chain(), Friction(), GAIT, 1e-2, instants=instants, tolerance=10.0)
 
 
-def samples(count, rate=2.0):
-    return timed(GAIT, rate, period=count / rate)
+def samples(count, rate=2.0, limits=None):
+    return timed(GAIT, rate, period=count / rate, limits=limits)
 
 
 def bound(limit, **changes):
@@ -40,6 +40,8 @@ TAKEN = [
     (Concertina, {"amplitude": TINY}), (Concertina, {"amplitude": np.pi / 2 - TINY}), (Wave, {"profile": "standing"}),
     (Wave, {"steepness": TINY}), (motion, {"stages": (0.0, 0.1, 1.0)}), (motion, {"stages": (0.0, 0.5), "antipodal": True}),
     (PowerLaw, {"power": 0}), (PowerLaw, {"power": 2}), (replayed, {"instants": 4}), (samples, {"count": 4}),
+    (samples, {"count": 4, "rate": 0.5}), (samples, {"count": 90, "limits": (9.0, 8.0)}),
+    (samples, {"count": 90, "limits": 9.0}),
     (bound, {"limit": np.pi}), (bound, {"limit": 0.2}), (checked_chain, {"body": Chain(), "friction": Friction(), "grade": 0}),
     (checked_chain, {"body": Chain(), "friction": Friction(), "grade": 1 - TINY}),
 ]  # fmt: skip
@@ -54,7 +56,11 @@ REFUSED = [
     (Wave, {"steepness": 0}), (motion, {"stages": (0.1, 1.0)}), (motion, {"stages": (0.0, 0.5)}),
     (motion, {"stages": (0.0, 1.0), "antipodal": True}), (motion, {"stages": (0.0, 0.6, 0.6, 1.0)}),
     (PowerLaw, {"power": -TINY}), (PowerLaw, {"power": 2 + TINY}), (replayed, {"instants": 2}), (replayed, {"instants": 5}),
-    (samples, {"count": 3}), (bound, {"limit": 0.0}), (bound, {"limit": np.pi + 1e-6}), (bound, {"limit": 1.0, "harmonics": (1, 2)}),
+    (samples, {"count": 3}), (bound, {"limit": 0.0}), (bound, {"limit": np.pi + 1e-6}),
+    (bound, {"limit": 1.0, "harmonics": (1, 2)}), (samples, {"count": 9, "rate": -1.0}),
+    (samples, {"count": 9, "rate": np.inf}),
+    (samples, {"count": 9, "limits": 0.0}), (samples, {"count": 9, "limits": (1.0, 1.0, 1.0)}),
+    (samples, {"count": 9, "limits": 1.0}),
     (checked_chain, {"body": Chain(), "friction": Friction(), "grade": -TINY}),
     (checked_chain, {"body": Chain(), "friction": Friction(), "grade": 1.0}),
     (checked_chain, {"body": Chain(), "friction": Friction(), "grade": True}),

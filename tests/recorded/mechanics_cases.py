@@ -54,7 +54,7 @@ def mechanics_of_chains():
 def laws_of_friction():
     vs, vn, w = np.random.default_rng(16).normal(size=(3, 3, 9))
     length, found = np.array([[0.2], [0.5], [0.3]]), []
-    for law in (Friction(), UNEQUAL, Elliptic(1.7, 1.0, 1.3), PowerLaw(0.5, 2.0, 1.0), Viscous(1.7, 1.0, 1.3)):
+    for law in (Friction(), UNEQUAL, Elliptic(1.7, 1.0, 1.3), PowerLaw(0.5, 2.0, 1.0), Viscous(1.7, 1.0)):
         found += [getattr(law, name)(vs, vn, 0.1) for name in ("density", "density_secant", "density_jacobian")]
         found += [getattr(law, name)(vs, vn, w, length, 0.1) for name in ("link_force", "link_jacobian", "link_secant")]
         if law.associated:
