@@ -76,7 +76,8 @@ class Mutant(NamedTuple):
         function = f"{self.file}::{_function_at(tree, number)}"
         around = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and n.lineno <= number <= (n.end_lineno or n.lineno)]
         if function.endswith("::"):  # of the module: those that use what it says
-            targets = [name.id for node in around for name in ast.walk(node) if isinstance(name, ast.Name)]
+            inner = sorted(around, key=lambda node: node.lineno)[-1:]
+            targets = [name.id for node in inner for name in ast.walk(node) if isinstance(name, ast.Name)]
             yield {"*", *(named_line(self.file, line) for line in lines if set(targets[:1]) & set(re.findall(r"\w+", line)))}
         else:
             for line in (number, max((n.lineno for n in around), default=number)):

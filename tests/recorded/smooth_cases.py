@@ -39,7 +39,7 @@ def mechanics_of_a_crawler():
 
 
 def mechanics_of_prescribed_motions():
-    return [mechanics(body, UNEQUAL, 1e-2, 1.0, count=3) for body in (ONE_BUMP, TWO_BUMPS, *WAVES)]
+    return [mechanics(body, UNEQUAL, 1e-2, 1.0, count=2) for body in (ONE_BUMP, TWO_BUMPS, *WAVES)]
 
 
 def a_guess_for_a_crawler():
