@@ -79,8 +79,8 @@ def corner_motions(body: Chain, cells: Cells) -> Loaded:
 
 def spread(values: np.ndarray, axis: int) -> np.ndarray:
     """Largest difference of ``(d, n, 8)`` corner values along one axis of the cells, ``(n,)``."""
-    low = CORNERS[:, axis] == 0
-    return np.sqrt(((values[:, :, ~low] - values[:, :, low]) ** 2).sum(axis=0)).max(axis=1)
+    changes = np.diff(values.reshape(*values.shape[:2], 2, 2, 2), axis=2 + axis)
+    return np.sqrt((changes**2).sum(axis=0)).max(axis=(1, 2, 3))
 
 
 def by_convexity(body: Chain, cells: Cells, free: Loaded, reference: ReferencePoint) -> Allowance:

@@ -4,6 +4,7 @@ import numpy as np
 
 from colloc import Chain, Corners, Fourier, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.collocation.layout import problem_mesh
+from colloc.gaits.objective import Objective
 from colloc.mechanics.actuators import ActuatorLimits
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
@@ -49,6 +50,12 @@ def replay_of_unequal_coefficients_with_limits():
 
 def replay_with_corners():
     return replay(LOPSIDED, Friction(3.0, 1.0, 1.0), SQUARE, 1e-3, instants=120, tolerance=1e-4, breaks=SQUARE.corner_phases)
+
+
+def replays_of_other_objectives():
+    """The error is that of the objective."""
+    aims = Objective("turning"), Objective("driven efficiency"), Objective("distance / length")
+    return [replay(Chain(), UNEQUAL, SKEW, 1e-2, instants=80, tolerance=1e-2, objective=aim) for aim in aims]
 
 
 def replay_of_a_mixture():
