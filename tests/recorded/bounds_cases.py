@@ -75,9 +75,12 @@ def mixtures_and_knots():
     rng, motion = np.random.default_rng(25), _motions()
     weight = rng.uniform(size=motion.size) ** 3
     measure = Measure(motion, rng.uniform(0, 2 * np.pi, motion.size), weight / weight.sum())
+    few = np.flatnonzero(motion.angles[0] > 1.5)
+    there = Measure(motion.take(few), measure.heading[few], np.full(few.size, 1 / few.size))
     found = [measure.time, measure.efficiency(), measure.path().corners]
     for space in SPACES.values():
-        found += [worth(space, measure), with_more_knots(space, measure, 11).spline.knots]
+        found += [worth(space, each) for each in (measure, there)]
+        found += [with_more_knots(space, each, most).spline.knots for each in (measure, there) for most in (8, 20)]
     return found
 
 
