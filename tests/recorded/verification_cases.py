@@ -131,18 +131,17 @@ def an_uneven_mesh():
 
 
 def gaits_on_slopes():
-    steep = slope_motion(WEIGHTY, UNEQUAL, SKEW, 0.1, 0.4, heading=1.0, periods=2, tolerance=1e-4)
-    corners = slope_motion(Chain(), Friction(), SQUARE, 0.1, 0.2, theta=0.3, tolerance=1e-4, breaks=SQUARE.corner_phases)
-    # how the solver stepped is not the library's
-    return [[getattr(ran, n) for n in ("course", "headings", "climb", "aside", "friction_work", "joint_work", "steering")]
-            for ran in (steep, corners)], repr(steep)  # fmt: skip
+    """As exact as is needed for digits that do not depend on how the solver steps."""
+    steep = slope_motion(WEIGHTY, UNEQUAL, SKEW, 0.1, 0.4, heading=1.0, periods=2, tolerance=1e-6)
+    corners = slope_motion(Chain(), Friction(), SQUARE, 0.1, 0.2, theta=0.3, tolerance=1e-6, breaks=SQUARE.corner_phases)
+    names = ("course", "headings", "climb", "aside", "friction_work", "joint_work", "steering")
+    return [np.round(getattr(ran, name), 4) for ran in (steep, corners) for name in names], repr(corners)
 
 
 def headings_on_a_slope():
-    found = heading_map(
-        Chain(), Friction(2, 1, 1), Fourier([0, 0], [[1.5], [0]], [[0], [1]]), 1e-1, 0.1, count=4, tolerance=1e-3
-    )
-    return found.headings, found.turns, found.neutral, [ran.stable for ran in found.lasting], repr(found)
+    gait = Fourier([0, 0], [[1.5], [0]], [[0], [1]])
+    found = heading_map(Chain(), Friction(2, 1, 1), gait, 1e-1, 0.1, count=4, tolerance=1e-3)
+    return np.round(found.turns, 2), found.headings, found.neutral, [ran.stable for ran in found.lasting], repr(found)
 
 
 def trajectories():
