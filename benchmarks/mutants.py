@@ -39,8 +39,8 @@ _OF_CALLS = {
     "dual.h": _OF_OWN_LAWS,
 }
 """The Python that calls the C of a file; any call at all for the other files."""
-_OF_CLASSES = "tests/test_data_classes.py"
-"""Looks at classes and calls nothing; for what stands outside functions."""
+_OF_CLASSES, _OUTSIDE = "tests/test_data_classes.py", "*"
+"""Tests that look at classes and call nothing: for faults that stand outside functions, which are marked so."""
 _MOST = 20.0
 """Recorded processor seconds of the tests that one fault is met with; two thirds of it for those that mirror its package."""
 _LEAST_SHARE = 20
@@ -78,7 +78,10 @@ class Mutant(NamedTuple):
         if function.endswith("::"):  # of the module: those that use what it says
             inner = sorted(around, key=lambda node: node.lineno)[-1:]
             targets = [name.id for node in inner for name in ast.walk(node) if isinstance(name, ast.Name)]
-            yield {"*", *(named_line(self.file, line) for line in lines if set(targets[:1]) & set(re.findall(r"\w+", line)))}
+            yield {
+                _OUTSIDE,
+                *(named_line(self.file, line) for line in lines if set(targets[:1]) & set(re.findall(r"\w+", line))),
+            }
         else:
             for line in (number, max((n.lineno for n in around), default=number)):
                 yield {named_line(self.file, lines[line - 1]), f"{function}*"}
@@ -108,10 +111,11 @@ def tests_of(mutant: Mutant, texts: dict[str, str], known: dict[str, list[Test]]
     every = [test for tests in known.values() for test in tests]
     for reached in mutant.reached_by(texts):
         if meeting := [test for test in every if reached & test.calls]:
-            meeting += [test for test in every if "*" in reached and test.name.startswith(_OF_CLASSES)]
             break
     else:
         meeting = [test for test in every if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
+    if next(mutant.reached_by(texts)) & {_OUTSIDE}:
+        meeting += [test for test in every if test.name.startswith(_OF_CLASSES)]
     mirroring = tuple(f"{folder}/" for folder in TESTS[mutant.package])
     chosen, spent = [], 0.0
     for test in sorted(meeting, key=lambda test: (not test.name.startswith(mirroring), _rank(test))):
