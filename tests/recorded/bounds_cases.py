@@ -103,8 +103,12 @@ def a_sampled_bound():
 
 def an_exchange_of_samples():
     settings = {"shapes": 4, "directions": 6, "rounds": 1, "starts": 4, "tolerance": 1e-1}
-    found = exchanged_optimum(Domain(THREE, ISOTROPIC, 2.5), PotentialSpace(TensorSpline(2, 2.5, 3), (1, 3), True), **settings)
-    return found.rounds, found.samples, found.measure.weight.size, np.round([found.floor, found.measure.efficiency()], 4)
+    found = exchanged_optimum(Domain(THREE, ISOTROPIC, 2.5), PotentialSpace(TensorSpline(2, 2.5, 4), (1, 3), True), **settings)
+    values = (
+        np.round([found.floor, found.measure.efficiency()], 4),
+        with_more_knots(found.space, found.measure, 30).spline.knots,
+    )
+    return found.rounds, found.samples, found.measure.weight.size, values
 
 
 def allowances_of_cells():
