@@ -85,7 +85,7 @@ def mixtures_and_knots():
 
 
 def small_gaits():
-    gaits = small_gait(THREE, UNEQUAL, (0.9, 0.4), 36, 6, 6), small_gait(THREE, ISOTROPIC, (2.0, 0.3), 40, 6)
+    gaits = small_gait(THREE, UNEQUAL, (0.9, 0.4), 36, 6, 6), small_gait(THREE, ISOTROPIC, (2.0, 0.3), 40, 6, 3)
     best, shape = best_small_gait(THREE, ISOTROPIC, 2.0, steps=2, refined=1)
     return [gait.efficiency for gait in gaits], gaits[0].path(np.array([0.9, 0.4]), 0.1), best.efficiency, shape
 
@@ -93,7 +93,7 @@ def small_gaits():
 def a_sampled_bound():
     """The program's digits are the solver's: values alone, and few of their digits."""
     found = []
-    for law, rounds in ((ISOTROPIC, 3), (Friction(1.0, 1.0, 3.0), 1)):
+    for law, rounds in ((ISOTROPIC, 2), (Friction(1.0, 1.0, 3.0), 1)):
         budget = Budget(intervals=5, shapes=5, directions=6, rounds=rounds, starts=8, tolerance=5e-2, first=3)
         bound = efficiency_bound(Chain((0.5, 0.5)) if rounds == 1 else THREE, law, 2.5, budget=budget)
         found += [np.round([bound.sampled, bound.floor], 4), bound.converged, bound.intervals, bound.harmonics, bound.graded]

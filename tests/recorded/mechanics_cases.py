@@ -112,7 +112,7 @@ def steps_of_the_kernel():
 
 def steps_of_numpy():
     with numpy_instead():
-        return _steps(20)
+        return _steps(5)
 
 
 def by_numpy():
