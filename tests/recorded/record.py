@@ -21,7 +21,8 @@ def main() -> None:
             print(f"changed: {name}: {str(error).splitlines()[0][:200]}")
         else:
             found[name] = before[name]
-    KNOWN.write_text(json.dumps(dict(sorted(found.items())), indent=0) + "\n", encoding="utf-8")
+    lines = (f"{json.dumps(name)}: {json.dumps(digests)}" for name, digests in sorted(found.items()))
+    KNOWN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
