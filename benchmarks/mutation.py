@@ -4,24 +4,23 @@
 
 Faults are drawn from the packages that results rest on, as many of each as it has, but at least one in twenty: an operator,
 a comparison, a constant, a sign, a condition or an `abs`, `min`, `max` is changed, in Python and in the C of the kernel. One
-run of the default suite without any fault records which tests call which functions, also in the programs that they start
-(`benchmarks.reach`). A fault meets those that call its function, of the folder that mirrors its package first, until one fails;
-as many as fit in 30 s of processor time. What takes far longer than without a fault counts as caught (it hangs). Those that
+run of the default suite without any fault records which tests run which lines, also in the programs that they start
+(`benchmarks.reach`). A fault meets those that run its line, of the folder that mirrors its package first, until one fails;
+as many as fit in 20 s of processor time. What takes far longer than without a fault counts as caught (it hangs). Those that
 survive are printed with their line: they are a gap of the tests, or a change without consequences. C that the compiler turns
 into the same library is no fault, and is named so.
 What the record has of the same sources is not done again, so that the same command goes on with a run that was ended; a sample
-of other sources has other mutants. Which tests call what is kept beside it.
+of other sources has other mutants. Which tests run what is kept beside it.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import contextlib
 import hashlib
+import importlib
 import json
 import os
-import random
 import re
 import resource
 import shutil
@@ -34,144 +33,16 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
-import casadi  # noqa: F401  (what all children need)
-import h5py  # noqa: F401
-import numpy  # noqa: F401
 import pytest
-import scipy.optimize  # noqa: F401
 
-from benchmarks.faults import faults_of
+from benchmarks.mutants import ROOT, Mutant, drawn, mutants, sources, tests_of
 from benchmarks.reach import Test, load, save
 
-ROOT = Path(__file__).resolve().parents[1]
+_NEEDED = "casadi clarabel filelock h5py jinja2 matplotlib.pyplot mpmath rich.progress scipy.integrate scipy.optimize xarray"
+"""What the children would import one after the other."""
 _LEFT_BEHIND = shutil.ignore_patterns(".*_cache", ".git", ".venv", ".hypothesis", "__pycache__", "reach-*.json")
 """What the copy does without."""
-MUTATED = ("bounds", "smooth", "mechanics", "results", "verification", "system")
-_NOT_MUTATED = ("dask_pool", "interruption", "progress", "processors", "late_binding", "task_pool", "arguments")
-"""What no result rests on."""
-TESTS = {
-    "bounds": ("tests/bounds",),
-    "smooth": ("tests/smooth",),
-    "mechanics": ("tests/mechanics", "tests/hard"),
-    "results": ("tests/results",),
-    "verification": ("tests/verification",),
-    "system": ("tests/system",),
-    "laws": ("tests/laws",),
-}
-"""What mirrors a package comes first; the rest of the suite is for those that survive it."""
-_OF_ALL_CALLS = "colloc/mechanics/native_kernel.py::address"
-_OF_OWN_LAWS = "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source"
-_OF_CALLS = {
-    "enclosure.h": "colloc/bounds/enclosure.py::",
-    "growth.h": "colloc/bounds/enclosure.py::",
-    "cell_link.h": "colloc/bounds/enclosure.py::",
-    "loaded.h": "colloc/bounds/loaded_balance.py::",
-    "motion.h": "colloc/mechanics/native_kernel.py::compiled_motion",
-    "link_quadrature.h": _OF_OWN_LAWS,
-    "dual.h": _OF_OWN_LAWS,
-}
-"""The Python that calls the C of a file; any call at all for the other files."""
-_MOST = 30.0
-"""Recorded processor seconds of the tests that one fault is met with; two thirds of it for those that mirror its package."""
-_LEAST_SHARE = 20
-"""At least one mutant in so many is of each package."""
-
-
-class Mutant(NamedTuple):
-    """One fault: a span of a file and what it is replaced by."""
-
-    file: str
-    start: int
-    end: int
-    new: str
-
-    @property
-    def package(self) -> str:
-        return self.file.split("/")[1]
-
-    def described(self, texts: dict[str, str]) -> str:
-        text = texts[self.file]
-        number = text.count("\n", 0, self.start) + 1
-        line = text.splitlines()[number - 1].strip()
-        return f"{self.file}:{number}: {text[self.start : self.end]!r} -> {self.new!r} in: {line}"
-
-    def function(self, texts: dict[str, str]) -> str:
-        """``file::function`` it is in, as `benchmarks.reach` names it; ``file::`` outside all functions."""
-        if not self.file.endswith(".py"):
-            return _OF_CALLS.get(Path(self.file).name, _OF_ALL_CALLS)
-        text = texts[self.file]
-        number = text.count("\n", 0, self.start) + 1
-        return f"{self.file}::{_function_at(ast.parse(text), number)}"
-
-
-def _function_at(node: ast.AST, number: int, outer: str = "") -> str:
-    """Qualified name of the innermost function that holds a line."""
-    for inner in ast.iter_child_nodes(node):
-        if getattr(inner, "lineno", number) <= number <= (getattr(inner, "end_lineno", number) or number):
-            if isinstance(inner, ast.ClassDef):
-                return _function_at(inner, number, f"{outer}{inner.name}.")
-            if isinstance(inner, ast.FunctionDef):
-                return _function_at(inner, number, f"{outer}{inner.name}.<locals>.") or outer + inner.name
-            if found := _function_at(inner, number, outer):
-                return found
-    return ""
-
-
-def _rank(test: Test) -> float:
-    """Cheap tests come first, and those that speak of little else."""
-    return test.seconds * len(test.calls)
-
-
-def tests_of(mutant: Mutant, texts: dict[str, str], known: dict[str, list[Test]]) -> tuple[list[str], float]:
-    """Names and processor seconds of the tests that call its function, or anything of its file where none does."""
-    function = mutant.function(texts)
-    file = function.partition("::")[0] + "::"
-    anywhere = any(function in test.calls for tests in known.values() for test in tests) and function != file
-    mirroring, chosen, spent = TESTS[file.split("/")[1]], [], 0.0
-    for folder in sorted(known, key=lambda folder: folder not in mirroring):
-        calling = [test for test in known[folder] if function in test.calls]
-        if not calling and (folder in mirroring or not anywhere):
-            calling = [test for test in known[folder] if any(name.startswith(file) for name in test.calls)]
-        by_file: dict[str, list[Test]] = {}
-        for test in sorted(calling, key=_rank):
-            by_file.setdefault(test.name.partition("::")[0], []).append(test)
-        for tests in sorted(by_file.values(), key=lambda tests: sum(map(_rank, tests))):
-            for test in tests:
-                if spent + test.seconds < (_MOST * 2 / 3 if folder in mirroring else _MOST):
-                    chosen.append(test.name)
-                    spent += test.seconds
-    return chosen, spent
-
-
-def sources() -> dict[str, str]:
-    """Texts of the files that faults are put in."""
-    files = [path for package in MUTATED for path in sorted((ROOT / "colloc" / package).rglob("*"))]
-    mutated = (path for path in files if path.suffix in (".py", ".c", ".h") and path.stem not in _NOT_MUTATED)
-    return {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in mutated}
-
-
-def mutants(texts: dict[str, str]) -> Iterator[Mutant]:
-    """Every fault that can be put in."""
-    for file, text in texts.items():
-        for start, end, new in faults_of(text, python=file.endswith(".py")):
-            yield Mutant(file, start, end, new)
-
-
-def drawn(found: list[Mutant], number: int, seed: int) -> list[Mutant]:
-    """A sample: of each package as many as it has of all, but at least one in `_LEAST_SHARE`."""
-    packages = Counter(mutant.package for mutant in found)
-    room = {name: max(number // _LEAST_SHARE, number * packages[name] // len(found)) for name in packages}
-    room[max(room, key=lambda name: room[name])] += number - sum(room.values())
-    chosen = []
-    for mutant in random.Random(seed).sample(found, len(found)):
-        if room[mutant.package] > 0:
-            room[mutant.package] -= 1
-            chosen.append(mutant)
-    return chosen
-
-
 _COMPILED = ("cc", "-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
 _OWN_LAW = "from colloc import OwnLaw; print(OwnLaw('-vs/speed', '-vn/speed*(1 + exp(-speed))').kernel_source)"
 
@@ -286,11 +157,11 @@ def _processor_seconds() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _recorded(copy: Path, cache: Path, beside: Path) -> dict[str, list[Test]]:
-    """What the tests of every folder call, kept beside the record under a name made of the tests' text."""
+def _recorded(copy: Path, cache: Path, beside: Path, chosen: list[str]) -> dict[str, list[Test]]:
+    """What the tests of every folder run, or of those chosen, kept beside the record under a name made of the tests' text."""
     known = {}
     places = [path for path in sorted((copy / "tests").iterdir()) if any(path.glob("test_*.py")) or path.match("test_*.py")]
-    for place in places:
+    for place in [place for place in places if not chosen or place.name in chosen]:
         files = sorted(place.rglob("*.py")) if place.is_dir() else [place]
         name = str(place.relative_to(copy))
         edition = hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:8]
@@ -310,6 +181,10 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=1e9, metavar="S", help="processor time after which none is begun")
     parser.add_argument("--record", type=Path, default=Path("results/mutation.jsonl"), help="one line a mutant is added here")
     parser.add_argument("--only", default="", metavar="TEXT", help="of the sample those in files whose path holds this")
+    parser.add_argument("--tests", nargs="*", default=[], metavar="FOLDER", help="these of the suite, and not all of it")
+    parser.add_argument(
+        "--part", nargs=2, type=int, default=(1, 1), metavar=("K", "N"), help="the K-th of N that share the work"
+    )
     options = parser.parse_args()
     texts = sources()
     found, edition = list(mutants(texts)), hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:12]
@@ -324,9 +199,15 @@ def main() -> None:
         copy, cache = Path(folder) / "colloc", Path(folder) / "cache"
         shutil.copytree(ROOT, copy, ignore=_LEFT_BEHIND)
         cache.mkdir(mode=0o700)
-        known = _recorded(copy, cache, options.record.parent)
+        for library in _NEEDED.split():
+            importlib.import_module(library)
+        known = _recorded(copy, cache, options.record.parent, options.tests)
+        _in_child(
+            copy, lambda: int(pytest.main(["-n", "0", "-p", "no:cacheprovider", "--collect-only", *known]))
+        )  # compiles them
         for index, mutant in enumerate(chosen):
-            if index in done or options.only not in mutant.file or _processor_seconds() > options.seconds:
+            elsewhere = index % options.part[1] != options.part[0] - 1 or options.only not in mutant.file
+            if index in done or elsewhere or _processor_seconds() > options.seconds:
                 continue
             before = _processor_seconds()
             tests, seconds = tests_of(mutant, texts, known)

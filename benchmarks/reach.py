@@ -1,15 +1,17 @@
-"""Which tests run which functions of colloc, and how long they take: a plugin of pytest, for `benchmarks.mutation`.
+"""Which tests run which lines of colloc, and how long they take: a plugin of pytest, for `benchmarks.mutation`.
 
     python -m benchmarks.reach results/reach.json tests/mechanics tests/bounds ...
 
 A fixture of a module or session is set up in its first test only; what it calls is ascribed to every test that asks for it.
-Python programs that a test starts write down their calls themselves (`traced_children`).
+Python programs that a test starts write down their calls themselves (`traced_children`), but not their lines.
+A line is known by its text, so that the record outlives changes elsewhere in the file.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import linecache
 import os
 import sys
 import tempfile
@@ -23,21 +25,28 @@ from typing import Any, NamedTuple
 import pytest
 
 _LIBRARY = f"{Path(__file__).resolve().parents[1] / 'colloc'}{os.sep}"
+_FOLLOWED = 50
+"""The first calls of a function by a test are followed from line to line; all of them would take minutes."""
 _TRACED_CHILDREN = str(Path(__file__).with_name("traced_children"))
 
 
 class Test(NamedTuple):
-    """A test: its name for pytest, processor seconds, and ``file::function`` of everything it calls."""
+    """A test: its name for pytest, processor seconds, and all it runs: ``file::function``, and ``file: text`` of lines; of
+    programs that it starts ``file::function*``."""
 
     name: str
     seconds: float
     calls: frozenset[str]
 
 
-def _named(code: CodeType) -> str | None:
-    """``colloc/bounds/guaranteed.py::certify`` of a function; None outside the library."""
-    file = code.co_filename
-    return f"colloc/{file.removeprefix(_LIBRARY)}::{code.co_qualname}" if file.startswith(_LIBRARY) else None
+def _named(code: CodeType) -> str:
+    """``colloc/bounds/guaranteed.py::certify`` of a function."""
+    return f"colloc/{code.co_filename.removeprefix(_LIBRARY)}::{code.co_qualname}"
+
+
+def named_line(file: str, text: str) -> str:
+    """``colloc/bounds/guaranteed.py: return 0`` of a line."""
+    return f"{file}: {text.strip()}"
 
 
 def _seconds() -> float:
@@ -56,11 +65,22 @@ class Recorder:
     @contextmanager
     def _calls(self) -> Iterator[set[str]]:
         """The set of what is called in the block, complete at its end."""
-        codes: set[CodeType] = set()
+        unseen: dict[CodeType, set[int]] = {}
+        followed: dict[CodeType, int] = {}
         found: set[str] = set()
 
-        def called(frame: FrameType, event: str, argument: Any) -> None:
-            codes.add(frame.f_code)
+        def called(frame: FrameType, event: str, argument: Any) -> Any:
+            code = frame.f_code
+            if code not in unseen:
+                own = code.co_filename.startswith(_LIBRARY)
+                unseen[code], followed[code] = {line for _, _, line in code.co_lines() if line} if own else set(), 0
+            followed[code] += 1
+            return at_line if unseen[code] and followed[code] < _FOLLOWED else None
+
+        def at_line(frame: FrameType, event: str, argument: Any) -> Any:
+            lines = unseen[frame.f_code]
+            lines.discard(frame.f_lineno)
+            return at_line if lines else None
 
         before, outer = sys.gettrace(), os.environ.get("COLLOC_REACH", "")
         with tempfile.NamedTemporaryFile("r", encoding="utf-8") as of_children:
@@ -73,7 +93,12 @@ class Recorder:
                 sys.settrace(before)
                 threading.settrace(before)
                 os.environ["COLLOC_REACH"] = outer
-                found |= {name for code in codes if (name := _named(code))} | set(of_children.read().splitlines())
+                found |= set(of_children.read().splitlines())
+                for code, rest in unseen.items():
+                    if code.co_filename.startswith(_LIBRARY):
+                        file = _named(code).partition("::")[0]
+                        run = {line for _, _, line in code.co_lines() if line} - rest
+                        found |= {_named(code)} | {named_line(file, linecache.getline(code.co_filename, i)) for i in run}
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_fixture_setup(self, fixturedef: Any, request: Any) -> Iterator[None]:
@@ -110,12 +135,16 @@ def recorded(folders: tuple[str, ...]) -> tuple[list[Test], int]:
 
 
 def save(tests: list[Test], path: Path) -> None:
-    path.write_text(json.dumps([[test.name, test.seconds, sorted(test.calls)] for test in tests]), encoding="utf-8")
+    names = sorted({call for test in tests for call in test.calls})
+    place = {name: i for i, name in enumerate(names)}
+    rows = [[test.name, test.seconds, sorted(map(place.__getitem__, test.calls))] for test in tests]
+    path.write_text(json.dumps({"names": names, "tests": rows}), encoding="utf-8")
 
 
 def load(path: Path) -> list[Test]:
-    rows = json.loads(path.read_text(encoding="utf-8"))
-    return [Test(name, seconds, frozenset(calls)) for name, seconds, calls in rows]
+    known = json.loads(path.read_text(encoding="utf-8"))
+    names = known["names"]
+    return [Test(name, seconds, frozenset(names[i] for i in calls)) for name, seconds, calls in known["tests"]]
 
 
 def main() -> None:

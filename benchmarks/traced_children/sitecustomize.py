@@ -17,7 +17,7 @@ def _called(frame: FrameType, event: str, argument: object) -> None:
     if code.co_filename.startswith(_LIBRARY):
         # at once, as a test may kill the program
         with open(_FILE, "a", encoding="utf-8") as calls:
-            calls.write(f"colloc/{code.co_filename.removeprefix(_LIBRARY)}::{code.co_qualname}\n")
+            calls.write(f"colloc/{code.co_filename.removeprefix(_LIBRARY)}::{code.co_qualname}*\n")
 
 
 if _FILE:

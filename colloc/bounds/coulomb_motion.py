@@ -28,7 +28,7 @@ _BISECTIONS = 30
 """Of the way from an admissible shape to where links touch."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoulombMotion:
     """Balanced motions, one a column.
 

@@ -81,8 +81,8 @@ def corner_motions(body: Chain, friction: Friction, cells: Cells) -> Loaded:
 
 def spread(values: np.ndarray, axis: int) -> np.ndarray:
     """Largest difference of ``(d, n, 8)`` corner values along one axis of the cells, ``(n,)``."""
-    low = CORNERS[:, axis] == 0
-    return np.sqrt(((values[:, :, ~low] - values[:, :, low]) ** 2).sum(axis=0)).max(axis=1)
+    changes = np.diff(values.reshape(*values.shape[:2], 2, 2, 2), axis=2 + axis)
+    return np.sqrt((changes**2).sum(axis=0)).max(axis=(1, 2, 3))
 
 
 def by_convexity(body: Chain, friction: Friction, cells: Cells, free: Loaded, reference: ReferencePoint) -> Allowance:
@@ -143,9 +143,9 @@ def by_loads(
     above = free.potential[cells.at] + rise[:, None]
     spins = z[2].max(axis=1) - z[2].min(axis=1)
     excess = []
-    one, c = np.ones_like(cells.points[2]), reference.at
+    c = reference.at
     for fx, fy, turn in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, _TORQUE), (0, 0, -_TORQUE)):
-        load = np.stack([fx * one, fy * one, fy * c.real - fx * c.imag + turn])
+        load = np.stack(np.broadcast_arrays(fx, fy, fy * c.real - fx * c.imag + turn))
         state = loaded_balance(body, friction, cells.points[:2], cells.rates, load / multiplier, free.velocity, DELTA)
         share, bilinear = _unbalanced(body, friction, cells, state)
         below = multiplier * (state.power + state.leftover_power) - (load * state.velocity).sum(axis=0)

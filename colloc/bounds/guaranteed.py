@@ -65,7 +65,7 @@ class Guarantee:
     seconds: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Lattice:
     """Points between given edges, each interval of an axis halved so many times; cells are named by integers."""
 
@@ -138,8 +138,8 @@ def _uncrossed(body: Chain, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     or rises and then falls: over a box of positive angles it is least at a corner. So is the second.
     """
     low, high = np.where(low.sum(axis=0) < 0, (-high, -low), (low, high))
-    near, turned = (crossing_sums(body, np.stack(each))[0] for each in ((low[0], low[1]), (high[0], low[1])))
-    other = crossing_sums(body, np.stack([low[0], high[1]]))[0]
+    near, turned = (crossing_sums(body, np.stack(each), 0) for each in ((low[0], low[1]), (high[0], low[1])))
+    other = crossing_sums(body, np.stack([low[0], high[1]]), 0)
     crossed = (np.minimum(near[0], turned[0]) > np.pi + 1e-9) & (np.minimum(near[1], other[1]) > np.pi + 1e-9)
     return ~(crossed[0] & (low >= 0.0).all(axis=0))
 

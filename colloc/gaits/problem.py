@@ -33,7 +33,7 @@ _NAME, LONGEST_NAME = re.compile(r"[A-Za-z0-9_.-]+"), 200
 
 
 @named_arguments
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Problem:
     """Maximise an objective over a class of gaits: by default the efficiency d/W.
 

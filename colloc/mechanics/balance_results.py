@@ -39,7 +39,7 @@ class Lifted(NamedTuple):
     power: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BalanceSolution:
     """Tail velocities that balance the body, instant by instant.
 

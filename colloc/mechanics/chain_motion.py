@@ -119,7 +119,7 @@ def _slopes(
     none, weight = np.zeros_like(behind), body.weight_column()[:, :, None]
     still = np.zeros((body.n_link, 2))
     dphi = np.concatenate([behind, none, still], axis=1)[:, :, None]
-    dw = np.concatenate([none, behind - behind[anchor], still], axis=1)[:, :, None] * np.ones(n_time)
+    dw = np.repeat(np.concatenate([none, behind - behind[anchor], still], axis=1)[:, :, None], n_time, axis=2)
     along = np.concatenate([np.zeros((2 * n_joint, 2)), np.eye(2)])[None, :, :, None]
     path = body.weighted_path(anchor)
     d = implicit_changes(

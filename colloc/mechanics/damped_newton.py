@@ -86,7 +86,7 @@ MakeBatch = Callable[[np.ndarray, int], Batch]
 """Makes the batch of some instants (indices) with a given reference."""
 
 
-@dataclass
+@dataclass(eq=False)
 class State:
     """Current anchors, anchor velocities, residuals and step counts of all instants; updated in place.
 

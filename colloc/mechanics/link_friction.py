@@ -77,8 +77,7 @@ def _roots(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> _Root
     # P = T + r0 r1 cancels where T < 0; there P = a^2 (w l)^2 / (r0 r1 - T).
     T = a2 + y0 * y1
     opposite = T < 0
-    wl2 = xp.where(opposite, 4.0 * half * half, 1.0)
-    Q = xp.where(opposite, (r0r1 - T) / wl2, a2 / xp.where(opposite, 1.0, r0r1 + T))
+    Q = xp.where(opposite, r0r1 - T, a2) / xp.where(opposite, 4.0 * half * half, r0r1 + T)
     # squared before |w| appears: automatic differentiation loses q'' where w = 0 behind an absolute value
     signed_root_q = 2.0 * half / S
     q = signed_root_q * signed_root_q

@@ -38,7 +38,7 @@ _USUAL = {
 }
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Certificate:
     """The verdict of an independent replay.
 
@@ -106,7 +106,7 @@ class Certificate:
     @property
     def replayed(self) -> bool:
         """Whether there was a replay at all; if not, all numbers are NaN."""
-        return self.instants > 0
+        return bool(self.instants)
 
     @property
     def passed(self) -> bool:

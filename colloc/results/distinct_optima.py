@@ -30,7 +30,7 @@ def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
     return fourier_through(gait, series_class(problem))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Basin:
     """A distinct certified optimum and the starts that ended there.
 
@@ -58,11 +58,10 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     symmetries of body and friction (see `colloc.results.equivalence.images`).
     """
     solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value)
-    found: list[list[Outcome]] = []
-    paths: list[Fourier] = []
+    found: list[tuple[list[Outcome], Fourier]] = []
     for outcome in solved:
         path = fourier_series(problem, outcome.gait)
-        for members, near in zip(found, paths, strict=True):
+        for members, near in found:
             best = members[0]
             if best.value - outcome.value > SAME_VALUE * abs(best.value):
                 continue
@@ -70,6 +69,5 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
                 members.append(outcome)
                 break
         else:
-            found.append([outcome])
-            paths.append(path)
-    return [Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m in found]
+            found.append(([outcome], path))
+    return [Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m, _ in found]

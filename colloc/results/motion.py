@@ -17,7 +17,7 @@ SAMPLES = 401
 """Instants of one period in a result file, both ends included."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class SampledMotion:
     """The body at given instants, ``n_time`` columns each.
 

@@ -20,7 +20,7 @@ STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, TIME_LIMIT, ERRO
 _LONGEST_MESSAGE = 1000
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Outcome:
     """What became of one start.
 

@@ -36,7 +36,7 @@ _MOST_OTHERS = 4
 """Of the gaits that a search met besides, so many are told."""
 
 
-@dataclass(eq=False, repr=False)
+@dataclass(eq=False)
 class Solution:
     """What a solve found.
 

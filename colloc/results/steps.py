@@ -11,7 +11,7 @@ from colloc.gaits.gait_fields import AnyGait
 REDUCED, PRESCRIBED, REALISED = "reduced", "prescribed", "realised"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Level:
     """One converged or failed step of the continuation.
 

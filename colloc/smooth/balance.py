@@ -24,7 +24,7 @@ _MOST_PANELS, _REFINEMENTS = 600, 40
 _ROUNDING = 1e-15
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SmoothSolution:
     """A smooth body in balance, instant by instant; arrays of length n_time unless stated.
 

@@ -30,6 +30,7 @@ In the limit epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b if it runs 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,16 +142,15 @@ def _ramp(t: np.ndarray, start: float, stop: float) -> tuple[np.ndarray, np.ndar
 
 
 def _one_bump(crawler: Concertina) -> Motion:
-    w, sign = crawler.width, -1.0 if crawler.backwards else 1.0
-    travel = 2 * crawler.epsilon - w
+    w = crawler.width
+    travel = w - 2 * crawler.epsilon if crawler.backwards else 2 * crawler.epsilon - w
 
     def state(t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Amplitude and centre of the bump, with their rates."""
-        mirror = np.where(t < 0.5, 1.0, -1.0)
+        scale = np.where(t < 0.5, crawler.amplitude, -crawler.amplitude)
         t = np.where(t < 0.5, t, t - 0.5)
         (up, up_rate), (on, on_rate), (down, down_rate) = (_ramp(t, k / 6, (k + 1) / 6) for k in range(3))
-        centre, centre_rate = 0.5 + sign * travel * (on - 0.5), sign * travel * on_rate
-        scale = mirror * crawler.amplitude
+        centre, centre_rate = 0.5 + travel * (on - 0.5), travel * on_rate
         return scale * (up - down), scale * (up_rate - down_rate), centre, centre_rate
 
     def angle(s: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -207,23 +207,29 @@ def _two_bumps(crawler: Concertina) -> Motion:
         b_rate = (dA * np.cos(phi) - A * np.sin(phi)) * phi_rate
         return tuple(part[places] for part in (a, b, centre, a_rate, b_rate, centre_rate))
 
-    def half(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Arc length of the point or its mirror image in the rear half, and +1 there or -1 in the front half."""
-        front = s > 0.5
-        return np.where(front, 1 - s, s), np.where(front, -1.0, 1.0)
+    def mirrored(s: np.ndarray, of_rear: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """The rear half's function of arc length, and minus that of the mirror image in the front half."""
+        value = of_rear(np.minimum(s, 1 - s))
+        return np.where(s > 0.5, -value, value)
 
     def angle(s: np.ndarray, t: np.ndarray) -> np.ndarray:
         a, b, centre, *_ = state(t)
-        s, sign = half(s)
-        x = 2 * (s - centre) / w
-        return sign * (a * odd_profile(x) + b * even_profile(x))
+
+        def of_rear(s: np.ndarray) -> np.ndarray:
+            x = 2 * (s - centre) / w
+            return a * odd_profile(x) + b * even_profile(x)
+
+        return mirrored(s, of_rear)
 
     def rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
         a, b, centre, a_rate, b_rate, centre_rate = state(t)
-        s, sign = half(s)
-        x = 2 * (s - centre) / w
-        moving = (a * odd_slope(x) + b * even_slope(x)) * 2 * centre_rate / w
-        return sign * (a_rate * odd_profile(x) + b_rate * even_profile(x) - moving)
+
+        def of_rear(s: np.ndarray) -> np.ndarray:
+            x = 2 * (s - centre) / w
+            moving = (a * odd_slope(x) + b * even_slope(x)) * 2 * centre_rate / w
+            return a_rate * odd_profile(x) + b_rate * even_profile(x) - moving
+
+        return mirrored(s, of_rear)
 
     def breaks(t: np.ndarray) -> np.ndarray:
         centre = state(t)[2]

@@ -47,7 +47,7 @@ class Motion:
 
     def first_edges(self, t: np.ndarray, n_panel: int) -> np.ndarray:
         """Panel edges ``(n_edge, n_time)``: the breaks, and at most `n_panel` + 1 equal parts of the body besides."""
-        even = np.linspace(0.0, 1.0, n_panel + 1)[:, None] * np.ones((1, t.size))
+        even = np.repeat(np.linspace(0.0, 1.0, n_panel + 1)[:, None], t.size, axis=1)
         if self.breaks is None:
             return even
         return np.sort(np.concatenate([even, np.clip(self.breaks(t), 0.0, 1.0)]), axis=0)

@@ -159,7 +159,7 @@ def _slopes(
     x, y = now.arm_s * s + now.arm_n * c, now.arm_n * s - now.arm_s * c
     none = np.zeros_like(vs)
     turning = batch.fields.rate - batch.edge_rate[reference] + z[2]
-    dphi, turned = body.angle_slopes(body.grid.nodes[:, 0], q, rates)
+    dphi, turned = (np.broadcast_to(a, (*a.shape[:2], n_time)) for a in body.angle_slopes(body.grid.nodes[:, 0], q, rates))
     anchor = body.angle_slopes(body.grid.edges[reference], q, rates)[1][0]
 
     def along_path(a: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ def _slopes(
     stiffness = ((weight * k_ss, weight * k_sn, none), (weight * k_ns, weight * k_nn, none), (none, none, none))
     d = implicit_changes(
         (c, s, x, y), (vs, vn, turning), (weight * fs, weight * fn, none), stiffness, left, along_path,
-        dphi * np.ones(n_time), (turned - anchor) * np.ones(n_time),
+        dphi, turned - anchor,
     )  # fmt: skip
     back = (panels.edge_path(reference)[TAIL] * panels.widths[:, 0])[:, None, None]
     full = d.w  # the change of the tangents' rotation rate, that of the anchor included

@@ -99,7 +99,7 @@ class SmoothBody:
         return np.empty((0, 1))
 
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
-        places = np.linspace(0.0, 1.0, _FINE_PLACES)[:, None] * np.ones((1, angles.shape[1]))
+        places = np.repeat(np.linspace(0.0, 1.0, _FINE_PLACES)[:, None], angles.shape[1], axis=1)
         return np.abs(self.tangent(places, angles)).max(axis=0)
 
     def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
@@ -114,7 +114,7 @@ class SmoothBody:
 
     def _curve(self, n: int, order: int, angles: np.ndarray, rates: np.ndarray) -> tuple[PanelGrid, Curve]:
         """The body on n equal panels."""
-        panels = PanelGrid(np.linspace(0.0, 1.0, n + 1)[:, None] * np.ones((1, angles.shape[1])), order)
+        panels = PanelGrid(np.repeat(np.linspace(0.0, 1.0, n + 1)[:, None], angles.shape[1], axis=1), order)
         s = panels.nodes
         return panels, curve(panels, self.tangent(s, angles), self.turning(s, angles, rates), TAIL, np.zeros((1, 1)))
 

@@ -102,7 +102,7 @@ def _told(verbose: bool, progress: Callable[..., object] | None) -> Callable[...
     return told
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Starts:
     """What a search over many starts found.
 

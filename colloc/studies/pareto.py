@@ -29,7 +29,7 @@ _BETTER = 1e-6
 """Relative gain for which a point is replaced."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class ParetoFront:
     """Gaits from the best by the first objective to the best by the second.
 

@@ -44,7 +44,7 @@ _COUNTS = ("starts", "starts_certified")
 KnownBound = Callable[[Problem], float | None]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class StudyTable:
     """Labelled arrays: coordinates and variables by name, with the dimensions of each variable."""
 

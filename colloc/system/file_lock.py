@@ -36,7 +36,7 @@ def locked(path: Path, *, wait: bool = False) -> Iterator[None]:
     with contextlib.ExitStack() as held:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            lock = held.enter_context(FileLock(path, timeout=-1 if wait else 0))
+            lock = held.enter_context(FileLock(path, blocking=wait))
             if not isinstance(lock, SoftFileLock):  # whose file has a content of its own
                 with contextlib.suppress(OSError):  # a full disk does not matter here
                     path.write_text(f"process {os.getpid()} on {socket.gethostname()}", encoding="utf-8")

@@ -45,7 +45,7 @@ _OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0, "driven_work": 0.0}
 """Shares in the error of the motion on the level: its way alone is asked for."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class SlopeMotion:
     """A gait on a slope, period by period.
 

@@ -9,6 +9,7 @@ import numpy as np
 from colloc.gaits.sloped import checked_chain
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion
 from colloc.verification.replay import Path
@@ -19,8 +20,7 @@ _LOOSER = 30.0
 def check_finite(positive: bool = False, **numbers: object) -> None:
     """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
     for name, value in numbers.items():
-        usable = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
-        if not usable or (positive and not value > 0):  # type: ignore[operator]
+        if not is_number(value) or (positive and not value > 0):
             raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
 
 

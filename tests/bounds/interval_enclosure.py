@@ -248,7 +248,7 @@ class Link:
             r, spread = norm(vs, nearest), top([self.spread(sa), self.spread(sb)])
             far = (spread + A) / r
             half, sine = (1, far) if mid(far) < 0.12 else (iv.mpf(1) / 2, spread / r)
-            if (pivots and mid(nearest) < mid(reach) * (1 - 1e-9)) or mid(sine) >= 0.12:
+            if (pivots and mid(nearest) < mid(reach)) or mid(sine) >= 0.12:
                 continue
             tau = iv.mpf(min(max(1.5 * mid(sine) + 0.75 * mid(h), 0.3), 0.6))
             factor = half * (1 - tau) * (1 - sine**2) / (1 + far)

@@ -5,7 +5,7 @@ import pytest
 
 from colloc.bounds import enclosure, guaranteed
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion
-from colloc.bounds.enclosure import _KAPPA, CORNERS, DELTA, Cells, ReferencePoint, by_convexity, by_loads, corner_motions
+from colloc.bounds.enclosure import _KAPPA, CORNERS, DELTA, by_convexity, by_loads, corner_motions
 from colloc.bounds.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from colloc.bounds.loaded_balance import loaded_balance
 from colloc.bounds.potential import PotentialSpace, Samples
@@ -21,6 +21,7 @@ from colloc.numerics.spline import DEGREE, TensorSpline
 from colloc.system.errors import ProblemError
 from tests.bounds.interval_enclosure import allowance
 from tests.bounds.load_enclosure import allowance_by_loads
+from tests.bounds.random_cells import all_cells, random_cells
 
 BODY, UNIT = Chain(), Friction()
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
@@ -48,12 +49,6 @@ def boxes(potential, size, count, seed, thin=False):
         sizes[2] = low[2] * 3.0
     inside = (np.searchsorted(knots, low[:2]) == np.searchsorted(knots, low[:2] + size)).all(axis=0)
     return all_cells(low[:, inside], sizes[:, inside])
-
-
-def all_cells(low, sizes):
-    """Cells that share no corners."""
-    points = (low[:, :, None] + sizes[:, :, None] * CORNERS.T[:, None, :]).reshape(3, -1)
-    return Cells(low, sizes, points, np.arange(points.shape[1]).reshape(-1, 8))
 
 
 def motions_inside(cells, count, seed, body=BODY, friction=UNIT):
@@ -157,19 +152,6 @@ def test_balanced_motions_stay_within_what_is_allowed(potential, body, friction,
     if size < 0.01 and friction is not DIRECTED:
         assert np.isfinite(known).mean() > 0.7
         assert np.median(known[np.isfinite(known)]) < 1e-3
-
-
-def random_cells(body, friction, size, seed, thin=False, count=8):
-    """Cells for any body, motions at their corners and a reference point that has nothing to do with a potential."""
-    rng = np.random.default_rng(seed)
-    low, sizes = rng.uniform(-1, 1, (3, count)) * [[2.5], [2.5], [0.9]], size * rng.uniform(0.7, 1.3, (3, count))
-    if thin:
-        low[2] = 10.0 ** rng.uniform(-9, -3, count)
-        sizes[2] = low[2] * 3.0
-    at, centre = rng.normal(size=(2, 8 * count)), rng.normal(size=(2, count))
-    reference = ReferencePoint(at[0] + 1j * at[1], centre[0] + 1j * centre[1], *rng.uniform(0.1, 1, (3, count)))
-    cells = all_cells(low, sizes)
-    return cells, corner_motions(body, friction, cells), reference
 
 
 @needs_kernel

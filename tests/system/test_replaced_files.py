@@ -8,6 +8,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
@@ -217,8 +218,8 @@ def test_what_killed_processes_left_behind_is_swept_after_an_hour(tmp_path):
     old, new, other = (tmp_path / f".{name}.part" for name in ("x[1].h5.aaa", "x[1].h5.bbb", "y.h5.ccc"))
     for path in (old, new, other):
         path.write_bytes(b"left")
-    os.utime(old, (0, 0))
-    os.utime(other, (0, 0))
+    for path, age in ((old, 3605), (new, 3590), (other, 1e6)):
+        os.utime(path, (time.time() - age,) * 2)
     with replaced_file(tmp_path / "x[1].h5") as name:
         Path(name).write_bytes(b"whole")
     assert [p.exists() for p in (old, new, other)] == [False, True, True]

@@ -50,6 +50,10 @@ def test_the_replay_follows_the_branch_in_time(sense):
     expected = step_by_step(friction, path, sense)
     assert abs(followed.efficiency / expected - 1) < 5e-4
     assert abs(other.efficiency / expected - 1) > 5e-3
+    # a motion to start from does not decide the branch
+    assert replay(BODY, friction, path, 1e-4, sense=sense, near=other).efficiency == pytest.approx(
+        followed.efficiency, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from shared.loaded_chain import left_over
 
 from colloc import Chain, CrawlerBody, Fourier, Friction, NotConvergedError, ProblemError, ellipse, replay
 from colloc.verification.heading_map import heading_map
-from colloc.verification.slope import slope_motion
+from colloc.verification.slope import gait_on_slope, slope_motion
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 """A gait without any symmetry."""
@@ -169,6 +169,8 @@ def test_the_stated_error_covers_the_true_one():
     for tolerance in (1e-3, 1e-4):
         ran = slope_motion(*at, tolerance=tolerance)
         assert np.abs(ran.states[:5, -1] - exact).max() < ran.error < 30 * tolerance
+    loose = gait_on_slope(*at, ()).run(ran.course, 0.0, 1, 30 * tolerance).states[:5, -1]
+    assert ran.error == np.abs(ran.states[:5, -1] - loose).max()
 
 
 def test_rates_may_jump_where_that_is_said():

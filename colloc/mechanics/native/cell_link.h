@@ -44,8 +44,8 @@ typedef struct {
     double error[PIECES];                  /* of the interpolated directions of force */
     double cone[PIECES][2], cone_sine[PIECES], cone_speed[PIECES];
     double force_error, gap, power_error;  /* over the link */
-    double hinge_row[2][3];                /* the hinge's velocity in the link's axes for a change of the middle link's motion */
-    double plain_row[2][3];                /* the same, not stretched */
+    TwoRows hinge_row;                     /* the hinge's velocity in the link's axes for a change of the middle link's motion */
+    TwoRows plain_row;                     /* the same, not stretched */
     double allowed;                        /* largest |a| that `growth` holds for */
 } CellLink;
 
@@ -107,7 +107,8 @@ static inline void find_pieces(CellLink *k)
         slowest = fmin(slowest, speed[i]), k->fastest = fmax(k->fastest, speed[i]);
     }
     if (slowest < SLOWEST * k->fastest) {
-        double pattern[3] = {0.0}, width = 0.0;
+        Vector3 pattern = {0.0};
+        double width = 0.0;
         for (int i = 0; i < CORNERS; ++i) {
             const double per = 1.0 / (CORNERS * (speed[i] + DBL_MIN));
             pattern[0] += per * k->hinge[i][0], pattern[1] += per * k->hinge[i][1], pattern[2] += per * k->spin[i];

@@ -22,7 +22,8 @@ typedef struct {
 /* Net force and torque, and what a step has to reduce: the potential less the load's power, or half the squared residual
    without one. */
 typedef struct {
-    double force[3], merit;
+    Vector3 force;
+    double merit;
 } Total;
 
 /* Directions of the links, from joint angles that lie `stride` apart; and rates in units of `speed`. */
@@ -36,8 +37,8 @@ static inline void find_directions(
             phi += angle[(i - 1) * stride];
         link[i].length = length[i];
         link[i].pressure = pressure[i];
-        link[i].cos = i > 0 ? cos(phi) : 1.0;
-        link[i].sin = i > 0 ? sin(phi) : 0.0;
+        link[i].cos = cos(phi);
+        link[i].sin = sin(phi);
         link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
         link[i].load_x = link[i].load_y = 0.0;
     }
@@ -73,7 +74,7 @@ static inline void find_midpoints(const int n, Link *link, const int reference)
 }
 
 /* Velocity of link `to` in body-frame axes from that of its neighbour `from`, one further (side 1) or back (-1). */
-static inline void pass_on(double v[3], const Link *from, const Link *to, int side)
+static inline void pass_on(Vector3 v, const Link *from, const Link *to, int side)
 {
     const double w = side > 0 ? v[2] + to->rate : v[2] - from->rate;
     const double a = 0.5 * side * from->length * v[2], b = 0.5 * side * to->length * w;
@@ -82,7 +83,7 @@ static inline void pass_on(double v[3], const Link *from, const Link *to, int si
     v[2] = w;
 }
 
-static inline void set_velocity(Sliding *k, const Link *link, const double v[3])
+static inline void set_velocity(Sliding *k, const Link *link, const Vector3 v)
 {
     k->vs = v[0] * link->cos + v[1] * link->sin;
     k->vn = v[1] * link->cos - v[0] * link->sin;
@@ -90,9 +91,9 @@ static inline void set_velocity(Sliding *k, const Link *link, const double v[3])
 }
 
 /* Velocities of all links from that of the reference. */
-static inline void find_velocities(const int n, const Link *link, Sliding *k, const int reference, const double z[3])
+static inline void find_velocities(const int n, const Link *link, Sliding *k, const int reference, const Vector3 z)
 {
-    double v[3] = {z[0], z[1], z[2]};
+    Vector3 v = {z[0], z[1], z[2]};
     set_velocity(&k[reference], &link[reference], v);
     for (int i = reference + 1; i < n; ++i) {
         pass_on(v, &link[i - 1], &link[i], 1);
@@ -106,7 +107,7 @@ static inline void find_velocities(const int n, const Link *link, Sliding *k, co
 }
 
 /* Velocity of a link in body-frame axes. */
-static inline void link_velocity(const Link *link, const Sliding *k, double v[3])
+static inline void link_velocity(const Link *link, const Sliding *k, Vector3 v)
 {
     v[0] = k->vs * link->cos - k->vn * link->sin;
     v[1] = k->vs * link->sin + k->vn * link->cos;
@@ -114,7 +115,7 @@ static inline void link_velocity(const Link *link, const Sliding *k, double v[3]
 }
 
 /* Velocity of the tail, the free end of link 0, which points along +x. */
-static inline void tail_velocity(const Link *link, const Sliding *k, double v[3])
+static inline void tail_velocity(const Link *link, const Sliding *k, Vector3 v)
 {
     v[0] = k[0].vs;
     v[1] = k[0].vn - 0.5 * link[0].length * k[0].w;
@@ -122,15 +123,15 @@ static inline void tail_velocity(const Link *link, const Sliding *k, double v[3]
 }
 
 /* The other way round: velocity of the links from that of the tail. */
-static inline void find_velocities_from_tail(const int n, const Link *link, Sliding *k, const double tail[3])
+static inline void find_velocities_from_tail(const int n, const Link *link, Sliding *k, const Vector3 tail)
 {
-    const double z[3] = {tail[0], tail[1] + 0.5 * link[0].length * tail[2], tail[2]};
+    const Vector3 z = {tail[0], tail[1] + 0.5 * link[0].length * tail[2], tail[2]};
     find_velocities(n, link, k, 0, z);
 }
 
 static inline double load_power(const Link *link, const Sliding *k)
 {
-    double v[3];
+    Vector3 v;
     if (link->load_x == 0.0 && link->load_y == 0.0)
         return 0.0;
     link_velocity(link, k, v);
@@ -139,7 +140,7 @@ static inline double load_power(const Link *link, const Sliding *k)
 
 /* Everything at velocity z of the reference. */
 static inline Total evaluate(
-    const int n, const Link *link, Sliding *k, const int reference, const double z[3], const Law *law, double delta)
+    const int n, const Link *link, Sliding *k, const int reference, const Vector3 z, const Law *law, double delta)
 {
     Total total = {{0.0, 0.0, 0.0}, 0.0};
     find_velocities(n, link, k, reference, z);
@@ -174,7 +175,7 @@ static inline void pull_back(
         else
             find_secants(&k[i], law, link[i].length, link[i].pressure, delta, K);
         for (int j = 0; j < 3; ++j) {
-            double column[3];
+            Vector3 column;
             for (int row = 0; row < 3; ++row)
                 column[row] = j == 0   ? K[row][0] * c - K[row][1] * s
                               : j == 1 ? K[row][0] * s + K[row][1] * c
@@ -187,7 +188,7 @@ static inline void pull_back(
 }
 
 /* Largest magnitude; infinite if any of them is not a number. */
-static inline double largest_of(const double v[3])
+static inline double largest_of(const Vector3 v)
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
     return isfinite(v[0] + v[1] + v[2]) ? largest : INFINITY;

@@ -27,16 +27,17 @@ typedef struct {
     Link *link;
     Sliding *now, *trial;
     int anchor;
-    double velocity[3];
+    Vector3 velocity;
     double largest_rate;
     double residual;
     long long iterations;
 } State;
 
 /* x with A x = b after symmetric scaling to a unit diagonal, to which `shift` is added; zero where that is singular. */
-static inline void solve3(Matrix3 A, const double b[3], double shift, double x[3])
+static inline void solve3(Matrix3 A, const Vector3 b, double shift, Vector3 x)
 {
-    double d[3], m[3][4];
+    Vector3 d;
+    double m[3][4];
     for (int i = 0; i < 3; ++i)
         d[i] = sqrt(fmin(fmax(fabs(A[i][i]), DBL_MIN), DBL_MAX));
     for (int i = 0; i < 3; ++i) {
@@ -88,7 +89,8 @@ static inline void iterate(const int n, State *s, double delta, double tolerance
             break;
         const bool newton = fixed_point_due == 0;
         Matrix3 left;
-        double step[3], trial[3], alpha = 1.0;
+        Vector3 step, trial;
+        double alpha = 1.0;
         pull_back(n, s->link, s->now, law, delta, newton, left);
         solve3(left, at.force, 0.0, step);
         double slope = -2.0 * at.merit, slack = 0.0;

@@ -29,7 +29,7 @@ static inline bool cholesky(const Matrix3 H, Matrix3 L)
 }
 
 /* L^-1 v */
-static inline void forward(const Matrix3 L, const double v[3], double x[3])
+static inline void forward(const Matrix3 L, const Vector3 v, Vector3 x)
 {
     for (int i = 0; i < 3; ++i) {
         x[i] = v[i];
@@ -40,9 +40,10 @@ static inline void forward(const Matrix3 L, const double v[3], double x[3])
 }
 
 /* Largest |rows d| over d.H d <= 1. */
-static inline double reach_of(const Matrix3 L, double row[2][3])
+static inline double reach_of(const Matrix3 L, TwoRows row)
 {
-    double x[3], y[3], a = 0.0, b = 0.0, c = 0.0;
+    Vector3 x, y;
+    double a = 0.0, b = 0.0, c = 0.0;
     forward(L, row[0], x), forward(L, row[1], y);
     for (int i = 0; i < 3; ++i)
         a += x[i] * x[i], b += y[i] * y[i], c += x[i] * y[i];
@@ -65,7 +66,7 @@ static inline double largest_ratio(const Matrix3 L, const Matrix3 G)
     for (int i = 0; i < 3; ++i)
         forward(L, G[i], half[i]); /* rows of G L^-T */
     for (int j = 0; j < 3; ++j) {
-        const double column[3] = {half[0][j], half[1][j], half[2][j]};
+        const Vector3 column = {half[0][j], half[1][j], half[2][j]};
         forward(L, column, K[j]);
     }
     const double norm = frobenius(K), scale = norm > 0 ? 1.0 / norm : 0.0;
@@ -101,8 +102,8 @@ static inline void stretch_link(CellLink *k, const double sigma[2])
 }
 
 /* The links over a cell, from the motions z (x, y, spin of the middle link) at its corners. */
-static inline void find_links(CellLink link[3], const double length[3], const double sigma[2], const double low[3], const double size[3],
-                              const double (*z)[3], double delta)
+static inline void find_links(CellLink link[3], const Vector3 length, const double sigma[2], const Vector3 low, const Vector3 size,
+                              const Vector3 *z, double delta)
 {
     for (int i = 0; i < 3; ++i) {
         CellLink *k = &link[i];
@@ -126,7 +127,7 @@ static inline void find_links(CellLink link[3], const double length[3], const do
             }
         k->off = k->turned * k->turned / 8.0 * fastest + k->turned / 4.0 * change;
         const double angle = side ? -side * (low[k->axis] + 0.5 * size[k->axis]) : 0.0, c = cos(angle), s = sin(angle);
-        const double row[2][3] = {{c, -s, -s * k->offset}, {s, c, c * k->offset}};
+        const TwoRows row = {{c, -s, -s * k->offset}, {s, c, c * k->offset}};
         memcpy(k->hinge_row, row, sizeof row);
         stretch_link(k, sigma);
         find_errors(k, delta);
@@ -134,9 +135,9 @@ static inline void find_links(CellLink link[3], const double length[3], const do
 }
 
 typedef struct {
-    double turning[3];    /* force at the hinge that the link's turning may leave unbalanced */
+    Vector3 turning;      /* force at the hinge that the link's turning may leave unbalanced */
     double force, torque; /* left at the corners by the solver */
-    double point[3];      /* the reference point (x, y), and what the spin counts beside it */
+    Vector3 point;        /* the reference point (x, y), and what the spin counts beside it */
 } Balance;
 
 typedef struct {
@@ -153,7 +154,8 @@ static inline bool rests(const CellLink link[3], const double sigma[2], const Ba
         if (link[i].fastest > AT_REST_AT_ALL * delta || reserve < NEARLY_HELD)
             continue;
         /* |a| on the other links and at the hinges, in terms of its largest value on this one */
-        double on[3], hinge[3] = {0.0}, power_error = 0.0, gap = 0.0;
+        Vector3 on, hinge = {0.0};
+        double power_error = 0.0, gap = 0.0;
         if (i == 1) {
             on[0] = 1.0 + 2.0 * link[0].length / l, on[1] = 1.0, on[2] = 1.0 + 2.0 * link[2].length / l;
             hinge[0] = hinge[2] = 1.0;
@@ -182,7 +184,8 @@ static inline bool rests(const CellLink link[3], const double sigma[2], const Ba
 /* The motion is where strong convexity holds it. */
 static inline bool held(CellLink link[3], const Balance *b, Allowance *found)
 {
-    double force_error = 0.0, gap = 0.0, power_error = 0.0, row[2][3];
+    double force_error = 0.0, gap = 0.0, power_error = 0.0;
+    TwoRows row;
     Matrix3 G = {{0.0}};
     for (int i = 0; i < 3; ++i) {
         CellLink *k = &link[i];
@@ -196,8 +199,8 @@ static inline bool held(CellLink link[3], const Balance *b, Allowance *found)
         force_error += k->force_error, gap += k->gap, power_error += k->power_error;
         k->allowed = FIRST_ALLOWED * fmax(k->end_spread[0], k->end_spread[1]);
     }
-    double place[2][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}}, turn[2][3] = {{0.0, 0.0, 1.0}, {0.0, 0.0, 0.0}};
-    double point[2][3] = {{1.0, 0.0, -b->point[1]}, {0.0, 1.0, b->point[0]}};
+    TwoRows place = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}}, turn = {{0.0, 0.0, 1.0}, {0.0, 0.0, 0.0}};
+    TwoRows point = {{1.0, 0.0, -b->point[1]}, {0.0, 1.0, b->point[0]}};
     for (int attempt = 0; attempt < ATTEMPTS; ++attempt) {
         Matrix3 H = {{0.0}}, L;
         for (int i = 0; i < 3; ++i)
@@ -237,7 +240,7 @@ int colloc_enclosure(
 {
     for (ptrdiff_t c = first; c < last; ++c) {
         CellLink link[3];
-        find_links(link, length, sigma, low + 3 * c, size + 3 * c, (const double(*)[3])(motion + 24 * c), delta);
+        find_links(link, length, sigma, low + 3 * c, size + 3 * c, (const Vector3 *)(motion + 24 * c), delta);
         Balance b = {.force = left[2 * c], .torque = left[2 * c + 1]};
         memcpy(b.point, point + 3 * c, sizeof b.point);
         for (int i = 0; i < 3; i += 2) {

@@ -4,7 +4,7 @@
 
 #include "cell_link.h"
 
-static inline void add_product(Matrix3 H, double factor, const double a[3], const double b[3])
+static inline void add_product(Matrix3 H, double factor, const Vector3 a, const Vector3 b)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
@@ -12,27 +12,27 @@ static inline void add_product(Matrix3 H, double factor, const double a[3], cons
 }
 
 /* Rows of the velocity of a point in the link's axes, for a change of the middle link's motion. */
-static inline void rows_at(const CellLink *k, double s, double row[2][3])
+static inline void rows_at(const CellLink *k, double s, TwoRows row)
 {
     memcpy(row, k->hinge_row, sizeof k->hinge_row);
     row[1][2] += k->sign * s;
 }
 
 /* Rows of the hinge's velocity, not stretched: its length is the same at every angle. */
-static inline void plain_rows(const CellLink *k, double row[2][3])
+static inline void plain_rows(const CellLink *k, TwoRows row)
 {
     memcpy(row, k->plain_row, sizeof k->plain_row);
 }
 
-static inline void add_gram(Matrix3 G, double factor, double row[2][3])
+static inline void add_gram(Matrix3 G, double factor, TwoRows row)
 {
     add_product(G, factor, row[0], row[0]);
     add_product(G, factor, row[1], row[1]);
 }
 
 /* The integral of (a.n)^2 / |V| over |y| <= reach, y the normal velocity, for every affine V near the mean one. */
-static inline void add_pivot(const CellLink *k, Matrix3 H, double reach, double spin, const double along[3], const double normal[3],
-                             double hinge[2][3])
+static inline void add_pivot(const CellLink *k, Matrix3 H, double reach, double spin, const Vector3 along, const Vector3 normal,
+                             TwoRows hinge)
 {
     const double vs = k->mean_hinge[0], vn = k->mean_hinge[1], w = k->mean_spin, allowed = k->allowed, h = k->turned;
     const double change = k->spin_spread + 2.0 * allowed / k->length;
@@ -53,14 +53,15 @@ static inline void add_pivot(const CellLink *k, Matrix3 H, double reach, double 
 }
 
 /* The integral of (a.n)^2 / |V| over a piece, V the mean velocity: y = |vs| sinh t, ds = |V| dt / w. */
-static inline void add_piece(const CellLink *k, Matrix3 H, double factor, double sa, double sb, double along[3], double normal[3])
+static inline void add_piece(const CellLink *k, Matrix3 H, double factor, double sa, double sb, Vector3 along, Vector3 normal)
 {
     const double vs = k->mean_hinge[0], vn = k->mean_hinge[1], w = k->mean_spin, v = fmax(fabs(vs), 1e-13);
     const double t0 = asinh((vn + w * sa) / v), t1 = asinh((vn + w * sb) / v);
     if (fabs(t1 - t0) < SHORT_ARC) { /* Gauss's rule of two points, exact to 1e-7 of |a|^2 here */
         for (int e = -1; e <= 1; e += 2) {
             const double s = 0.5 * (sa + sb) + e * 0.28867513459481287 * (sb - sa), y = vn + w * s, V = norm_of(vs, y);
-            double row[2][3], across_V[3];
+            TwoRows row;
+            Vector3 across_V;
             rows_at(k, s, row);
             for (int i = 0; i < 3; ++i)
                 across_V[i] = (vs * row[1][i] - y * row[0][i]) / V;
@@ -83,7 +84,8 @@ static inline void add_growth(const CellLink *k, Matrix3 H)
     const double most = fmax(k->end_spread[0], k->end_spread[1]) + allowed, reach = fmin(fabs(vn), fabs(vn + w * l));
     const double spin = fabs(w) - k->spin_spread - 2.0 * allowed / l;
     const bool pivots = (vn < 0) != (vn + w * l < 0) && reach > ROOM * most && spin > 0.3 * fabs(w);
-    double hinge[2][3] = {{0.0}}, along[3], normal[3]; /* hinge: at least what a turn by a unit angle changes */
+    TwoRows hinge = {{0.0}}; /* at least what a turn by a unit angle changes */
+    Vector3 along, normal;
     if (k->uneven > 1.0 || (k->directed && !(fabs(vs) > k->along_spread + allowed)))
         return; /* the balanced motion may slide in the other sense */
     for (int i = 0; k->axis >= 0 && i < 6; ++i)
@@ -97,13 +99,13 @@ static inline void add_growth(const CellLink *k, Matrix3 H)
         add_pivot(k, H, reach - most, spin, along, normal, hinge);
     for (int j = 0; j < PIECES; ++j) {
         const double sa = k->node[j], sb = k->node[j + 1], length = sb - sa;
-        double first[2][3], last[2][3];
+        TwoRows first, last;
         if (length <= 0 || k->kind[j] == LOOSE)
             continue;
         rows_at(k, sa, first), rows_at(k, sb, last);
         if (k->kind[j] == SLOW) {
             const double factor = length / (2.0 * (k->cone_speed[j] + allowed)), s2 = k->cone_sine[j] * k->cone_sine[j];
-            double across_cone[3];
+            Vector3 across_cone;
             for (int i = 0; i < 3; ++i)
                 across_cone[i] = 0.5 * (k->cone[j][0] * (first[1][i] + last[1][i]) - k->cone[j][1] * (first[0][i] + last[0][i]));
             add_product(H, 0.5 * (1.0 - s2) * factor, across_cone, across_cone);
@@ -113,7 +115,7 @@ static inline void add_growth(const CellLink *k, Matrix3 H)
             continue;
         }
         const double ya = vn + w * sa, yb = vn + w * sb, nearest = ya * yb <= 0 ? 0.0 : fmin(fabs(ya), fabs(yb));
-        if (pivots && nearest < reach * (1.0 - 1e-9))
+        if (pivots && nearest < reach)
             continue;
         const double least = norm_of(vs, nearest), spread = fmax(k->spread[j], k->spread[j + 1]);
         /* along the way to the balanced motion, or (half as much) about the trial motion alone */

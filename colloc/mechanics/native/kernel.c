@@ -31,7 +31,7 @@ static inline void balance_instants(
 {
     for (ptrdiff_t t = first; t < last; ++t) {
         const double largest = largest_rate_of(n, rates + t, n_time, load ? delta : 0.0), speed = speed_unit_of(largest);
-        double tail[3];
+        Vector3 tail;
         s->largest_rate = largest;
         find_directions(n, s->link, length, pressure, angles + t, rates + t, speed, n_time);
         if (load)
@@ -94,7 +94,8 @@ int colloc_motion(
     for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
         const double speed = speed_unit_of(largest_rate_of(n, rates + t, n_time, load ? delta : 0.0)), own_delta = scaled_delta_of(delta, speed);
         const int a = (int)anchor[t];
-        double z[3], value[ROWS], net[3], dz[3], change[DIFFERENTIATED_ROWS];
+        double value[ROWS], change[DIFFERENTIATED_ROWS];
+        Vector3 z, net, dz;
         for (int i = 0; i < 3; ++i)
             z[i] = anchor_velocity[i * n_time + t] / speed;
         find_directions(n, link, length, pressure, angles + t, rates + t, speed, n_time);
@@ -148,11 +149,11 @@ int colloc_loaded(
     if (link && sliding) {
         State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
         for (ptrdiff_t t = first; t < last; ++t) {
-            double own[3] = {load[t], load[n_time + t], load[2 * n_time + t]};
+            Vector3 own = {load[t], load[n_time + t], load[2 * n_time + t]};
             find_directions(n, link, length, pressure, angles + t, rates + t, 1.0, n_time);
             find_midpoints(n, link, middle);
             const double c = link[middle].cos, q = link[middle].sin;
-            const double body_load[3] = {c * own[0] - q * own[1], q * own[0] + c * own[1], own[2]};
+            const Vector3 body_load = {c * own[0] - q * own[1], q * own[0] + c * own[1], own[2]};
             s.velocity[0] = c * start[t] - q * start[n_time + t];
             s.velocity[1] = q * start[t] + c * start[n_time + t];
             s.velocity[2] = start[2 * n_time + t];

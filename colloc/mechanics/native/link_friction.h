@@ -6,6 +6,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "vectors.h"
+
 typedef struct {
     double mu_t, mu_f, mu_b;
     double stretch_f, stretch_b; /* of the tangential velocity in the speed, forwards and backwards: 1 for Coulomb */
@@ -20,8 +22,6 @@ typedef struct {
     double a2, r0r1, S, Q, g, h;
     double fs, fn, couple;
 } Sliding;
-
-typedef double Matrix3[3][3];
 
 /* Of `kernel_numbers` in colloc/mechanics/friction.py. */
 static Law law_of(const double number[6])

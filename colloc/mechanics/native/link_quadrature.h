@@ -7,6 +7,7 @@
 #include <stdbool.h>
 
 #include "own_law.h"
+#include "vectors.h"
 
 enum { NODES = 20, ALL_NODES = 2 * NODES };
 
@@ -33,8 +34,6 @@ typedef struct {
     double sigma[ALL_NODES], y[ALL_NODES], weight[ALL_NODES];
     double fs, fn, couple;
 } Sliding;
-
-typedef double Matrix3[3][3];
 
 /* Of `kernel_numbers` in colloc/laws/link_quadrature.py. */
 static Law law_of(const double number[6])

@@ -14,7 +14,7 @@ static const double LOADED_SHRINK[] = {0.5, 0.5, 0.5, 0.1, 0.1, 0.1, 0.1, 0.1};
 
 /* Net force with the load, and potential less the load's power. */
 static inline Total evaluate_loaded(
-    const int n, const Link *link, Sliding *k, int middle, const double z[3], const double load[3], const Law *law, double delta)
+    const int n, const Link *link, Sliding *k, int middle, const Vector3 z, const Vector3 load, const Law *law, double delta)
 {
     Total total = evaluate(n, link, k, middle, z, law, delta);
     for (int i = 0; i < 3; ++i) {
@@ -25,13 +25,14 @@ static inline Total evaluate_loaded(
 }
 
 /* Minimise from the state's velocity; what is left over there. */
-static inline Total loaded_newton(const int n, State *s, const double load[3], double delta, int steps)
+static inline Total loaded_newton(const int n, State *s, const Vector3 load, double delta, int steps)
 {
     double *z = s->velocity;
     Total at = evaluate_loaded(n, s->link, s->now, s->anchor, z, load, &s->law, delta);
     for (int count = 0; count < steps && largest_of(at.force) > LOADED_TOLERANCE; ++count) {
         Matrix3 left;
-        double step[3], trial[3], alpha = 1.0;
+        Vector3 step, trial;
+        double alpha = 1.0;
         pull_back(n, s->link, s->now, &s->law, delta, true, left);
         solve3(left, at.force, REGULAR, step);
         const double slope = at.force[0] * step[0] + at.force[1] * step[1] + at.force[2] * step[2];
@@ -62,7 +63,7 @@ static inline double left_over(const Total *at)
 }
 
 /* The same, through falling delta where it stalls. */
-static inline Total loaded_solve(const int n, State *s, const double load[3], double delta, int steps)
+static inline Total loaded_solve(const int n, State *s, const Vector3 load, double delta, int steps)
 {
     Total at = loaded_newton(n, s, load, delta, steps);
     if (left_over(&at) <= STALLED)

@@ -29,7 +29,7 @@ static inline double actuator_power(const int n, const Link *link, const Sliding
 
 static inline void find_values(const int n, const Link *link, const Sliding *k, double value[ROWS])
 {
-    double v[3];
+    Vector3 v;
     tail_velocity(link, k, value + TAIL_ROW);
     value[CENTRE_ROW] = value[CENTRE_ROW + 1] = value[POWER_ROW] = 0.0;
     for (int i = 0; i < n; ++i) {
@@ -56,8 +56,8 @@ static inline void find_changes(
     const int n, const Link *link, const Sliding *k, const int anchor, const int joint, const bool of_rate, Change *d)
 {
     for (int i = 0; i < n; ++i) {
-        d[i].phi = !of_rate && i > joint ? 1.0 : 0.0;
-        d[i].w = of_rate ? (double)((i > joint) - (anchor > joint)) : 0.0;
+        d[i].phi = !of_rate && i > joint;
+        d[i].w = of_rate * ((i > joint) - (anchor > joint));
     }
     d[anchor].vx = d[anchor].vy = d[anchor].x = d[anchor].y = 0.0;
     for (int side = -1; side <= 1; side += 2)
@@ -73,7 +73,7 @@ static inline void find_changes(
     }
 }
 
-static inline void force_change(Matrix3 K, const Change *d, double df[3])
+static inline void force_change(Matrix3 K, const Change *d, Vector3 df)
 {
     for (int row = 0; row < 3; ++row)
         df[row] = -(K[row][0] * d->vs + K[row][1] * d->vn + K[row][2] * d->w);
@@ -81,13 +81,13 @@ static inline void force_change(Matrix3 K, const Change *d, double df[3])
 
 /* Change of net force and torque. */
 static inline void net_change(
-    const int n, const Link *link, const Sliding *k, Matrix3 *K, const Change *d, double net[3])
+    const int n, const Link *link, const Sliding *k, Matrix3 *K, const Change *d, Vector3 net)
 {
     net[0] = net[1] = net[2] = 0.0;
     for (int i = 0; i < n; ++i) {
         const double c = link[i].cos, s = link[i].sin, x = link[i].x, y = link[i].y;
         const double fx = k[i].fs * c - k[i].fn * s, fy = k[i].fs * s + k[i].fn * c;
-        double df[3];
+        Vector3 df;
         force_change(K[i], &d[i], df);
         const double dfx = df[0] * c - df[1] * s - d[i].phi * fy, dfy = df[0] * s + df[1] * c + d[i].phi * fx;
         net[0] += dfx;
@@ -97,7 +97,7 @@ static inline void net_change(
 }
 
 /* The same with the load's component along x (side 0) or y (side 1), while the anchor keeps its velocity. */
-static inline void load_change(const int n, const Link *link, const int side, Change *d, double net[3])
+static inline void load_change(const int n, const Link *link, const int side, Change *d, Vector3 net)
 {
     memset(d, 0, (size_t)n * sizeof *d);
     net[0] = side == 0, net[1] = side == 1, net[2] = 0.0;
@@ -106,7 +106,7 @@ static inline void load_change(const int n, const Link *link, const int side, Ch
 }
 
 /* Let the anchor follow with dz, so that the body stays in balance. */
-static inline void follow(const int n, const Link *link, Change *d, const double dz[3])
+static inline void follow(const int n, const Link *link, Change *d, const Vector3 dz)
 {
     for (int i = 0; i < n; ++i) {
         const double c = link[i].cos, s = link[i].sin, x = link[i].x, y = link[i].y;
@@ -127,7 +127,7 @@ static inline void value_changes(
     change[2] = d[0].w;
     change[3] = change[4] = change[5] = 0.0;
     for (int i = 0; i < n; ++i) {
-        double df[3];
+        Vector3 df;
         force_change(K[i], &d[i], df);
         change[3] += link[i].pressure * link[i].length * d[i].vx;
         change[4] += link[i].pressure * link[i].length * d[i].vy;

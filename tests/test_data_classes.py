@@ -1,0 +1,47 @@
+"""What kind of thing each of the library's data classes is: a value, which others may be equal to, or one of its own."""
+
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+
+import colloc
+
+# fmt: off
+VALUES = {
+    "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FreePath", "Friction",
+    "GaitClass", "Guarantee", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon", "PotentialSpace",
+    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "SearchStep",
+    "TensorSpline", "Viscous", "Wave", "Lost", "Task", "Axis", "Study",
+}
+MUTABLE = {
+    "Archive", "Candidate", "CellState", "Group", "Journal", "PathGeometry", "Solution", "State", "_Heard", "_State",
+}
+# fmt: on
+
+
+def data_classes():
+    modules = (m.name for m in pkgutil.walk_packages(colloc.__path__, "colloc.") if not m.name.endswith("__main__"))
+    for name in modules:
+        for thing in vars(importlib.import_module(name)).values():
+            if inspect.isclass(thing) and thing.__module__ == name and "__dataclass_params__" in vars(thing):
+                yield thing
+
+
+def test_values_compare_and_hash_by_their_fields_and_nothing_else_does():
+    """Arrays have no truth value, so what holds them is no value."""
+    by_fields = {c for c in data_classes() if c.__dataclass_params__.eq and c.__name__ != "_Heard"}
+    assert {c.__name__ for c in by_fields} == VALUES
+    held = {c.__name__: [f.name for f in dataclasses.fields(c) if f.compare and "ndarray" in str(f.type)] for c in by_fields}
+    assert not {name: fields for name, fields in held.items() if fields}
+    assert all(c.__hash__ is not None for c in by_fields if c.__name__ != "Rows")
+
+
+def test_only_what_is_under_way_can_be_changed():
+    assert {c.__name__ for c in data_classes() if not c.__dataclass_params__.frozen} == MUTABLE
+
+
+def test_classes_are_printed_by_their_fields_or_a_method_of_their_own():
+    """Gaits by that of all gaits."""
+    gaits = {"ArcPath", "Corners", "Fourier", "Phases"}
+    assert {c.__name__ for c in data_classes() if not c.__dataclass_params__.repr} == gaits
