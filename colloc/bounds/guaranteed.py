@@ -212,7 +212,7 @@ def certify(
     return Guarantee(max(target, worst), target, int(still.size), examined, deepened, time.process_time() - begin)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Cover:
     """Cells of one view of a body, under friction of mu_t = 1, and what they have to prove until when [processor time]."""
 

@@ -20,7 +20,7 @@ of two segments is that of an end of one from the other:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def tangent_of_minimum(first: Array, second: Array, share: Array, width: float =
     return share * first + share_of_second * second + width * bulge
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contact:
     """Two parts of a body that must not cross: the smaller of two functions of the shape must not be positive.
 
@@ -96,6 +96,10 @@ class Contact:
     def excess(self, angles: Array) -> Array:
         """The smoothed minimum ``(1, n_time)``."""
         return smooth_minimum(*self.pair(angles), self.width)
+
+    def after(self, joints_at: Callable[[Array], Array]) -> Contact:
+        """The same parts as a function of other coordinates, of which the joint angles are a function."""
+        return replace(self, pair=lambda shape: self.pair(joints_at(shape)))
 
     def share(self, angles: Array) -> Array:
         """What the first function has of its derivative, ``(1, n_time)``."""
