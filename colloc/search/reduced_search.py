@@ -33,8 +33,9 @@ VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
 """Accuracy of the objective at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
 STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
 """What the first-order conditions have to keep to then; the objective is off by the square of that."""
-KINK_RADIUS = 1e-6
-"""Of the points whose gradients are taken together [rad]: as far as an optimum without a kink may be missed by."""
+KINK_RADIUS, _WIDEST, _MISSED = 1e-6, 1e-5, 1e-8
+"""Of the points whose gradients are taken together [rad]: as far as an optimum without a kink may be missed by; more where the
+slopes at a kink are so small that the objective is not missed by more than the last."""
 _AROUND = (2, 16)
 """How many those are per parameter; the second where several kinks meet."""
 _GROWTH, _FEW_POINTS = 3, 300
@@ -119,8 +120,9 @@ def kink_or_not(found: Found) -> Found:
     if found.optimal:
         return found
     program = found.program or ReducedProgram(found.space, found.delta)
+    radius = min(max(KINK_RADIUS, _MISSED / found.conditions.kkt_error), _WIDEST)
     for points in _AROUND:
-        conditions = stationarity_around(program, found.v, found.conditions, KINK_RADIUS, points)
+        conditions = stationarity_around(program, found.v, found.conditions, radius, points)
         around = replace(found, conditions=conditions, on_kink=True)
         if around.optimal:
             return around

@@ -16,7 +16,10 @@ def form(body, size, seed=3, count=7):
     names += ("looks_for_all_velocities", "limited", "limit_names", "drawn_width", "bending")
     found = {name: getattr(body, name) for name in names}
     found |= {"describe": body.describe(), "hinges": [body.hinges.start, body.hinges.stop], "pairs": np.array(body.far_pairs)}
-    found |= {"largest": body.largest_angles(angles), "contacts": [(c.name, *c.pair(angles), c.width) for c in body.contacts(body.far_pairs)]}
+    found |= {
+        "largest": body.largest_angles(angles),
+        "contacts": [(c.name, *c.pair(angles), c.width) for c in body.contacts(body.far_pairs)],
+    }
     found |= {"crossing": body.crossing_depth(angles), "passing": body.passing_depth(np.repeat(angles, 2, axis=1))}
     return found | {
         "outline": body.outline(angles),

@@ -144,4 +144,6 @@ def cells_of_a_potential():
 def balances_under_loads():
     angles, rates, start = shapes(ODD, 12, 27, 2.0)
     load = 0.3 * np.random.default_rng(28).normal(size=(3, 12))
-    return loaded_balance(ODD, ISOTROPIC, angles, rates, load, start, 1e-3), loaded_balance(ODD, ISOTROPIC, angles, rates, load, start, 1e-8, 3)
+    return loaded_balance(ODD, ISOTROPIC, angles, rates, load, start, 1e-3), loaded_balance(
+        ODD, ISOTROPIC, angles, rates, load, start, 1e-8, 3
+    )

@@ -8,7 +8,16 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power
 from colloc.mechanics.chain_motion import chain_slopes
-from colloc.mechanics.contact import clearance, ends_and_links, excess, gap, intrusions, overlap, share_of_first, tangent_of_minimum
+from colloc.mechanics.contact import (
+    clearance,
+    ends_and_links,
+    excess,
+    gap,
+    intrusions,
+    overlap,
+    share_of_first,
+    tangent_of_minimum,
+)
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
@@ -43,7 +52,8 @@ def contact():
     share = share_of_first(first, second)
     found += [gap(WIDE, angles), overlap(WIDE, angles), share, tangent_of_minimum(second, first, share)]
     path = np.stack([np.linspace(0, 3.0, 50), np.linspace(0.2, 3.1, 50), np.linspace(-2.0, 2.5, 50)])
-    return found, [excess(WIDE, angles, *pair) for pair in ends_and_links(WIDE)], WIDE.passing_depth(path), WIDE.crossing_depth(path)
+    lacking = [excess(WIDE, angles, *pair) for pair in ends_and_links(WIDE)]
+    return found, lacking, WIDE.passing_depth(path), WIDE.crossing_depth(path)
 
 
 def mechanics_of_chains():
