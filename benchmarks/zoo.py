@@ -5,9 +5,9 @@
 
 Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1 to 4 harmonics, free paths
 and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. With --laws another family: elliptic, viscous, power
-and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power. For each: whether it is
-solved, its value over the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates), and
-the processor time. Failures are printed with the reason.
+and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power, slopes. For each: whether
+it is solved, its value over the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates),
+and the processor time. Failures are printed with the reason.
 """
 
 from __future__ import annotations
@@ -85,6 +85,8 @@ def law_problem(number: int) -> Problem:
     symmetry = str(rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"]))
     limited = {"power_limit": round(float(rng.uniform(0.3, 0.8)), 2)} if rng.random() < 0.3 and rate_independent(law) else {}
     gait = Harmonic(int(rng.integers(1, 4)), symmetry)
+    if number % 10 == 9:  # on a slope that most gaits of the level still climb
+        objective, limited = "efficiency", {"grade": round(float(rng.uniform(0.02, 0.2)) * min(mu.values()), 3)}
     return Problem(f"zoo-laws-{number}", body=body, friction=law, gait=gait, objective=objective, **limited)  # type: ignore[arg-type]
 
 
@@ -92,7 +94,8 @@ def described(problem: Problem) -> str:
     """In one line."""
     law, best = problem.friction.label, "" if problem.objective == EFFICIENCY else f"best {problem.objective.name}, "
     limit = f", power within {problem.power_limit:g}" if problem.power_limit else ""
-    return f"{best}{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}{limit}"
+    slope = f", on a slope of {problem.grade:g}" if problem.grade else ""
+    return f"{best}{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}{limit}{slope}"
 
 
 def main() -> None:
