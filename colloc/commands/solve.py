@@ -49,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
         "--starts",
         type=int,
         metavar="N",
-        help="starts to find the best gait of (default: 32, of relaxed gaits 8); 1: the guess alone",
+        help="starts to find the best gait of, at least (default: 32, of relaxed gaits 8); 1: the guess alone",
     )
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="begin no other start after so long")
     parser.add_argument(

@@ -144,12 +144,17 @@ def class_on(slope: Slope | None, gait_class: Any) -> Any:
     return SlopeHarmonic(gait_class.harmonics, gait_class.symmetry)
 
 
+def _checked_grade(grade: object) -> float:
+    if not is_number(grade) or grade < 0:
+        raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
+    return float(grade)
+
+
 def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
     """The body, if it can be on a slope of some grade; else a `ProblemError` that says why not."""
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
         raise ProblemError(f"only a Chain, whose joints are its own, can be put on a slope, not {type(body).__name__}.")
-    if isinstance(grade, bool) or not isinstance(grade, (int, float, np.number)) or not 0 <= grade < np.inf:
-        raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
+    _checked_grade(grade)
     if rate_independent(friction) and grade >= friction.largest:
         raise ProblemError(
             f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most {friction.largest:g} times "
@@ -166,16 +171,15 @@ def slope_from(body: Body, friction: Law, grade: object, towards: object) -> Slo
     ProblemError
         If there is none like it, or the body cannot be on it.
     """
-    if not is_number(grade) or grade < 0:
-        raise ProblemError(f"grade must be a number that is not negative, the tangent of the inclination, not {grade!r}.")
+    tangent = _checked_grade(grade)
     if towards is not None and not is_number(towards):
         raise ProblemError(f"towards must be a finite angle from straight uphill, or None, not {towards!r}.")
-    if grade == 0:
+    if tangent == 0:
         if towards is not None:
             raise ProblemError("towards is a direction on a slope: give a grade, or leave it out.")
         return None
-    checked_chain(body, friction, grade)
-    return Slope(float(grade), None if towards is None else float(towards))
+    checked_chain(body, friction, tangent)
+    return Slope(tangent, None if towards is None else float(towards))
 
 
 def check_asked(problem: Any) -> None:

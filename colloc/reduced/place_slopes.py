@@ -32,7 +32,7 @@ def along_shape(piece: Piece) -> Pulled:
 
 
 def along_arcs(n_joint: int) -> Pulled:
-    """Of arcs between unit tangents, by hand: all but a few weights is linear, which for four joints takes a tenth of the time.
+    """Of arcs between unit tangents, by hand: all but a few weights is linear, which for four joints takes a third of the time.
 
     ``angles = start + 2 pi speed h (c T0 + e T1)`` and ``direction = a T0 + b T1``, with weights that depend on tau and on
     m = |T1 - T0|^2 / 4 (`colloc.numerics.arcs`).

@@ -202,6 +202,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     ----------
     problem : Problem
     count : int
+        Of starts; hops go on while they lead on, to three times as many at most.
     seconds : float
         Wall time after which no other start is begun and no other gait is followed.
     watch : callable

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from colloc import Harmonic, Problem, ellipse
+from colloc.numerics.sqp import stationarity
 from colloc.reduced.program import ReducedProgram
 from colloc.search.full_program import RADIUS, answer
-from colloc.search.reduced_search import FINE, at_rest, searched
+from colloc.search.reduced_search import FINE, Found, at_rest, kink_or_not, searched
 
 PROBLEM = Problem("plain", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=40, mesh_tolerance=0)
 
@@ -64,3 +65,19 @@ def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(found, monkey
     assert ("beyond its limits" in text) == kept
     assert (level.status == "stationary") == kept
     assert abs(level.value + found.objective) < RADIUS
+
+
+@pytest.mark.parametrize(
+    ("slope", "missed", "kink"), [(1e-3, 5e-7, True), (1e-3, 5e-6, False), (1.0, 5e-8, True), (1.0, 5e-7, False)]
+)
+def test_a_kink_may_be_missed_by_more_where_the_slopes_beside_it_are_small(slope, missed, kink):
+    """By a tenth of 1e-6, or of 1e-5 where that changes the objective by less than 1e-8; slope |x| is least at 0."""
+    none = np.empty(0)
+    vee = SimpleNamespace(
+        lower=-np.ones(1), upper=np.ones(1), row_lower=none, row_upper=none, rows=lambda v: none,
+        row_slopes=lambda v: np.empty((0, 1)), objective=lambda v: slope * abs(v[0]), gradient=lambda v: slope * np.sign(v),
+    )  # fmt: skip
+    v = np.array([missed])
+    found = Found(PROBLEM, v, 1e-4, vee.objective(v), stationarity(vee, v), FINE, 0, 0, 0.0, program=vee)
+    assert not found.optimal
+    assert kink_or_not(found).on_kink == kink

@@ -108,3 +108,20 @@ def test_the_answer_is_the_best_gait_whose_certificate_holds(monkeypatch, ends, 
     found = optimise._best_certified(UNEQUAL, contenders, None, lambda: True)
     assert (found.number, len(asked)) == (answer, solved_for)
     assert bool(found.message) == (answer > 0 and ends[0][0] != "solved")
+
+
+@pytest.mark.parametrize(
+    ("speed", "failed", "small"),
+    [
+        (0.1, ["delta influence"], True),
+        (0.15, ["delta influence"], True),
+        (0.25, ["delta influence"], False),
+        (0.1, ["mesh error"], False),
+    ],
+)
+def test_delta_is_lowered_for_gaits_near_the_bound_where_nothing_else_fails(speed, failed, small):
+    checks = [SimpleNamespace(name=name) for name in failed]
+    solution = SimpleNamespace(
+        problem=UNEQUAL, gait=SimpleNamespace(shape_speed=speed), certificate=SimpleNamespace(failures=checks)
+    )
+    assert optimise._is_small_and_viscous(solution) == small
