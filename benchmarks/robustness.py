@@ -3,12 +3,13 @@
     python -m benchmarks.robustness --starts 100
     python -m benchmarks.robustness --starts 4 --harmonics 3
     python -m benchmarks.robustness --starts 12 --harmonics 3 --lengths 0.2 0.5 0.3 --symmetries none
+    python -m benchmarks.robustness --starts 20 --curvature 4 --lengths 0.25 0.25 0.25 0.25 --symmetries none --laws 1
 
 For every case: the share of starts that reach a certified optimum (first-order conditions and an independent fine
 replay) at delta = 1e-4 and, followed from there, at 1e-6; the median processor time of a start (certificate included);
 every failure and why; the best optimum and the share of starts that found it; and a second replay of every distinct
 optimum that shares neither grid nor start phase with the certificate's. Latin-hypercube starts, seed 0; one harmonic and three
-equal links unless asked otherwise.
+equal links unless asked otherwise. Free paths start from two harmonics.
 
 Both symmetries are valid for every friction law: a bilateral gait closes its rotation for any mu_b / mu_f
 (`colloc.results.equivalence`), and the second half of an antipodal one is the mirror image of its first half for any friction.
@@ -30,9 +31,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc import Chain, Friction, Harmonic, Problem, ellipse
+from colloc import Chain, FreePath, Friction, Harmonic, Problem
 from colloc.gaits.gait_fields import law_fields
-from colloc.gaits.harmonic import shifted
+from colloc.gaits.harmonic import Fourier, shifted
 from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
 from colloc.results.distinct_optima import basins
@@ -41,7 +42,8 @@ from colloc.results.solution import SOLVED, versions
 from colloc.studies.campaign import process_pool, run_starts
 from colloc.verification.replay import replay
 
-LAWS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
+Laws = tuple[tuple[float, float, float], ...]
+LAWS: Laws = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
 SYMMETRIES = ("none", "bilateral", "antipodal")
 INTERVALS = {"none": 40, "bilateral": 20, "antipodal": 20}
 DELTA, SMALL_DELTA, NEXT_DELTA = 1e-4, 1e-6, 4e-3
@@ -57,11 +59,22 @@ class Table(NamedTuple):
 
     body: Chain = Chain()
     harmonics: int = 1
+    curvature: float | None = None
+
+    def gait_class(self, symmetry: str) -> Harmonic | FreePath:
+        """Free paths where a curvature is given."""
+        return Harmonic(self.harmonics, symmetry) if self.curvature is None else FreePath(self.curvature, symmetry)
+
+    @property
+    def words(self) -> str:
+        """The class of gaits, whatever its symmetry."""
+        return f"harmonics: {self.harmonics}" if self.curvature is None else f"free paths of curvature <= {self.curvature:g}"
 
     @property
     def suffix(self) -> str:
         """Of its files; none for the published one."""
         parts = [] if self.harmonics == 1 else [f"{self.harmonics}-harmonics"]
+        parts += [] if self.curvature is None else [f"curvature-{self.curvature:g}"]
         parts += [] if self.body == Chain() else ["-".join(f"{length:g}" for length in self.body.lengths)]
         return "".join(f"-{part}" for part in parts)
 
@@ -77,12 +90,11 @@ def case_problem(
         name="robustness-" + "-".join(f"{mu:g}" for mu in law) + f"-{symmetry}-{delta:g}{table.suffix}",
         body=table.body,
         friction=Friction(*law),
-        gait=Harmonic(table.harmonics, symmetry),
-        guess=ellipse(0.0 if symmetry == "antipodal" else 0.3, 1.0, 0.5),
+        gait=table.gait_class(symmetry),
         delta=delta,
         delta_start=delta_start,
     )
-    return stated.with_(intervals=INTERVALS[symmetry]) if table.harmonics == 1 else stated
+    return stated.with_(intervals=INTERVALS[symmetry]) if table.harmonics == 1 and table.curvature is None else stated
 
 
 def stored(problem: Problem, folder: Path) -> Archive:
@@ -116,10 +128,10 @@ def _complete(archive: Archive, most: int, run: Callable) -> None:
 
 
 def contradiction(problem: Problem, outcome: Outcome) -> float:
-    """Relative difference of a certified efficiency from a replay on another grid, begun at another phase."""
-    gait = shifted(outcome.gait, PHASE)
+    """Relative difference of a certified efficiency from a replay on another grid, begun at another phase (paths: the same)."""
+    gait = shifted(outcome.gait, PHASE) if isinstance(outcome.gait, Fourier) else outcome.gait
     again = replay(
-        problem.body, problem.friction, gait, problem.delta,
+        problem.body, problem.friction, gait, problem.delta * outcome.gait.delta_unit,
         instants=REPLAY_INSTANTS, most_instants=REPLAY_INSTANTS,
     )  # fmt: skip
     return float(outcome.efficiency / again.efficiency - 1)
@@ -141,7 +153,7 @@ def row(archive: Archive) -> dict:
         "optima": [[b.best.efficiency, b.frequency] for b in found],
         "on_speed_floor": [on_speed_floor(problem, b.best.gait) for b in found],
         "replay_differences": [contradiction(problem, b.best) for b in found],
-        "best_gait": {k: getattr(found[0].best.gait, k).tolist() for k in ("mean", "cos", "sin")} if found else None,
+        "best_gait": {k: np.asarray(v).tolist() for k, v in vars(found[0].best.gait).items()} if found else None,
     }
 
 
@@ -150,7 +162,7 @@ def markdown(rows: list[dict], asked: int, command: str, table: Table = PUBLISHE
     lines = [
         "# Robustness of the search over gaits",
         "",
-        f"{table.body.describe()}; harmonics: {table.harmonics}; Latin-hypercube starts (seed 0). Written by `{command}`.",
+        f"{table.body.describe()}; {table.words}; Latin-hypercube starts (seed 0). Written by `{command}`.",
         "Certified: first-order conditions and an independent fine replay agree. Time: processor time of one start,",
         "certificate included, on a core of a busy machine;",
         "at the smaller delta that of going on from the result at the larger one. Replay: largest relative difference of the",
@@ -190,11 +202,11 @@ def markdown(rows: list[dict], asked: int, command: str, table: Table = PUBLISHE
     return "\n".join(lines) + "\n"
 
 
-def write_tables(symmetries: list[str], asked: int, folder: Path, output: Path, command: str, table: Table) -> None:
+def write_tables(laws: Laws, symmetries: list[str], asked: int, folder: Path, output: Path, command: str, table: Table) -> None:
     """results/robustness.md and .json from the archives."""
     archives = [
         stored(case_problem(law, symmetry, delta, 0.1 if delta == DELTA else NEXT_DELTA, table), folder)
-        for delta, symmetry, law in product((DELTA, SMALL_DELTA), symmetries, LAWS)
+        for delta, symmetry, law in product((DELTA, SMALL_DELTA), symmetries, laws)
     ]
     rows = [row(archive) for archive in archives if archive.outcomes]
     (output / f"robustness{table.suffix}.md").write_text(markdown(rows, asked, command, table), encoding="utf-8")
@@ -208,25 +220,32 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--symmetries", nargs="+", choices=SYMMETRIES, default=SYMMETRIES)
     parser.add_argument("--harmonics", type=int, default=1, metavar="N")
+    parser.add_argument("--curvature", type=float, metavar="C", help="free paths of at most so much, in place of harmonics")
+    parser.add_argument("--laws", type=int, default=len(LAWS), metavar="N", help="the first so many of the six")
     parser.add_argument("--lengths", type=float, nargs="+", metavar="L", help="of the links, by default three equal ones")
     parser.add_argument("--output", type=Path, default=Path("results"))
     parser.add_argument("--tables", action="store_true", help="write the tables of what is stored, and solve nothing")
     options = parser.parse_args()
     folder = options.output / "robustness"
-    table = Table(Chain(tuple(options.lengths)) if options.lengths else Chain(), options.harmonics)
+    table = Table(Chain(tuple(options.lengths)) if options.lengths else Chain(), options.harmonics, options.curvature)
+    laws = LAWS[: options.laws]
     command = f"python -m benchmarks.robustness --starts {options.starts}"
     if options.harmonics != 1:
         command += f" --harmonics {options.harmonics}"
+    if options.curvature is not None:
+        command += f" --curvature {options.curvature:g}"
+    if len(laws) < len(LAWS):
+        command += f" --laws {len(laws)}"
     if options.lengths:
         command += f" --lengths {' '.join(f'{length:g}' for length in options.lengths)}"
     if tuple(options.symmetries) != SYMMETRIES:
         command += f" --symmetries {' '.join(options.symmetries)}"
     turns = [] if options.tables else [*range(TURN, options.starts, TURN), options.starts]
     for most in turns:
-        for symmetry, law in product(options.symmetries, LAWS):
+        for symmetry, law in product(options.symmetries, laws):
             advance(law, symmetry, most, options.workers, folder, table)
             print(f"{most} starts of {law}, {symmetry}", flush=True)
-    write_tables(list(options.symmetries), options.starts, folder, options.output, command, table)
+    write_tables(laws, list(options.symmetries), options.starts, folder, options.output, command, table)
 
 
 if __name__ == "__main__":
