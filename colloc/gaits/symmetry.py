@@ -77,10 +77,10 @@ def check_symmetric(problem: Any) -> None:
     needed = {BILATERAL, ANTIPODAL} if symmetry == BOTH else {symmetry}
     if not needed <= set(problem.body.symmetries):
         raise ProblemError(
-            f"a {symmetry} gait needs a body whose lengths read the same from both ends; "
+            f"gaits of symmetry {symmetry} need a body whose lengths read the same from both ends; "
             f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
         )
     for name in ("joint_limit", "torque_limit", "power_limit"):
         limit = getattr(problem, name)
         if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
-            raise ProblemError(f"a {symmetry} gait bends mirrored joints alike: give them the same {name}.")
+            raise ProblemError(f"gaits of symmetry {symmetry} bend mirrored joints alike: give them the same {name}.")

@@ -1,18 +1,19 @@
 """The best gait, not the nearest one: many starts, cheaply told apart, the promising ones followed to the end.
 
 A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it meets a gait that an
-earlier start came through, at the same delta, it goes on as that one did, and is dropped. The last starts are not new ones but
-hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). What is left is sorted by its value; the first
-few are followed to the final delta, and the best of those is refined, answered and certified.
+earlier start came through, at the same delta, it goes on as that one did, and is dropped. After every four new starts come
+four hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). What is left is sorted by its value;
+the first few are followed to the final delta, and the best of those is refined, answered and certified.
 """
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import chain, islice
+from functools import partial
 
 import numpy as np
 
@@ -51,11 +52,12 @@ _BROKEN = 1e-2
 _FOLLOWED, _PROMISING, _CLOSE = 3, 0.8, 0.01
 """How many gaits are followed to the final delta, the share of the best value that they need at the coarse one, and how
 far they may be from the best at the final one to be optimised on the whole mesh."""
-_HOPS, _HOP_SIZES, _HOP_SEED = 0.5, (0.2, 0.4, 0.8), 1
-"""The share of the starts that hop from the best gait known, and how far [rad], in turn. At 0.2 a hop mostly falls back, at 0.8
-it lands where any start would; which of them leads on differs from problem to problem."""
+_TURN, _HOP_SIZES, _HOP_SEED = 4, (0.2, 0.4, 0.8), 1
+"""Starts and hops from the best gait known take turns of so many, and how far hops go [rad], in turn. At 0.2 a hop mostly falls
+back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start k is depends on
+what came before alone: more starts go wherever fewer do."""
 _PATIENCE, _MOST = 8, 3
-"""Hops go on until so many in a row have led nowhere better; at most so many times the starts asked for are tried."""
+"""The search goes on until so many in a row have led nowhere better; at most so many times the starts asked for are tried."""
 _SPARE = 8
 """Gaits of finite size that are followed at most, until one has not shrunk."""
 _ROUNDS = 3
@@ -84,17 +86,16 @@ class Candidate:
             at = at.then
 
 
-def starting_gaits(problem: Problem, count: int, seed: int = 0) -> Iterator[AnyGait]:
-    """The guess, gaits known from three links, waves both ways, then a seeded Latin hypercube."""
+def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
+    """The guess, gaits known from three links, waves both ways, then seeded Latin hypercubes without end."""
     body, limit = problem.body, problem.joint_limit
     known = [over_links(ellipse(*numbers), Chain(), body, limit) for numbers in _KNOWN]
     waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
     own = seed_class(problem)
     first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in (*known, *waves))]
     # known gaits and seeds take turns: neither are always better
-    seeds = (latin_hypercube_gait(problem, seed, k) for k in range(count))
-    turns = chain.from_iterable(zip(first, seeds, strict=False))
-    return islice(chain(turns, seeds), count)
+    seeds = map(partial(latin_hypercube_gait, problem, seed), itertools.count())
+    return itertools.chain(itertools.chain.from_iterable(zip(first, seeds, strict=False)), seeds)
 
 
 def same_gait(problem: Problem, a: Found, b: Found) -> bool:
@@ -111,20 +112,18 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)  # compared where friction is nearly dry
     deltas = [max(delta, problem.delta) for delta in (problem.delta_start, _NEARLY_DRY * usual)]
     known: list[list[Candidate]] = [[] for _ in deltas]
-    independent, last, tried, best = count - int(_HOPS * count), count - 1, 0, 0.0
-    starts = starting_gaits(problem, independent)
+    starts, last, tried, best = starting_gaits(problem), count - 1, 0, 0.0
     while tried == 0 or (tried <= min(last, _MOST * count - 1) and goes_on()):
         start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
-            gait = next(starts, None)
-            if gait is not None:
-                _follow(*space_about(coarse, closed_gait(coarse, gait, deltas[0])), start, deltas, known)
-            elif known[-1]:
+            if start // _TURN % 2 == 0 or not known[-1]:
+                _follow(*space_about(coarse, closed_gait(coarse, next(starts), deltas[0])), start, deltas, known)
+            else:
                 shaken = _shaken(problem, min((c.found for c in known[-1]), key=lambda f: f.objective).gait, start)
                 _follow(*space_about(coarse, shaken), start, deltas[-1:], known[-1:])
         before, best = best, min((c.found.objective for c in known[-1]), default=0.0)
-        if start >= independent and best < before - _SAME_EFFICIENCY * abs(before):
+        if start > 0 and best < before - _SAME_EFFICIENCY * abs(before):
             last = max(last, start + _PATIENCE)
         watch(_step("starts", tried, max(tried, count), [c.found for c in known[-1]]))
     return sorted(known[-1], key=lambda c: c.found.objective), tried
@@ -202,7 +201,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     ----------
     problem : Problem
     count : int
-        Of starts; hops go on while they lead on, to three times as many at most.
+        Of starts, at least: they go on while they lead on, to three times as many at most.
     seconds : float
         Wall time after which no other start is begun and no other gait is followed.
     watch : callable

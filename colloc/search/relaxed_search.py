@@ -131,7 +131,7 @@ def relaxed_gaits(
     """
     begin, coarse = time.perf_counter(), max(6, round(_COARSE * problem.intervals))
     known: list[Found] = []
-    for count, gait in enumerate((*first, *islice(starting_gaits(problem, starts), starts)), 1):
+    for count, gait in enumerate((*first, *islice(starting_gaits(problem), starts)), 1):
         if known and time.perf_counter() - begin > seconds:
             break
         report(f"trying start {count} of {starts + len(first)}")

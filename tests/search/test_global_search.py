@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
@@ -64,14 +65,15 @@ def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch
 @pytest.mark.parametrize(
     ("count", "better", "tried"),
     [
-        (8, {0: 1, 2: 2}, 8),
+        (1, {0: 1}, 1),
+        (8, {0: 1}, 8),
         (8, {0: 1, 6: 2}, 15),
         (8, {0: 1, 6: 2, 14: 3}, 23),
         (4, {0: 1, 3: 2, 9: 3}, 12),
     ],
-    ids=["independent starts alone", "a hop", "hops that lead on", "three times what was asked for"],
+    ids=["one", "none leads on", "one leads on", "two do", "three times what was asked for"],
 )
-def test_hops_go_on_while_one_of_the_last_eight_led_on(monkeypatch, count, better, tried):
+def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, count, better, tried):
     def follow(space, v, number, deltas, known):
         if number in better:
             found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0)
@@ -81,6 +83,27 @@ def test_hops_go_on_while_one_of_the_last_eight_led_on(monkeypatch, count, bette
     found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, lambda step: None)
     assert number == tried
     assert found[0].found.objective == -max(better.values())
+
+
+def test_more_starts_go_wherever_fewer_do(monkeypatch):
+    """New starts and hops take turns of four, and what a hop begins from depends on what came before alone."""
+    begun = {}
+
+    def follow(space, v, number, deltas, known):
+        begun[number] = (v, len(deltas))
+        found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=ellipse(0, 1.0, 0.1 * number), delta=1.0)
+        known[-1].append(global_search.Candidate(found))
+
+    monkeypatch.setattr(global_search, "_follow", follow)
+    problem = Problem("turns", gait=Harmonic(1, "bilateral"))
+    candidates(problem, 6, lambda: True, lambda step: None)
+    fewer, begun = begun, {}
+    candidates(problem, 20, lambda: True, lambda step: None)
+    assert [deltas for _, deltas in begun.values()] == 2 * ([2] * 4 + [1] * 4) + [2] * 4
+    assert 6 < len(fewer) < 20
+    for number, (v, deltas) in fewer.items():
+        assert deltas == begun[number][1]
+        np.testing.assert_array_equal(v, begun[number][0])
 
 
 @pytest.mark.parametrize(
