@@ -45,41 +45,21 @@ def local_function(name: str, local: ca.SX, parameter: ca.SX, delta: ca.SX, out:
     """Differentiate the expression `out` for one instance."""
     weight = ca.SX.sym("weight", out.shape[0])
     hessian = ca.hessian(ca.dot(weight, out), local)[0]
-    return _packed(name, local, parameter, delta, out, ca.jacobian(out, local), ca.triu(hessian), weight)
+    return _differentiated(name, local, parameter, delta, out, ca.jacobian(out, local), hessian, weight)
 
 
-def _packed(
-    name: str, local: ca.SX, parameter: ca.SX, delta: ca.SX, out: ca.SX, jacobian: ca.SX, upper: ca.SX, weight: ca.SX
-) -> LocalFunction:
-    jacobian, upper = ca.sparsify(jacobian), ca.sparsify(upper)
-    jac_row, jac_col = (np.array(a, dtype=int) for a in jacobian.sparsity().get_triplet())
-    hess_row, hess_col = (np.array(a, dtype=int) for a in upper.sparsity().get_triplet())
-    arguments = [local, parameter, delta]
-    functions = (
-        ca.Function(name, arguments, [ca.densify(out)]),
-        ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))]),
-        ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))]),
-    )
-    value, jac, hess = functions
-    return LocalFunction(
-        local.shape[0],
-        out.shape[0],
-        parameter.shape[0],
-        value,
-        jac,
-        hess,
-        jac_row,
-        jac_col,
-        hess_row,
-        hess_col,
-    )
-
-
-def total_function(
+def _differentiated(
     name: str, local: ca.SX, parameter: ca.SX, delta: ca.SX, out: ca.SX, jacobian: ca.SX, hessian: ca.SX, weight: ca.SX
 ) -> LocalFunction:
-    """A local function whose derivatives are given, because some parameters depend on the locals (see `Block.implicit`)."""
-    return _packed(name, local, parameter, delta, out, jacobian, ca.triu(hessian), weight)
+    """A local function with its derivatives."""
+    jacobian, upper = ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
+    jac_row, jac_col = (np.array(a, dtype=int) for a in jacobian.sparsity().get_triplet())
+    hess_row, hess_col = (np.array(a, dtype=int) for a in upper.sparsity().get_triplet())
+    arguments, sizes = [local, parameter, delta], (local.shape[0], out.shape[0], parameter.shape[0])
+    value = ca.Function(name, arguments, [ca.densify(out)])
+    jac = ca.Function(f"{name}_jac", arguments, [ca.densify(ca.vertcat(*jacobian.nonzeros()))])
+    hess = ca.Function(f"{name}_hess", [*arguments, weight], [ca.densify(ca.vertcat(*upper.nonzeros()))])
+    return LocalFunction(*sizes, value, jac, hess, jac_row, jac_col, hess_row, hess_col)
 
 
 def implicit_function(
@@ -93,14 +73,15 @@ def implicit_function(
     n = solved.shape[0]
     R_z, R_y = ca.jacobian(equations, solved), ca.jacobian(equations, local)
     slope = -ca.solve(R_z, ca.densify(R_y))
-    jacobian = ca.jacobian(out, local) + ca.jacobian(out, solved) @ slope
+    on_solved = ca.vertcat(*(ca.jacobian(row, solved) for row in ca.vertsplit(out)))  # backwards, which is a tenth shorter
+    jacobian = ca.jacobian(out, local) + on_solved @ slope
     weight, nu = ca.SX.sym("weight", out.shape[0]), ca.SX.sym("nu", n)
     total = ca.dot(weight, out)
     inner = ca.hessian(total + ca.dot(nu, equations), ca.vertcat(local, solved))[0]
     inner = ca.substitute(inner, nu, -ca.solve(R_z.T, ca.densify(ca.jacobian(total, solved).T)))
     frame = ca.vertcat(ca.SX.eye(local.shape[0]), slope)
     hessian = frame.T @ inner @ frame
-    return total_function(name, local, ca.vertcat(given, solved), delta, out, jacobian, hessian, weight)
+    return _differentiated(name, local, ca.vertcat(given, solved), delta, out, jacobian, hessian, weight)
 
 
 @dataclass(frozen=True, eq=False)
