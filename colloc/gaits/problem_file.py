@@ -46,22 +46,14 @@ class Reference:
 
 @dataclass(frozen=True)
 class ProblemFile:
-    """What a problem file states.
-
-    Attributes
-    ----------
-    problem : Problem
-    reference : Reference or None
-    source : str
-        Its text.
-    starts : int or None
-        ``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess leads to.
-    """
+    """What a problem file states."""
 
     problem: Problem
     reference: Reference | None
     source: str
+    """Its text."""
     starts: int | None = None
+    """``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess leads to."""
 
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:

@@ -40,21 +40,14 @@ class LinkVelocity(NamedTuple):
 
 @dataclass(frozen=True)
 class Links:
-    """Straight links joined end to end: their geometry. `colloc.mechanics.chain.Chain` is the body.
-
-    Parameters
-    ----------
-    lengths : tuple of float
-        Link lengths from tail to head; they add up to the body length, 1.
-    width : float
-        Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines.
-    weights : tuple of float
-        Of the links, in parts of the body's; by default the body is as heavy everywhere.
-    """
+    """Straight links joined end to end: their geometry. `colloc.mechanics.chain.Chain` is the body."""
 
     lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)
+    """Link lengths from tail to head; they add up to the body length, 1."""
     width: float = field(default=0.0, metadata=STATED_IF_SET)
+    """Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines."""
     weights: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
+    """Of the links, in parts of the body's; by default the body is as heavy everywhere."""
 
     def __post_init__(self) -> None:
         try:

@@ -86,27 +86,19 @@ def implicit_function(
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A local function repeated over instances.
-
-    Attributes
-    ----------
-    function : LocalFunction
-    gather : (n_local, n_instance) int
-        Which variables are the locals of each instance.
-    scatter : sparse (n_constraint, n_out * n_instance)
-        What each output contributes to each constraint; outputs are ordered instance by instance.
-    parameters : (n_given, n_instance)
-        Initial instance parameters; they may change between solves.
-    implicit : callable, optional
-        From the local variables ``(n_local, n_instance)`` and delta to more instance parameters, appended to the given
-        ones. The function's derivatives have to be total ones.
-    """
+    """A local function repeated over instances."""
 
     function: LocalFunction
     gather: np.ndarray
+    """Which variables are the locals of each instance, ``(n_local, n_instance)`` int."""
     scatter: sparse.csr_matrix
+    """sparse ``(n_constraint, n_out * n_instance)``: what each output contributes to each constraint; outputs are ordered
+    instance by instance."""
     parameters: np.ndarray
+    """``(n_given, n_instance)``: initial instance parameters; they may change between solves."""
     implicit: Callable[[ca.MX, ca.MX], ca.MX] | None = None
+    """From the local variables ``(n_local, n_instance)`` and delta to more instance parameters, appended to the given ones. The
+    function's derivatives have to be total ones."""
 
     @property
     def n_instance(self) -> int:

@@ -122,19 +122,12 @@ class _Floats(ast.NodeTransformer):
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """A formula that was read.
-
-    Attributes
-    ----------
-    text : str
-        As Python writes it.
-    names : frozenset of str
-        Variables and functions that it speaks of.
-    code : CodeType
-    """
+    """A formula that was read."""
 
     text: str
+    """As Python writes it."""
     names: frozenset[str]
+    """Variables and functions that it speaks of."""
     code: CodeType
 
     def __call__(self, at: Mapping[str, Array]) -> Array:

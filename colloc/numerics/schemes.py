@@ -20,24 +20,15 @@ _LARGEST = 12
 
 @dataclass(frozen=True, eq=False)
 class Scheme:
-    """A collocation scheme.
-
-    Attributes
-    ----------
-    name : str
-    c : (s,)
-        Nodes in [0, 1], ascending.
-    A : (s, s)
-    b : (s,)
-    order : int
-        Order of the end-point values for a smooth problem.
-    """
+    """A collocation scheme."""
 
     name: str
     c: np.ndarray
+    """Nodes in [0, 1], ascending, ``(s,)``."""
     order: int
-    A: np.ndarray = field(init=False)
-    b: np.ndarray = field(init=False)
+    """Order of the end-point values for a smooth problem."""
+    A: np.ndarray = field(init=False)  # (s, s)
+    b: np.ndarray = field(init=False)  # (s,)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "A", self.integrals(self.c))

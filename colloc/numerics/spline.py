@@ -21,23 +21,15 @@ DEGREE = 3
 
 @dataclass(frozen=True)
 class TensorSpline:
-    """The space of tensor-product cubic splines on the cube |angle| <= limit.
-
-    Parameters
-    ----------
-    n_joint : int
-    limit : float
-        Half-width of the cube [rad].
-    intervals : int
-        Knot intervals a joint.
-    graded : tuple of float
-        The ``intervals - 1`` inner knots, ascending and symmetric about 0; evenly spaced if empty.
-    """
+    """The space of tensor-product cubic splines on the cube |angle| <= limit."""
 
     n_joint: int
     limit: float
+    """Half-width of the cube [rad]."""
     intervals: int
+    """Knot intervals a joint."""
     graded: tuple[float, ...] = ()
+    """The ``intervals - 1`` inner knots, ascending and symmetric about 0; evenly spaced if empty."""
 
     def __post_init__(self) -> None:
         if self.intervals < 1 or self.n_joint < 1 or not self.limit > 0:

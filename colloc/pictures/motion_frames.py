@@ -16,32 +16,21 @@ _STRAIGHT = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """One period of a motion, from phase 0 to 1, both included.
+    """One period of a motion, from phase 0 to 1, both included."""
 
-    Attributes
-    ----------
-    t : (n_time,)
-    angles : (n_joint, n_time)
-    ends : (2, n_point, n_time)
-        Lab positions of the body's outline (the ends of links), tail first.
-    centre : (2, n_time)
-        Of mass.
-    arrow_base, arrow : (2, n_arrow, n_time)
-        Where friction is shown, and the force per length there, in lab axes.
-    step : (2,)
-        What a period adds to every position.
-    periods : int
-        How many periods can be shown in a row.
-    """
-
-    t: np.ndarray
-    angles: np.ndarray
+    t: np.ndarray  # (n_time,)
+    angles: np.ndarray  # (n_joint, n_time)
     ends: np.ndarray
+    """Lab positions of the body's outline (the ends of links), tail first, ``(2, n_point, n_time)``."""
     centre: np.ndarray
+    """Of mass, ``(2, n_time)``."""
     arrow_base: np.ndarray
     arrow: np.ndarray
+    """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow, n_time)`` each."""
     step: np.ndarray
+    """What a period adds to every position, ``(2,)``."""
     periods: int
+    """How many periods can be shown in a row."""
 
 
 def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:

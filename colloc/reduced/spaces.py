@@ -28,18 +28,12 @@ from colloc.system.errors import ProblemError
 
 
 class Searched(NamedTuple):
-    """How a class of gaits is collocated, and how a search sees it.
-
-    Attributes
-    ----------
-    program : callable
-        Of a problem, a gait near, the edges of a mesh, and pairs of links that must not cross: its nonlinear program.
-    space : callable
-        Of a problem, a gait near, the edges of a mesh, and a scheme: its parameters.
-    """
+    """How a class of gaits is collocated, and how a search sees it."""
 
     program: Callable[[Problem, AnyGait, np.ndarray | None, Pairs], GaitProgram]
+    """Of a problem, a gait near, the edges of a mesh, and pairs of links that must not cross: its nonlinear program."""
     space: Callable[[Problem, AnyGait, np.ndarray | None, str], SearchSpace]
+    """Of a problem, a gait near, the edges of a mesh, and a scheme: its parameters."""
 
 
 _LINEAR = Searched(

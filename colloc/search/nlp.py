@@ -42,41 +42,26 @@ needs no such leash and is slowed by it."""
 
 @dataclass(frozen=True, eq=False)
 class NlpResult:
-    """A point IPOPT returned, with its multipliers and what we measured there ourselves.
+    """A point IPOPT returned, with its multipliers and what we measured there ourselves."""
 
-    Attributes
-    ----------
-    x, lam_x : (n,)
-    lam_g : (m,)
-    objective : float
-    kkt_error : float
-        Largest component of the Lagrangian's gradient, unscaled.
-    violation : float
-        Largest violation of a constraint or bound.
-    complementarity : float
-        Largest product of a multiplier with its distance to the bound.
-    status : str
-        IPOPT's own word; not a verdict.
-    iterations : int
-    seconds : float
-    evaluation_seconds : float
-        The part spent evaluating functions and derivatives.
-    excess : (m,)
-        How far each constraint is violated.
-    """
-
-    x: np.ndarray
-    lam_x: np.ndarray
-    lam_g: np.ndarray
+    x: np.ndarray  # (n,)
+    lam_x: np.ndarray  # (n,)
+    lam_g: np.ndarray  # (m,)
     objective: float
     kkt_error: float
+    """Largest component of the Lagrangian's gradient, unscaled."""
     violation: float
+    """Largest violation of a constraint or bound."""
     complementarity: float
+    """Largest product of a multiplier with its distance to the bound."""
     status: str
+    """IPOPT's own word; not a verdict."""
     iterations: int
     seconds: float
     evaluation_seconds: float
+    """The part spent evaluating functions and derivatives."""
     excess: np.ndarray
+    """How far each constraint is violated, ``(m,)``."""
 
     def accumulated(self, earlier: NlpResult) -> NlpResult:
         """This result with the effort of an earlier solve of the same level added."""

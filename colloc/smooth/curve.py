@@ -38,18 +38,13 @@ def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, sparse.csc_m
 
 @dataclass(frozen=True, eq=False)
 class PanelGrid:
-    """Gauss panels on the arc length, one column per instant (or a single column for all).
-
-    Parameters
-    ----------
-    edges : (n_panel + 1, n_time)
-        Ascending from 0 to 1; panels of width zero are allowed (they fill up columns that need fewer).
-    order : int
-        Gauss nodes a panel.
-    """
+    """Gauss panels on the arc length, one column per instant (or a single column for all)."""
 
     edges: np.ndarray
+    """``(n_panel + 1, n_time)``: ascending from 0 to 1; panels of width zero are allowed (they fill up columns that need
+    fewer)."""
     order: int = 8
+    """Gauss nodes a panel."""
 
     @property
     def n(self) -> int:

@@ -25,29 +25,20 @@ _DELTA = 1e-3
 
 @dataclass(frozen=True)
 class GaitClass:
-    """The kind of a gait.
-
-    Attributes
-    ----------
-    bilateral, antipodal : bool
-        Symmetries it has (see `colloc.gaits.harmonic`), whatever class it was searched in.
-    retraced : bool
-        It goes back the way it came.
-    winding : int
-        Turns of the path (angle 1, angle 2) about its mean over a period, positive counter-clockwise.
-    wave : float
-        Direction in which bending travels (see `wave_direction`): 1 if every joint repeats the one behind it a quarter
-        period later, which is a wave towards the head.
-    forward : float
-        Displacement per period along the mean direction of the body, tail to head, over the distance: 1 is head first.
-    """
+    """The kind of a gait."""
 
     bilateral: bool
     antipodal: bool
+    """Symmetries it has (see `colloc.gaits.harmonic`), whatever class it was searched in."""
     retraced: bool
+    """It goes back the way it came."""
     winding: int
+    """Turns of the path (angle 1, angle 2) about its mean over a period, positive counter-clockwise."""
     wave: float
+    """Direction in which bending travels (see `wave_direction`): 1 if every joint repeats the one behind it a quarter period
+    later, which is a wave towards the head."""
     forward: float
+    """Displacement per period along the mean direction of the body, tail to head, over the distance: 1 is head first."""
 
     @property
     def symmetry(self) -> str:

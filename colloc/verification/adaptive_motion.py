@@ -81,27 +81,21 @@ def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | 
 
 @dataclass(frozen=True, eq=False)
 class FineMotion:
-    """The motion of a gait over its solved part.
-
-    Attributes
-    ----------
-    edges : (n + 1,)
-        Panel edges.
-    rates : Rates
-        At the panel nodes, ``(n, s)``.
-    theta, path, work, driven_work : (n + 1,)
-        Orientation, displacement in the lab (complex, starting with orientation 0), work and driven work at the edges.
-    unresolved : (n,)
-        Relative error of the objective that a panel may still hold: what halving it last changed, at its end and half way.
-    """
+    """The motion of a gait over its solved part."""
 
     edges: np.ndarray
+    """Panel edges, ``(n + 1,)``."""
     rates: Rates
+    """At the panel nodes, ``(n, s)``."""
     theta: np.ndarray
     path: np.ndarray
     work: np.ndarray
     driven_work: np.ndarray
+    """Orientation, displacement in the lab (complex, starting with orientation 0), work and driven work at the edges,
+    ``(n + 1,)`` each."""
     unresolved: np.ndarray
+    """``(n,)``: relative error of the objective that a panel may still hold: what halving it last changed, at its end and half
+    way."""
 
     @property
     def nodes(self) -> np.ndarray:

@@ -33,41 +33,28 @@ _LENGTH_PIECES = 200
 
 @dataclass(frozen=True, eq=False)
 class MeshError:
-    """Errors of collocating one gait on one mesh, ``(n_interval,)`` each.
-
-    Attributes
-    ----------
-    rotation : (n,)
-        Error of the rotation over the interval [rad].
-    displacement : (n,)
-        Magnitude of the error of the displacement over the interval [body lengths].
-    work : (n,)
-        Error of the work over the interval.
-    velocity : (n,)
-        Largest error between the nodes of the interpolated velocity of the tail or, times a body length, of its rotation
-        rate [body lengths per period].
-    value : (n,)
-        Contribution to the error of the problem's objective, relative to its magnitude, signed, to first order.
-    violation : (n,)
-        Largest excess over a joint limit [rad] or penetration of links [rad or body lengths] inside the interval.
-    total : float
-        Relative error of the collocated objective as a whole: all contributions, not linearised.
-    unresolved : float
-        What the panels that measured all this may have missed, relative to the objective.
-    turning : float
-        Rotation that collocation misses over a whole period, times the body's reach (half a length) over the distance; 0 where
-        a symmetry closes the rotation. It is what makes the distance of a closed gait ambiguous.
-    """
+    """Errors of collocating one gait on one mesh, ``(n_interval,)`` each."""
 
     rotation: np.ndarray
+    """Error of the rotation over the interval [rad], ``(n,)``."""
     displacement: np.ndarray
+    """Magnitude of the error of the displacement over the interval [body lengths], ``(n,)``."""
     work: np.ndarray
+    """Error of the work over the interval, ``(n,)``."""
     velocity: np.ndarray
+    """Largest error between the nodes of the interpolated velocity of the tail or, times a body length, of its rotation rate
+    [body lengths per period], ``(n,)``."""
     value: np.ndarray
+    """Contribution to the error of the problem's objective, relative to its magnitude, signed, to first order, ``(n,)``."""
     violation: np.ndarray
+    """Largest excess over a joint limit [rad] or penetration of links [rad or body lengths] inside the interval, ``(n,)``."""
     total: float
+    """Relative error of the collocated objective as a whole: all contributions, not linearised."""
     unresolved: float
+    """What the panels that measured all this may have missed, relative to the objective."""
     turning: float
+    """Rotation that collocation misses over a whole period, times the body's reach (half a length) over the distance; 0 where a
+    symmetry closes the rotation. It is what makes the distance of a closed gait ambiguous."""
 
     @property
     def estimate(self) -> float:

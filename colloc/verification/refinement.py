@@ -52,25 +52,16 @@ _WORST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class MeshPlan:
-    """A mesh on which a gait is collocated as accurately as requested, or as the budget allows.
-
-    Attributes
-    ----------
-    scheme : str
-    edges : (n + 1,)
-    estimate : float
-        Relative error of the gait's value on that mesh.
-    reached : bool
-        Whether that is below the request; if not, the budget of points was exhausted.
-    kept : array
-        Phases that have to stay knots: they split intervals in which a constraint was violated.
-    """
+    """A mesh on which a gait is collocated as accurately as requested, or as the budget allows."""
 
     scheme: str
-    edges: np.ndarray
+    edges: np.ndarray  # (n + 1,)
     estimate: float
+    """Relative error of the gait's value on that mesh."""
     reached: bool
+    """Whether that is below the request; if not, the budget of points was exhausted."""
     kept: np.ndarray
+    """Phases that have to stay knots: they split intervals in which a constraint was violated."""
 
 
 def kink_knots(problem: Problem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
