@@ -57,12 +57,7 @@ _CHANGES = ("delta", "delta_start", "intervals", "mesh_tolerance", "scheme", "fo
 
 def changed(problem: Problem, options: argparse.Namespace) -> Problem:
     """The problem with the changes of `add_problem`, and with the gait of the result that ``--start`` names as guess.
-
-    Raises
-    ------
-    ProblemError
-        If a value cannot be used, or the gait cannot be the guess; the message names the file.
-    """
+    `ProblemError` if a value cannot be used, or the gait cannot be the guess; the message names the file."""
     changes = {name: getattr(options, name) for name in _CHANGES if getattr(options, name) is not None}
     problem = problem.with_(**changes) if changes else problem
     if getattr(options, "start", None) is None:
@@ -100,13 +95,8 @@ def add_bound(parser: argparse.ArgumentParser) -> None:
 
 
 def output_kind(options: argparse.Namespace, kinds: Sequence[str]) -> str:
-    """Which of several kinds of files to write: ``--format``, else the ending of ``--output``, else the first.
-
-    Raises
-    ------
-    ProblemError
-        If ``--output`` ends in something else.
-    """
+    """Which of several kinds of files to write: ``--format``, else the ending of ``--output``, else the first. `ProblemError`
+    if ``--output`` ends in something else."""
     ending = "" if _is_folder(options.output) else Path(options.output).suffix
     if options.format is None and ending and ending.lstrip(".") not in kinds:
         raise _wrong_ending(options.output, " or ".join(f".{kind}" for kind in kinds))

@@ -59,12 +59,7 @@ def disagreement(recorded: Certificate, now: Certificate) -> str:
 
 def rechecked(solution: Solution, tolerance: float = 1e-6) -> Solution:
     """The solution with new certificates, on other instants than before; its check of second order is taken over.
-
-    Raises
-    ------
-    ProblemError
-        If there is nothing to check.
-    """
+    `ProblemError` if there is nothing to check."""
     solution.last  # noqa: B018  raises
     before = solution.certificate.instants or 1600
     known = next((check for check in solution.certificate.checks if check.name == "second order"), None)

@@ -220,13 +220,7 @@ class ClassOfGaits:
 
 
 def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
-    """Numbers of a gait as an array of so many dimensions.
-
-    Raises
-    ------
-    ProblemError
-        If they are none, or not finite.
-    """
+    """Numbers of a gait as an array of so many dimensions. `ProblemError` if they are none, or not finite."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):

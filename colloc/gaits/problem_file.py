@@ -57,13 +57,8 @@ class ProblemFile:
 
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
-    """Execute a problem file.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such file, it cannot be read, it fails (with the line), or states no ``PROBLEM``.
-    """
+    """Execute a problem file. `ProblemError` if there is no such file, it cannot be read, it fails (with the line), or states
+    no ``PROBLEM``."""
     path, names, source = stated_names(path, "problem")
     problem, reference = names.get("PROBLEM"), names.get("REFERENCE")
     if problem is None:
@@ -110,12 +105,7 @@ def problem_file_text(problem: Problem) -> str:
 
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
     """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is for the messages.
-
-    Raises
-    ------
-    ProblemError
-        As for `read_problem_file`.
-    """
+    `ProblemError` as for `read_problem_file`."""
     path = Path(path)
     if not os.path.isfile(path):  # Path.is_file raises for a name that is too long
         raise ProblemError(f"there is no {kind} file {path}.")

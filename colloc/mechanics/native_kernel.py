@@ -97,13 +97,8 @@ def _call(function: Callable[..., int], body: Links, friction: Law, n_time: int,
 
 
 def _each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
-    """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large.
-
-    Raises
-    ------
-    MemoryError
-        If a call returns anything but 0.
-    """
+    """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large. `MemoryError` if a call
+    returns anything but 0."""
     starts = range(0, n_time, _PIECE)
     ends = [min(first + _PIECE, n_time) for first in starts]
     workers = min(available_threads(), len(ends)) if len(ends) > 1 else 1

@@ -146,12 +146,7 @@ class Formula:
 @lru_cache(maxsize=64)
 def formula(text: str, variables: tuple[str, ...]) -> Formula:
     """A formula of some variables, ready to be evaluated. Objects that hold one keep its text: code cannot be pickled.
-
-    Raises
-    ------
-    ProblemError
-        If it is no formula, or speaks of anything but the variables, numbers and `FUNCTIONS`.
-    """
+    `ProblemError` if it is no formula, or speaks of anything but the variables, numbers and `FUNCTIONS`."""
     if not isinstance(text, str):
         raise ProblemError(f"a formula must be text, not {text!r}.")
     if len(text) > _LONGEST:

@@ -90,13 +90,8 @@ def _radau_nodes(s: int) -> np.ndarray:
 
 
 def scheme(name: str) -> Scheme:
-    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes.
-
-    Raises
-    ------
-    ProblemError
-        For any other name.
-    """
+    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes. `ProblemError` for any
+    other name."""
     known = _known(name) if isinstance(name, str) else None
     if known is None:
         raise ProblemError(

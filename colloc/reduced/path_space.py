@@ -158,12 +158,7 @@ class PathSpace:
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances where arcs or sides meet.
-
-        Raises
-        ------
-        NotConvergedError
-            If no path of the class is found near the gait.
-        """
+        `NotConvergedError` if no path of the class is found near the gait."""
         laid = self._through(gait)
         v, target, accuracy = laid[self.own], laid, _NEAR
         for _ in range(_ROUNDS):

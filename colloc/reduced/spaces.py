@@ -77,12 +77,7 @@ def space_near(
     problem: Problem, gait: AnyGait, edges: np.ndarray | None = None, scheme: str = ""
 ) -> tuple[SearchSpace, np.ndarray]:
     """The class of a problem on its first mesh, or a given one, and the parameters of its member nearest to a gait.
-
-    Raises
-    ------
-    NotConvergedError
-        If no path of the class is found near the gait.
-    """
+    `NotConvergedError` if no path of the class is found near the gait."""
     space = _searched(problem).space(problem, gait, edges, scheme)
     return space, space.parameters(gait)
 

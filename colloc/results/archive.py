@@ -137,13 +137,7 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
 
 
 def archive_at(path: str | os.PathLike[str]) -> Archive:
-    """The archive with this HDF5 file, whatever its problem is.
-
-    Raises
-    ------
-    StoreError
-        If there is none, or it is damaged.
-    """
+    """The archive with this HDF5 file, whatever its problem is. `StoreError` if there is none, or it is damaged."""
     rows = row_path(path)
     stated = read_rows(rows, ROWS).values.get(_PROBLEM) if rows.exists() else None
     if stated is None:
@@ -155,13 +149,8 @@ def archive_at(path: str | os.PathLike[str]) -> Archive:
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:
-    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written; the file that was there before is left.
-    """
+    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well. `StoreError`
+    if the folder cannot be written; the file that was there before is left."""
     with locked(_lock(archive.path), wait=True):
         found = _rows_of(archive.problem, archive.path)
         archive.outcomes |= found[0] if found else {}

@@ -189,13 +189,8 @@ class Study:
 
 
 def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:
-    """Execute a study file; its study and its text.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such file, it fails (with the line), or states no ``STUDY``.
-    """
+    """Execute a study file; its study and its text. `ProblemError` if there is no such file, it fails (with the line), or
+    states no ``STUDY``."""
     path, names, source = stated_names(path, "study")
     study = names.get("STUDY")
     if not isinstance(study, Study):

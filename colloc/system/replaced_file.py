@@ -18,12 +18,7 @@ _FORGOTTEN = 3600.0
 @contextlib.contextmanager
 def replaced_file(path: Path) -> Iterator[str]:
     """Name of a temporary file beside `path`, which takes its place if the block ends well and vanishes if it does not.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be made, or the file not written.
-    """
+    `StoreError` if the folder cannot be made, or the file not written."""
     temporary = ""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

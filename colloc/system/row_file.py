@@ -89,13 +89,8 @@ def _table(kind: str) -> str:
 
 
 def read_rows(path: Path, kind: str) -> Rows:
-    """All rows of a file; none if there is no such file.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be read, is too large, of another kind, or damaged beyond single rows.
-    """
+    """All rows of a file; none if there is no such file. `StoreError` if the file cannot be read, is too large, of another
+    kind, or damaged beyond single rows."""
     values, damaged = {}, 0
     try:
         if not path.exists():
@@ -124,13 +119,8 @@ def read_rows(path: Path, kind: str) -> Rows:
 
 
 def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
-    """Add rows, or replace those of the same keys: all of them, or none. Writers wait for each other.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written, or is of another kind. It then holds what it held.
-    """
+    """Add rows, or replace those of the same keys: all of them, or none. Writers wait for each other. `StoreError` if the file
+    cannot be written, or is of another kind. It then holds what it held."""
     texts = [(key, json.dumps(value)) for key, value in rows.items()]
     filled = [(key, _sum(key.encode(), text.encode()).decode(), text) for key, text in texts]
     try:

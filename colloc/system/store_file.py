@@ -52,11 +52,7 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     """An HDF5 file to write; it takes its place, sealed, only if the block ends well.
 
     It is made in memory: where the disk is full, HDF5 closing a file on it can end the process (a segmentation fault).
-
-    Raises
-    ------
-    StoreError
-        If the folder or the file cannot be written.
+    `StoreError` if the folder or the file cannot be written.
     """
     with replaced_file(Path(path)) as temporary:
         # no image of an open file: that of HDF5 1.14.2 has a wrong checksum in its first block
@@ -113,13 +109,8 @@ def sealed_file(
 
 
 def was_changed(path: Path, kind: str, largest: int = LARGEST_FILE) -> bool:
-    """Whether another program opened a file to write: it has no seal, but is as long as its own first block says.
-
-    Raises
-    ------
-    StoreError
-        If the file is missing or too large, or has a seal that does not fit.
-    """
+    """Whether another program opened a file to write: it has no seal, but is as long as its own first block says. `StoreError`
+    if the file is missing or too large, or has a seal that does not fit."""
     if is_sealed(path, largest, kind):
         return False
     with open(path, "rb") as file:
@@ -149,14 +140,8 @@ def mark(file: h5py.File, kind: str, version: int) -> None:
 def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Dataset:
     """A new dataset of numbers or texts, with texts such as its units as attributes.
 
-    ``dims="joint, time"`` names its dimensions also in the way of netCDF (`_name_dimensions`).
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
-    StoreError
-        If a text is too long to be read again.
+    ``dims="joint, time"`` names its dimensions also in the way of netCDF (`_name_dimensions`). `TypeError` if the
+    value is neither; `StoreError` if a text is too long to be read again.
     """
     dataset = group.create_dataset(name, data=_stored(value, name))
     if dataset.dtype.kind == "S":
@@ -229,13 +214,8 @@ def _decoded(value: Any) -> Any:
 
 
 def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
-    """An attribute: a number or text of Python, or an array of them.
-
-    Raises
-    ------
-    StoreError
-        If it is missing, too large, or neither number nor text.
-    """
+    """An attribute: a number or text of Python, or an array of them. `StoreError` if it is missing, too large, or neither
+    number nor text."""
     where = f"attribute {name} of {owner.name}"
     if name not in owner.attrs:
         raise StoreError(f"{where} is missing.")
@@ -247,13 +227,8 @@ def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
 
 
 def array(group: h5py.Group, name: str, *, largest: int = LARGEST_ARRAY) -> Any:
-    """The data of a dataset: numbers as a NumPy array, texts decoded.
-
-    Raises
-    ------
-    StoreError
-        If it is no plain dataset of this file, or too large.
-    """
+    """The data of a dataset: numbers as a NumPy array, texts decoded. `StoreError` if it is no plain dataset of this file, or
+    too large."""
     where = f"{group.name.rstrip('/')}/{name}"
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         raise StoreError(f"{where} is missing, or a link.")
