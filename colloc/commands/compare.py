@@ -29,13 +29,8 @@ _PHASES = 800
 
 
 def path_distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Largest distance [rad] from a point of one closed polygon of shapes to the other polygon, both ways.
-
-    Parameters
-    ----------
-    a, b : (n_joint, n_time)
-        Vertices; the first and the last are joined.
-    """
+    """Largest distance [rad] from a point of one closed polygon of shapes to the other, both ways; vertices ``(n_joint,
+    n_time)``, of which the first and the last are joined."""
     return max(_farthest(a, b), _farthest(b, a))
 
 

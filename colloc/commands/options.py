@@ -113,19 +113,8 @@ def _wrong_ending(output: str, wanted: str) -> ProblemError:
 
 
 def output_path(output: str | None, default: Path) -> Path:
-    """The file to write, in a folder that exists and can be written.
-
-    Parameters
-    ----------
-    output : str or None
-        What the user named: a folder, or a file with the suffix of `default`; None: `default`.
-    default : Path
-
-    Raises
-    ------
-    ProblemError
-        If nothing can be written there, or it ends in another suffix.
-    """
+    """The file to write, in a folder that exists and can be written: what the user named, a folder or a file with the suffix of
+    `default`, or else that. `ProblemError` if nothing can be written there, or it ends in another suffix."""
     path = default if output is None else Path(output) / default.name if _is_folder(output) else Path(output)
     if path.suffix != default.suffix:
         raise _wrong_ending(str(path), default.suffix)

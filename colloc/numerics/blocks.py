@@ -119,18 +119,12 @@ class Assembly:
         return self.linear.shape[0]
 
 
-def _accumulator(
-    rows: np.ndarray,
-    cols: np.ndarray,
-    sources: np.ndarray,
-    values: np.ndarray,
-    shape: tuple[int, int],
-    n_source: int,
-) -> tuple[ca.Sparsity, sparse.csr_matrix]:
-    """Sparsity of the entries (rows, cols), and the matrix that sums ``values * source`` into its nonzeros."""
-    unique, accumulate = summed(cols.astype(np.int64) * shape[0] + rows, sources, values, n_source)
+def _matrix(terms: Terms, shape: tuple[int, int], sources: ca.MX) -> ca.MX:
+    """The sparse matrix whose entries are sums of terms."""
+    key = terms.column.astype(np.int64) * shape[0] + terms.row
+    unique, accumulate = summed(key, terms.source, terms.weight, terms.n_source)
     pattern = ca.Sparsity.triplet(shape[0], shape[1], (unique % shape[0]).tolist(), (unique // shape[0]).tolist())
-    return pattern, accumulate
+    return ca.MX(pattern, _dm(accumulate) @ sources)
 
 
 def _dm(matrix: sparse.spmatrix) -> ca.DM:
@@ -187,13 +181,9 @@ def oracles(assembly: Assembly) -> Oracles:
         constraints += _dm(block.scatter) @ mapped(block.function.value, index)
 
     # gradient of the objective
-    f = blocks[0].function
-    pattern, accumulate = _accumulator(
-        blocks[0].gather[f.jac_col, 0], np.zeros(f.jac_col.size, int), np.arange(f.jac_col.size),
-        np.ones(f.jac_col.size), (assembly.n, 1), f.jac_col.size,
-    )  # fmt: skip
-    gradient = ca.densify(ca.MX(pattern, _dm(accumulate) @ mapped(f.jacobian, 0)))
-
+    f, size = blocks[0].function, blocks[0].function.jac_col.size
+    terms = Terms(blocks[0].gather[f.jac_col, 0], np.zeros(size, int), np.arange(size), np.ones(size), size)
+    gradient = ca.densify(_matrix(terms, (assembly.n, 1), mapped(f.jacobian, 0)))
     jacobian = _jacobian(assembly, blocks, mapped)
     hessian = _hessian(assembly, blocks, mapped, lam_f, lam_g)
     return Oracles(
@@ -209,10 +199,7 @@ def oracles(assembly: Assembly) -> Oracles:
 
 
 class Terms(NamedTuple):
-    """Entries of a Jacobian as sums of terms: its row and column, and a weight times a source.
-
-    Sources are 1, then the nonzeros of the blocks' Jacobians, block by block and instance by instance; n_source of them.
-    """
+    """Entries of a matrix as sums of terms: row and column of each, and a weight times one of n_source sources."""
 
     row: np.ndarray
     column: np.ndarray
@@ -222,7 +209,8 @@ class Terms(NamedTuple):
 
 
 def jacobian_terms(linear: sparse.spmatrix, blocks: Sequence[Block]) -> Terms:
-    """Those of ``linear @ x`` and the blocks' contributions."""
+    """Those of the Jacobian of ``linear @ x`` and the blocks' contributions; the sources are 1, then the nonzeros of the
+    blocks' Jacobians, block by block and instance by instance."""
     constant = sparse.coo_matrix(linear)
     rows, columns = [constant.row], [constant.col]
     sources, weights = [np.zeros(constant.nnz, int)], [constant.data]
@@ -255,12 +243,10 @@ def summed(key: np.ndarray, source: np.ndarray, weight: np.ndarray, n_source: in
 
 
 def _jacobian(assembly: Assembly, blocks: Sequence[Block], mapped: Mapped) -> ca.MX:
-    terms, shape = jacobian_terms(assembly.linear, blocks[1:]), (assembly.m, assembly.n)
-    pattern, accumulate = _accumulator(terms.row, terms.column, terms.source, terms.weight, shape, terms.n_source)
     nonzeros = [
         mapped(block.function.jacobian, index) for index, block in enumerate(blocks[1:], 1) if block.function.jac_row.size
     ]
-    return ca.MX(pattern, _dm(accumulate) @ ca.vertcat(1, *nonzeros))
+    return _matrix(jacobian_terms(assembly.linear, blocks[1:]), (assembly.m, assembly.n), ca.vertcat(1, *nonzeros))
 
 
 def _hessian(assembly: Assembly, blocks: Sequence[Block], mapped: Mapped, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
@@ -281,5 +267,4 @@ def _hessian(assembly: Assembly, blocks: Sequence[Block], mapped: Mapped, lam_f:
         stacked.append(mapped(f.hessian, index, weights))
         offset += n_nonzero * block.n_instance
     row, col, source, value = (np.concatenate(part) for part in (rows, cols, sources, values))
-    pattern, accumulate = _accumulator(row, col, source, value, (assembly.n, assembly.n), offset)
-    return ca.MX(pattern, _dm(accumulate) @ ca.vertcat(*stacked))
+    return _matrix(Terms(row, col, source, value, offset), (assembly.n, assembly.n), ca.vertcat(*stacked))

@@ -19,21 +19,8 @@ _ARROW = 0.12
 
 
 def pictures(solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900) -> Iterator[np.ndarray]:
-    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes.
-
-    Parameters
-    ----------
-    solution : Solution
-        With at least one level.
-    count : int
-        Pictures a period.
-    periods : int
-        Fewer are shown where the body turns, since then its path is no straight line.
-    arrows : bool
-        Draw friction.
-    width : int
-        Pixels, even.
-    """
+    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes, of an even width [pixels].
+    Where the body turns fewer periods are shown, since then its path is no straight line; with arrows friction is drawn."""
     shown = frames(solution, count + 1, periods=periods)
     with styled():
         scene = _Scene(solution, shown, arrows, width)

@@ -39,19 +39,8 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
 
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
-    """Sample a solution's motion and the friction that acts on it.
-
-    Parameters
-    ----------
-    solution : Solution
-        With at least one level.
-    count : int
-        Instants, both ends of the period included.
-    arrows : int
-        Along the body, about.
-    periods : int
-        How many periods to show where the body does not turn.
-    """
+    """Sample a solution's motion at `count` instants, both ends of the period included, and the friction that acts on it at
+    about so many arrows along the body. `periods` are shown where the body does not turn."""
     problem = solution.problem
     body, delta = problem.body, solution.delta_per_period
     motion = solution.sample(np.linspace(0.0, 1.0, count))

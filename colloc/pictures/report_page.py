@@ -72,17 +72,8 @@ def environment() -> Environment:
 
 
 def report_page(solution: Solution, reference: Reference | None = None, gap: str = "") -> str:
-    """The page as a string.
-
-    Parameters
-    ----------
-    solution : Solution
-        Also one that failed; what does not exist is left out.
-    reference : Reference, optional
-        The value to hold the result against.
-    gap : str
-        A sentence about the upper bound.
-    """
+    """The page as a string, also of a solution that failed: what does not exist is left out. The reference is the value to hold
+    the result against, `gap` a sentence about the upper bound."""
     found: dict[str, Any] = {"gait_pictures": [], "convergence_pictures": [], "motion": None, "errors": None}
     if solution.levels:
         errors = mesh_errors(solution)

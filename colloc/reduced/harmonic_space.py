@@ -17,18 +17,10 @@ from colloc.numerics.mesh import Mesh
 
 
 class HarmonicSpace:
-    """Members of a class of harmonics by their parameters v, in which angles and rates are linear.
+    """Members of a class of harmonics by their parameters v, in which angles and rates are linear, on a mesh (by default the
+    problem's first), with pairs of links `far` apart that are kept from crossing.
 
     Rows: shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed.
-
-    Parameters
-    ----------
-    problem : Problem
-    edges : (n_interval + 1,), optional
-        Of the mesh; uniform by default.
-    scheme : str, optional
-        By default the problem's.
-    far : pairs of links more than two apart that are kept from crossing.
     """
 
     knots: np.ndarray | None = None

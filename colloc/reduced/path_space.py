@@ -39,18 +39,8 @@ _LEAST_CURVATURE, _SOFT = 1e-4, 0.1
 
 
 class PathSpace:
-    """Members of a class of paths near one of them; attributes as `colloc.reduced.program.SearchSpace`.
-
-    Parameters
-    ----------
-    problem : Problem
-    near : AnyGait
-        Fixes winding, start phase, and which interval lies on which side.
-    edges : (n_interval + 1,), optional
-        Of the mesh, in phases of `near`.
-    scheme : str, optional
-    far : pairs of links
-    """
+    """Members of a class of paths near one of them, which fixes winding, start phase, and which interval lies on which side;
+    edges of the mesh are phases of that one. Attributes as `colloc.reduced.program.SearchSpace`."""
 
     def __init__(
         self, problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()

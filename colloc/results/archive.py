@@ -110,19 +110,8 @@ def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], in
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
-    """The archive of a problem with all starts that are on the disk, begun if there is none.
-
-    Parameters
-    ----------
-    problem : Problem
-    path : path-like
-        Of its HDF5 file.
-
-    Raises
-    ------
-    StoreError
-        If what is there is damaged, of an older colloc or about another problem, or the folder cannot be written.
-    """
+    """The archive of a problem with all starts that are on the disk, begun if there is none; the path is that of its HDF5 file.
+    `StoreError` if what is there is damaged, of an older colloc or about another problem, or the folder cannot be written."""
     path = Path(path)
     with locked(_lock(path), wait=True):
         found = _rows_of(problem, path)

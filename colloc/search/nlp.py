@@ -104,11 +104,7 @@ class Solver:
         self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
 
     def solve(
-        self,
-        x: np.ndarray,
-        delta: float,
-        multipliers: tuple[np.ndarray, np.ndarray] | None = None,
-        radius: float = np.inf,
+        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None = None, radius: float = np.inf
     ) -> NlpResult:
         """Maximise efficiency from x.
 
@@ -162,15 +158,8 @@ class Solver:
         return self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
 
     def measured(self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray) -> NlpResult:
-        """The first-order conditions at x, solving nothing, with multipliers of the equations that come closest to them.
-
-        Parameters
-        ----------
-        x : (n,)
-        delta : float
-        lam_x, lam_g : (n,), (m,)
-            Multipliers of the bounds and of the inequalities.
-        """
+        """The first-order conditions at x ``(n,)``, solving nothing, from multipliers of the bounds and of the inequalities;
+        those of the equations are the ones that come closest to the conditions."""
         parameters = self._parameters(x, delta)
         multipliers = self._completed(x, parameters, lam_x, lam_g)
         bounds = self.transcription.lower, self.transcription.upper

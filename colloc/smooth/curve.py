@@ -106,18 +106,8 @@ class Curve(NamedTuple):
 
 
 def curve(panels: PanelGrid, angle: Array, rate: Array, reference: int, reference_rate: Array) -> Curve:
-    """The curve of tangent angles and rates at the nodes, ``(n_node, n_time)`` (paper, eqs. x0, y0 and dtz0).
-
-    Parameters
-    ----------
-    panels : PanelGrid
-    angle, rate : (n_node, n_time)
-        Theta [rad] and its rate [rad/time].
-    reference : int
-        Index of the panel edge that serves as reference.
-    reference_rate : (1, n_time)
-        Rate of Theta there.
-    """
+    """The curve of tangent angles [rad] and rates [rad/time] at the nodes, ``(n_node, n_time)``, seen from the panel edge
+    number `reference`, where Theta has the rate ``(1, n_time)`` (paper, eqs. x0, y0 and dtz0)."""
     xp = namespace(angle, rate)
     width = panels.widths
     c, s = xp.cos(angle), xp.sin(angle)

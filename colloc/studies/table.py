@@ -40,7 +40,7 @@ UNITS = {
     "sin": "rad",
 }
 _NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
-_COUNTS = ("starts", "starts_certified")
+_COUNTS = ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "below_neighbour", "starts", "starts_certified")
 KnownBound = Callable[[Problem], float | None]
 
 
@@ -68,14 +68,8 @@ class StudyTable:
 
 
 def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:
-    """All cells of a run.
-
-    Parameters
-    ----------
-    run : StudyRun
-    known_bound : callable
-        An upper bound on the efficiency of every gait of a problem's body, if one is known.
-    """
+    """All cells of a run; `known_bound` gives an upper bound on the efficiency of every gait of a problem's body, if one is
+    known."""
     study = run.study
     axes = tuple(axis.name for axis in study.axes)
     problems = [state.problem for state in run.cells.values() if state.problem is not None]
@@ -90,16 +84,7 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
 
     for name in (*_NUMBERS, "delta", "trivial_bound", "upper_bound", "neighbour_value", "seconds", "wave", "forward"):
         variable(name, float, np.nan)
-    for name in (
-        "bilateral",
-        "antipodal",
-        "retraced",
-        "at_slowest",
-        "winding",
-        "below_neighbour",
-        "starts",
-        "starts_certified",
-    ):
+    for name in _COUNTS:
         variable(name, int, 0)
     for name in ("status", "message", "origin", "gait_class", "problem_hash"):
         variable(name, object, "")

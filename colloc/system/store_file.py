@@ -66,23 +66,10 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 def sealed_file(
     path: str | os.PathLike[str], kind: str, version: int, *, largest: int = LARGEST_FILE, unsealed: bool = False
 ) -> Iterator[h5py.File]:
-    """An HDF5 file of a kind ("colloc solution") to read.
+    """An HDF5 file of a kind ("colloc solution") and version to read, of so many bytes at most; `unsealed` ones, since they
+    `was_changed`, without a look at their seal.
 
-    Parameters
-    ----------
-    path : path-like
-    kind : str
-    version : int
-        Of the format.
-    largest : int
-        Bytes.
-    unsealed : bool
-        Read it without looking at its seal, since `was_changed`.
-
-    Raises
-    ------
-    StoreError
-        If it is missing, too large, damaged, of another kind or of another version, or if reading in the block fails.
+    `StoreError` if it is missing, too large, damaged, of another kind or version, or if reading in the block fails.
     """
     path = Path(path)
     if not unsealed:
@@ -108,10 +95,10 @@ def sealed_file(
         raise StoreError(f"{path} is not a readable {kind} ({type(error).__name__}: {error}).") from None
 
 
-def was_changed(path: Path, kind: str, largest: int = LARGEST_FILE) -> bool:
+def was_changed(path: Path, kind: str) -> bool:
     """Whether another program opened a file to write: it has no seal, but is as long as its own first block says. `StoreError`
     if the file is missing or too large, or has a seal that does not fit."""
-    if is_sealed(path, largest, kind):
+    if is_sealed(path, LARGEST_FILE, kind):
         return False
     with open(path, "rb") as file:
         block, size = file.read(_END_OF_FILE.stop), os.fstat(file.fileno()).st_size

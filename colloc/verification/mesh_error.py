@@ -98,25 +98,8 @@ def _whole_length(problem: Problem, gait: AnyGait) -> float:
 def mesh_error(
     problem: Problem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float = 1e-6, fine: Any = None
 ) -> MeshError:
-    """Errors of collocating `gait` on `mesh`.
-
-    Parameters
-    ----------
-    problem : Problem
-    mesh : Mesh
-    gait : AnyGait
-    delta : float
-        Regularisation speed, per period.
-    tolerance : float
-        Relative error of interest; smaller ones need not be exact.
-    fine : FineMotion or SlopeCourse, optional
-        The gait's motion, if known.
-
-    Raises
-    ------
-    NotConvergedError
-        If the balance cannot be solved at some instant.
-    """
+    """Errors of collocating a gait on a mesh, with delta per period; relative ones below the tolerance need not be exact.
+    `fine` is the gait's motion, if it is known. `NotConvergedError` if the balance cannot be solved at some instant."""
     if fine is None:
         fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
     if problem.slope is not None:
