@@ -29,6 +29,7 @@ from colloc.mechanics.damped_newton import METHODS, Evaluated, groups, relative_
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import compiled_balance, native_kernel
+from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 
 
@@ -148,9 +149,7 @@ def solve_balance(
             f"angles and rates must both have shape (n_joint, n_time) = ({body.n_joint}, n), "
             f"not {angles.shape} and {rates.shape}."
         )
-    for name, value in (("delta", delta), ("tolerance", tolerance)):
-        if not (isinstance(value, (int, float, np.number)) and np.isfinite(value) and value > 0):
-            raise ProblemError(f"{name} must be a positive finite number, not {value!r}.")
+    check_finite(positive=True, delta=delta, tolerance=tolerance)
     if method not in METHODS:
         raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
     if not (np.isfinite(angles).all() and np.isfinite(rates).all()):

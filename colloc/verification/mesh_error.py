@@ -63,6 +63,15 @@ class MeshError:
         return float(np.abs(self.value).sum() + self.unresolved)
 
 
+class Known(NamedTuple):
+    """A gait of a problem, delta per period, and its motion (`gait_motion`)."""
+
+    problem: Problem
+    gait: AnyGait
+    delta: float
+    fine: Any
+
+
 def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> Any:
     """The gait's motion on adaptive panels, a `FineMotion`; on a slope a `SlopeCourse`."""
     if problem.slope is not None:
@@ -105,7 +114,8 @@ def mesh_error(
     if problem.slope is not None:
         off, violation = slope_defects(problem, mesh, gait, delta, fine), constraint_violation(problem, mesh, gait)
         return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
-    own = _collocated_intervals(problem, mesh.scheme, mesh.edges[:-1], mesh.edges[1:], gait, delta, fine)
+    known = Known(problem, gait, delta, fine)
+    own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
     return MeshError(
         own.rotation,
         np.abs(own.displacement),
@@ -113,19 +123,17 @@ def mesh_error(
         _velocity_error(mesh, own.rates, fine),
         own.value,
         constraint_violation(problem, mesh, gait),
-        _collocated_value(problem, own, gait) / _fine_value(problem, fine, gait) - 1,
+        _collocated_value(known, own) / _fine_value(known) - 1,
         float(fine.unresolved.sum()),
-        abs(float(_turning(problem, own, fine).sum())),
+        abs(float(_turning(known, own).sum())),
     )
 
 
-def interval_shares(
-    problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
-) -> np.ndarray:
+def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """What collocating on each of the intervals from left to right adds to the relative error of the objective and to the
     rotation that is missed (as `MeshError.turning`), magnitudes, ``(n,)``."""
-    own = _collocated_intervals(problem, rule, left, right, gait, delta, fine)
-    return np.abs(own.value) + np.abs(_turning(problem, own, fine))
+    own = _collocated_intervals(known, rule, left, right)
+    return np.abs(own.value) + np.abs(_turning(known, own))
 
 
 class _Own(NamedTuple):
@@ -140,14 +148,11 @@ class _Own(NamedTuple):
     increments: Increments
 
 
-def _collocated_intervals(
-    problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
-) -> _Own:
+def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Own:
+    problem, gait, delta, fine = known
     nodes = left[:, None] + (right - left)[:, None] * rule.c
-    rates = rates_at(
-        problem.body, problem.friction, gait, delta, nodes, fine.velocity(nodes),
-        problem.uses("driven_work"),
-    )  # fmt: skip
+    at = problem.body, problem.friction, gait, delta, nodes
+    rates = rates_at(*at, fine.velocity(nodes), problem.uses("driven_work"))
     turned, moved, spent, delivered = increments(rule, right - left, rates)
     (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
     rotation, energy = turned - (theta_right - theta), spent - (work_right - work)
@@ -158,16 +163,16 @@ def _collocated_intervals(
     if problem.uses("length") and not problem.gait.unit_speed:  # else arc length is the clock, and exact
         pace = np.linalg.norm(gait.rates(nodes.ravel()), axis=0).reshape(nodes.shape)
         length = (right - left) * (pace @ rule.b) - path_lengths(gait, left, right, 4)
-    shares = _shares(problem, _fine_part(problem, fine), _whole_length(problem, gait))
+    shares = _shares(problem, _fine_part(known), _whole_length(problem, gait))
     ahead = (pull * np.conj(direction)).real
     value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length
     value += shares["driven_work"] * (delivered - (driven_right - driven))
     return _Own(rotation, displacement, energy, length, value, rates, (turned, moved, spent, delivered))
 
 
-def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
+def _turning(known: Known, own: _Own) -> np.ndarray:
     """Rotation missed by intervals, times the body's reach over the distance, ``(n,)``."""
-    return own.rotation * (0.5 / abs(fine.path[-1]) if problem.gait.symmetry == NONE else 0.0)
+    return own.rotation * (0.5 / abs(known.fine.path[-1]) if known.problem.gait.symmetry == NONE else 0.0)
 
 
 def _part(problem: Problem, end: complex, work: float, rotation: float, driven_work: float) -> dict[str, float]:
@@ -175,21 +180,23 @@ def _part(problem: Problem, end: complex, work: float, rotation: float, driven_w
     return {"distance": distance, "work": float(work), "rotation": float(rotation), "driven_work": float(driven_work)}
 
 
-def _fine_part(problem: Problem, fine: FineMotion) -> dict[str, float]:
+def _fine_part(known: Known) -> dict[str, float]:
     """What the solved part comes to."""
-    return _part(problem, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
+    fine = known.fine
+    return _part(known.problem, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
 
 
-def _fine_value(problem: Problem, fine: FineMotion, gait: AnyGait) -> float:
-    return problem.objective(_period(problem, _fine_part(problem, fine), _whole_length(problem, gait)))
+def _fine_value(known: Known) -> float:
+    return known.problem.objective(_period(known.problem, _fine_part(known), _whole_length(known.problem, known.gait)))
 
 
-def _collocated_value(problem: Problem, own: _Own, gait: AnyGait) -> float:
+def _collocated_value(known: Known, own: _Own) -> float:
     """The objective as the scheme sees it."""
+    problem = known.problem
     turned, moved, spent, delivered = own.increments
     theta = np.concatenate([[0.0], np.cumsum(turned)])
     part = _part(problem, (np.exp(1j * theta[:-1]) * moved).sum(), spent.sum(), theta[-1], delivered.sum())
-    length = _whole_length(problem, gait) + float(own.length.sum()) / problem.gait.fraction
+    length = _whole_length(problem, known.gait) + float(own.length.sum()) / problem.gait.fraction
     return problem.objective(_period(problem, part, length))
 
 
