@@ -124,7 +124,6 @@ class UnitSpeedGait(GaitFunction):
         return self.length / (2 * np.pi)
 
     def angles(self, t: np.ndarray) -> np.ndarray:
-        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
         phase, image = reduced(self.symmetry, t)
         return imaged(self.symmetry, self._angles(phase), image)
 
