@@ -10,6 +10,8 @@ from colloc.mechanics.bodies import ARROWS, Body
 from colloc.results.motion import turned
 from colloc.results.solution import Solution
 
+_ARROW = 0.12
+"""Length [body lengths] of the arrow of the largest friction."""
 _STRAIGHT = 1e-2
 """A body that turns by less a period [rad] is shown over several periods, one after the other along a straight line."""
 
@@ -31,6 +33,18 @@ class Frames:
     """What a period adds to every position, ``(2,)``."""
     periods: int
     """How many periods can be shown in a row."""
+
+    @property
+    def window(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners ``(2,)``, low and high, of what all periods need with their arrows."""
+        ends = self.ends.reshape(2, -1)
+        reach = np.concatenate([ends, ends + (self.periods - 1) * self.step[:, None]], axis=1)
+        return reach.min(axis=1) - _ARROW, reach.max(axis=1) + _ARROW
+
+    @property
+    def arrow_scale(self) -> float:
+        """Length of an arrow [body lengths] over the force."""
+        return _ARROW / max(float(np.hypot(*self.arrow).max()), 1e-300)
 
 
 def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:

@@ -60,10 +60,6 @@ class GaitClass:
         return f"{self.kind}{' (retraced)' if self.retraced else ''}, {self.symmetry}"
 
 
-def _amplitude(gait: Fourier) -> float:
-    return float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
-
-
 def winding(gait: Fourier) -> int:
     """Turns of the first two joint angles about their mean in a period."""
     angles = gait.angles(np.linspace(0.0, 1.0, _FINE + 1)) - gait.mean[:, None]
@@ -102,7 +98,8 @@ def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
 
 def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     """The kind of a gait of a body with at least two joints or modes."""
-    close = _SAME * max(_amplitude(gait), 1e-12)
+    amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
+    close = _SAME * max(amplitude, 1e-12)
     bilateral = body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait, body))) < close
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
     antipodal = np.linalg.norm(even) < close

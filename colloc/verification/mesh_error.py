@@ -116,6 +116,7 @@ def mesh_error(
         return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
     known = Known(problem, gait, delta, fine)
     own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
+    exact = problem.objective(_period(problem, _fine_part(known), _whole_length(problem, gait)))
     return MeshError(
         own.rotation,
         np.abs(own.displacement),
@@ -123,7 +124,7 @@ def mesh_error(
         _velocity_error(mesh, own.rates, fine),
         own.value,
         constraint_violation(problem, mesh, gait),
-        _collocated_value(known, own) / _fine_value(known) - 1,
+        _collocated_value(known, own) / exact - 1,
         float(fine.unresolved.sum()),
         abs(float(_turning(known, own).sum())),
     )
@@ -184,10 +185,6 @@ def _fine_part(known: Known) -> dict[str, float]:
     """What the solved part comes to."""
     fine = known.fine
     return _part(known.problem, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
-
-
-def _fine_value(known: Known) -> float:
-    return known.problem.objective(_period(known.problem, _fine_part(known), _whole_length(known.problem, known.gait)))
 
 
 def _collocated_value(known: Known, own: _Own) -> float:
