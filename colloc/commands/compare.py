@@ -1,7 +1,4 @@
-"""Command line: two results side by side: what was asked, what came out, and whether it is the same gait.
-
-Exit codes: 0 the same optimum, 1 different, 2 bad file.
-"""
+"""Command line: two results side by side: what was asked, what came out, and whether it is the same gait."""
 
 from __future__ import annotations
 

@@ -2,8 +2,6 @@
 
 The gait is replayed anew by the NumPy solver, on other instants than before; optimality (KKT error, violation) is what
 the solver recorded, since it takes derivatives of the whole program.
-
-Exit codes: 0 certified, 2 bad file, 4 a check fails or the file's own certificate says something else.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.distinct_optima import basins, fourier_series
-from colloc.results.outcome import Outcome, outcome_fields, outcome_from
+from colloc.results.outcome import UNITS, Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.file_lock import locked
@@ -37,20 +37,7 @@ from colloc.system.store_file import mark, new_file, put, put_attribute
 KIND, VERSION = "colloc archive", 4
 ROWS = "colloc starts 1"
 _PROBLEM = "problem"
-_COLUMNS = {
-    "status": "text",
-    "message": "text",
-    "efficiency": "1/weight",
-    "efficiency_error": "1/weight",
-    "value": "of the objective",
-    "value_error": "of the objective",
-    "distance": "length",
-    "work": "weight length",
-    "delta": "length/period",
-    "iterations": "1",
-    "seconds": "s",
-    "cpu_seconds": "s",
-}
+_COLUMNS = {"status": "text", "message": "text", **UNITS, "iterations": "1", "cpu_seconds": "s"}
 
 
 class StartName(NamedTuple):

@@ -182,9 +182,8 @@ class Solver:
         """Jacobian of the equations in the free variables at x, and their row numbers among all constraints."""
         t = self.transcription
         equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
-        return as_sparse(self.oracles.options["jac_g"](x, self._parameters(x, delta))[1])[equality][
-            :, t.lower < t.upper
-        ], equality
+        jacobian = as_sparse(self.oracles.options["jac_g"](x, self._parameters(x, delta))[1])
+        return jacobian[equality][:, t.lower < t.upper], equality
 
     def _measured(
         self,

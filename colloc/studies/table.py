@@ -12,6 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.law import rate_independent
 from colloc.results.distinct_optima import fourier_series, series_class
+from colloc.results.outcome import UNITS as OF_OUTCOMES
 from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.gait_class import GaitClass, gait_class
@@ -24,20 +25,11 @@ if TYPE_CHECKING:
 
 NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
 UNITS = {
-    "efficiency": "1/weight",
-    "efficiency_error": "1/weight",
-    "value": "of the objective",
-    "value_error": "of the objective",
+    **OF_OUTCOMES,
     "trivial_bound": "1/weight",
     "upper_bound": "1/weight",
     "neighbour_value": "of the objective",
-    "distance": "length",
-    "work": "weight length",
-    "delta": "length/period",
-    "seconds": "s",
-    "mean": "rad",
-    "cos": "rad",
-    "sin": "rad",
+    **dict.fromkeys(("mean", "cos", "sin"), "rad"),
 }
 _NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
 _COUNTS = ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "below_neighbour", "starts", "starts_certified")

@@ -125,9 +125,8 @@ def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
     filled = [(key, _sum(key.encode(), text.encode()).decode(), text) for key, text in texts]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(
-            FileExistsError
-        ):  # with 0o666 less the umask, where SQLite would take 0o644: a group may share it
+        # with 0o666 less the umask, where SQLite would take 0o644: a group may share it
+        with contextlib.suppress(FileExistsError):
             os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         with _opened(path, "rw") as connection:
             connection.execute("BEGIN IMMEDIATE")

@@ -186,11 +186,8 @@ def _is_text(stored: h5d.DatasetID | h5py.h5a.AttrID, where: str, largest: int) 
         raise StoreError(f"{where} holds neither numbers nor texts of fixed length.")
     if space.get_simple_extent_type() == h5s.NULL:
         raise StoreError(f"{where} is empty.")
-    # decoded, NumPy takes four bytes a character
-    if (
-        space.get_simple_extent_npoints() * kind.get_size() * (4 if is_text and space.get_simple_extent_ndims() else 1)
-        > largest
-    ):
+    times = 4 if is_text and space.get_simple_extent_ndims() else 1  # decoded, NumPy takes four bytes a character
+    if space.get_simple_extent_npoints() * kind.get_size() * times > largest:
         raise StoreError(f"{where} is too large.")
     return is_text
 
