@@ -29,7 +29,7 @@ class GaitClass:
 
     bilateral: bool
     antipodal: bool
-    """Symmetries it has (see `colloc.gaits.harmonic`), whatever class it was searched in."""
+    """Symmetries it has (see `colloc.gaits.symmetry`), whatever class it was searched in."""
     retraced: bool
     """It goes back the way it came."""
     winding: int
@@ -42,7 +42,7 @@ class GaitClass:
 
     @property
     def symmetry(self) -> str:
-        """In the words of `colloc.gaits.harmonic`; "both" if it has both."""
+        """In the words of `colloc.gaits.symmetry`; "both" if it has both."""
         if self.bilateral and self.antipodal:
             return "both"
         return "bilateral" if self.bilateral else "antipodal" if self.antipodal else "none"
