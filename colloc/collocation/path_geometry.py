@@ -25,37 +25,25 @@ _ANGLE_PER_ARC = 2.5
 
 @dataclass(eq=False)
 class PathGeometry:
-    """Constraint rows and blocks of a path, and where on it the mesh lies.
-
-    Attributes
-    ----------
-    piece : Piece
-        The expression of a point of a piece.
-    shape : (n_shape, n_interval)
-        Variables of the piece that each mesh interval lies on.
-    on : (n_interval,)
-        Which piece that is.
-    start, width : (n_interval,)
-        Where on its piece an interval begins, and which part of the piece it takes.
-    second : (n_interval,)
-        The second instance parameter of the piece's points (see `colloc.collocation.path_equations`).
-    groups : list of Group
-    blocks : dict of str to (function, gather, instance parameters)
-    checks : list of ShapeCheck
-    lower, upper : (n,)
-    """
+    """Constraint rows and blocks of a path, and where on it the mesh lies."""
 
     piece: Piece
+    """The expression of a point of a piece."""
     shape: np.ndarray
+    """Variables of the piece that each mesh interval lies on, ``(n_shape, n_interval)``."""
     on: np.ndarray
+    """Which piece that is, ``(n_interval,)``."""
     start: np.ndarray
     width: np.ndarray
+    """Where on its piece an interval begins (`start`), and which part of the piece it takes, ``(n_interval,)`` each."""
     second: np.ndarray
+    """The second instance parameter of the piece's points (see `colloc.collocation.path_equations`), ``(n_interval,)``."""
     groups: list[Group]
     blocks: dict[str, tuple[LocalFunction, np.ndarray, np.ndarray]]
+    """Function, gather, instance parameters, by name."""
     checks: list[ShapeCheck]
-    lower: np.ndarray
-    upper: np.ndarray
+    lower: np.ndarray  # (n,)
+    upper: np.ndarray  # (n,)
 
     def given(self, tau: np.ndarray) -> np.ndarray:
         """Instance parameters ``(2, k)`` of points at fractions tau ``(k,)`` of the intervals, k a multiple of their number."""

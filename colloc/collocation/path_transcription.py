@@ -119,15 +119,10 @@ def _with_vertices(edges: np.ndarray, phases: np.ndarray) -> np.ndarray:
 
 
 def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathProgram:
-    """The nonlinear program of a problem whose class bounds the path.
+    """The nonlinear program of a problem whose class bounds the path, near a gait, which fixes winding, start phase, and which
+    interval lies on which side.
 
-    Parameters
-    ----------
-    problem : Problem
-    gait : Gait
-        Where the search begins: it fixes winding, start phase, and which interval lies on which side.
-    edges : (n + 1,), optional
-        Phases; by default graded by the turns of the gait (free paths), or evenly spread over the sides (polygons).
+    Edges are phases; by default graded by the turns of the gait (free paths), or evenly spread over the sides (polygons).
     """
     near, mesh = path_through(problem, gait, edges)
     layout = problem_layout(problem, mesh, _knots(near))

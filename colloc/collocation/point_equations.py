@@ -30,7 +30,7 @@ from colloc.mechanics.actuators import driven_power
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.law import Law
-from colloc.numerics.blocks import Block, LocalFunction, local_function, total_function
+from colloc.numerics.blocks import Block, LocalFunction, implicit_function, local_function
 from colloc.numerics.constraint_rows import Group, block_group, total_group
 from colloc.numerics.mesh import Mesh
 
@@ -83,39 +83,13 @@ def across_point(body: Body, friction: Law, slope: Slope) -> LocalFunction:
 
 
 def _map_point(body: Body, friction: Law) -> LocalFunction:
-    """Outputs z - Z, rate of distance at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter).
-
-    Derivatives of Z follow from balance(Z, y) = 0: dZ/dy = -R_z^-1 R_y. The Hessian of w.Z + w_P P(Z, y) is that of
-    w_P P + nu.R on (y, Z), pulled back along (I, dZ/dy), with nu such that the z-derivative of the whole vanishes.
-    """
+    """Outputs z - Z, rate of distance at z, power at Z, where Z(angles, rates) solves the balance (an instance parameter)."""
     theta, angles, rates, z, delta = _symbols(body)
-    solved = ca.SX.sym("Z", 3)
-    y = ca.vertcat(angles, rates)
-    balance, _, power = body.sliding(friction, angles, rates, solved, delta)
-    local = ca.vertcat(theta, y, z)
+    solved, local = ca.SX.sym("Z", 3), ca.vertcat(theta, angles, rates, z)
+    balanced = body.sliding(friction, angles, rates, solved, delta)
     ahead = forward(theta, body.sliding(friction, angles, rates, z, delta).centre)
-    out = ca.vertcat(z - solved, ahead, power)
-
-    R_z, R_y = ca.jacobian(balance, solved), ca.jacobian(balance, y)
-    P_z, P_y = ca.jacobian(power, solved), ca.jacobian(power, y)
-    slope = -ca.solve(R_z, R_y)
-    n_y = y.shape[0]
-    zeros = ca.SX(3, 1)
-    jacobian = ca.vertcat(
-        ca.horzcat(zeros, -slope, ca.SX.eye(3)),
-        ca.jacobian(ahead, local),
-        ca.horzcat(ca.SX(1, 1), P_y + P_z @ slope, ca.SX(1, 3)),
-    )
-    weight = ca.SX.sym("weight", 5)
-    nu = ca.SX.sym("nu", 3)
-    both = ca.vertcat(y, solved)
-    inner = ca.hessian(weight[4] * power + ca.dot(nu, balance), both)[0]
-    nu_value = ca.solve(R_z.T, weight[0:3] - weight[4] * P_z.T)
-    inner = ca.substitute(inner, nu, nu_value)
-    frame = ca.vertcat(ca.SX.eye(n_y), slope)
-    hessian = ca.hessian(weight[3] * ahead, local)[0]
-    hessian[1 : 1 + n_y, 1 : 1 + n_y] += frame.T @ inner @ frame
-    return total_function("point", local, solved, delta, out, jacobian, hessian, weight)
+    out = ca.vertcat(z - solved, ahead, balanced.power)
+    return implicit_function("point", local, ca.SX(0, 1), solved, delta, balanced.force, out)
 
 
 def gait_check(check: ShapeCheck, n_joint: int, n_parameter: int) -> LocalFunction:

@@ -26,45 +26,29 @@ Implicit = dict[str, Callable[[ca.MX, ca.MX], ca.MX]]
 
 @dataclass(frozen=True, eq=False)
 class GaitProgram:
-    """A problem on a mesh, ready for a solver of nonlinear programs.
-
-    Attributes
-    ----------
-    problem : Problem
-    mesh : Mesh
-    knots : (n,) or None
-        Phases where the arcs of a free path meet; None for other gaits.
-    layout : Layout
-    assembly : Assembly
-    names : tuple of str
-        Of the assembly's blocks, in order.
-    lower, upper : (n,)
-        Bounds of the variables.
-    constraint_lower, constraint_upper : (m,)
-    groups : dict of str to slice
-        Names of the constraint rows, in order.
-    checks : list of ShapeCheck
-        Shape functions whose largest value in each mesh cell is constrained.
-    speed_unit : float
-        The program's unit of speed: delta is divided by it before the blocks see it.
-    velocity : ImplicitVelocity or None
-        Kept alive here for the functions that call it.
-    """
+    """A problem on a mesh, ready for a solver of nonlinear programs."""
 
     problem: Problem
     mesh: Mesh
     knots: np.ndarray | None
+    """``(n,)`` or None: phases where the arcs of a free path meet; None for other gaits."""
     layout: Layout
     assembly: Assembly
     names: tuple[str, ...]
+    """Of the assembly's blocks, in order."""
     lower: np.ndarray
     upper: np.ndarray
-    constraint_lower: np.ndarray
-    constraint_upper: np.ndarray
+    """Bounds of the variables, ``(n,)`` each."""
+    constraint_lower: np.ndarray  # (m,)
+    constraint_upper: np.ndarray  # (m,)
     groups: dict[str, slice]
+    """Names of the constraint rows, in order."""
     checks: list[ShapeCheck]
+    """Shape functions whose largest value in each mesh cell is constrained."""
     speed_unit: float
+    """The program's unit of speed: delta is divided by it before the blocks see it."""
     velocity: ImplicitVelocity | None
+    """Kept alive here for the functions that call it."""
 
     def with_rows(self, lower: np.ndarray, upper: np.ndarray) -> GaitProgram:
         """The program with other bounds of its rows."""

@@ -4,13 +4,10 @@ Decision variables: gait parameters p; at every point joint angles, joint rates 
 theta at every site; distance x and work W at every edge. Rates, velocities and delta are per radian of phase, so that all
 variables are O(1).
 
-The balance itself is a step function of the tail velocity as delta goes to 0. The formulation "full" lifts the links' forces:
-each is a variable, tied to its velocities by an equation scaled like a velocity, F / I0 + mu v = 0, and the balance is linear.
-"implicit velocity" puts z - Z(angles, rates) = 0 in the place of the balance, with Z the velocity that balances the body.
-x is the displacement of the centre of mass along a fixed direction. The first orientation is free, so maximising x
-turns the motion into that direction; nothing is imposed on the sideways displacement, which is not even a variable. On a slope
-the balance contains the weight's pull, which depends on theta, the first theta is the last parameter of the gait, and x is the
-way in the direction that counts.
+What stands for the balance, by the formulation, is said in `colloc.collocation.point_equations`. x is the displacement of the
+centre of mass along a fixed direction. The first orientation is free, so maximising x turns the motion into that direction;
+nothing is imposed on the sideways displacement, which is not even a variable. On a slope the balance contains the weight's
+pull, which depends on theta, the first theta is the last parameter of the gait, and x is the way in the direction that counts.
 """
 
 from __future__ import annotations

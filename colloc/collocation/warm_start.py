@@ -19,32 +19,15 @@ _TOLERANCE = 1e-11
 
 
 def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: float) -> np.ndarray:
-    """Variables that satisfy every equation of the transcription but net rotation, for a gait and delta.
-
-    Parameters
-    ----------
-    transcription : GaitProgram
-    parameters : (n_parameter,)
-        Gait parameters.
-    delta : float
-        Regularisation speed, in the units of the problem's class of gaits.
-
-    Returns
-    -------
-    (n,) array
-    """
+    """Variables ``(n,)`` that satisfy every equation of the transcription but net rotation, for gait parameters
+    ``(n_parameter,)`` and delta in the units of the problem's class of gaits."""
     gait = transcription.member(parameters)
     mesh = transcription.phase_mesh(gait)
     return balanced_variables(transcription.problem, transcription.layout, mesh, gait, parameters, delta)
 
 
 def balanced_variables(
-    problem: Problem,
-    layout: Layout,
-    mesh: Mesh,
-    gait: AnyGait,
-    parameters: np.ndarray,
-    delta: float,
+    problem: Problem, layout: Layout, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, delta: float
 ) -> np.ndarray:
     """The same for a layout of variables, a mesh in phases of the gait, and the gait's parameters in that layout."""
     x = np.zeros(layout.n)

@@ -1,7 +1,4 @@
-"""Command line: two results side by side: what was asked, what came out, and whether it is the same gait.
-
-Exit codes: 0 the same optimum, 1 different, 2 bad file.
-"""
+"""Command line: two results side by side: what was asked, what came out, and whether it is the same gait."""
 
 from __future__ import annotations
 
@@ -29,13 +26,8 @@ _PHASES = 800
 
 
 def path_distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Largest distance [rad] from a point of one closed polygon of shapes to the other polygon, both ways.
-
-    Parameters
-    ----------
-    a, b : (n_joint, n_time)
-        Vertices; the first and the last are joined.
-    """
+    """Largest distance [rad] from a point of one closed polygon of shapes to the other, both ways; vertices ``(n_joint,
+    n_time)``, of which the first and the last are joined."""
     return max(_farthest(a, b), _farthest(b, a))
 
 
@@ -74,42 +66,27 @@ def _short(value: object) -> str:
 
 def rows(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
     """What came out, as text: name, first, second."""
-    return [("", a.problem.name, b.problem.name), *zip(_NAMES, _column(a), _column(b), strict=True)]
+    first, second = _outcome(a), _outcome(b)
+    return [("", a.problem.name, b.problem.name), *((name, text, second[name]) for name, text in first.items())]
 
 
-_NAMES = (
-    "status",
-    "objective",
-    "value",
-    "  error",
-    "efficiency",
-    "  at delta -> 0",
-    "distance d",
-    "work W",
-    "delta",
-    "intervals",
-    "iterations",
-    "seconds",
-)
-
-
-def _column(solution: Solution) -> list[str]:
+def _outcome(solution: Solution) -> dict[str, str]:
     last, certificate, measured = solution.last, solution.certificate, solution.measured
     error = f" +- {certificate.efficiency_error:.0e}" if certificate.replayed else " (not replayed)"
-    return [
-        solution.status,
-        solution.problem.objective.name,
-        f"{measured.value:.6f}",
-        f"{certificate.value_error:.0e}" if certificate.replayed else "-",
-        f"{measured.efficiency:.6f}{error}",
-        f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
-        f"{measured.distance:.6f}",
-        f"{measured.work:.6f}",
-        f"{last.delta:.1e}",
-        str(last.edges.size - 1),
-        str(sum(level.iterations for level in solution.levels)),
-        f"{solution.seconds:.1f}",
-    ]
+    return {
+        "status": solution.status,
+        "objective": solution.problem.objective.name,
+        "value": f"{measured.value:.6f}",
+        "  error": f"{certificate.value_error:.0e}" if certificate.replayed else "-",
+        "efficiency": f"{measured.efficiency:.6f}{error}",
+        "  at delta -> 0": f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
+        "distance d": f"{measured.distance:.6f}",
+        "work W": f"{measured.work:.6f}",
+        "delta": f"{last.delta:.1e}",
+        "intervals": str(last.edges.size - 1),
+        "iterations": str(sum(level.iterations for level in solution.levels)),
+        "seconds": f"{solution.seconds:.1f}",
+    }
 
 
 def verdict(a: Solution, b: Solution) -> tuple[bool, str]:

@@ -47,13 +47,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def problem_text(path: Path, links: int) -> str:
-    """A problem file for a chain of so many equal links.
-
-    Raises
-    ------
-    ProblemError
-        If the number of links is out of range, or the file's name cannot be a problem's.
-    """
+    """A problem file for a chain of so many equal links. `ProblemError` if the number of links is out of range, or the file's
+    name cannot be a problem's."""
     if not _FEWEST <= links <= _MOST:
         raise ProblemError(f"--links must be {_FEWEST} to {_MOST}, not {links}.")
     if path.suffix != ".py":

@@ -13,10 +13,7 @@ from colloc.system.processors import one_thread_each
 SUBCOMMANDS = {
     "init": ("init", "write a commented problem file for a chain of links, to change and solve"),
     "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
-    "multistart": (
-        "multistart",
-        "solve a problem from many random starts; distinct optima with their frequencies",
-    ),
+    "multistart": ("multistart", "solve a problem from many random starts; distinct optima with their frequencies"),
     "open": ("open", "what an archive of starts holds; the whole result of one of them"),
     "sweep": ("sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
     "pareto": ("pareto", "what two objectives cost each other: a front of certified gaits"),

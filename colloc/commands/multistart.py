@@ -1,7 +1,4 @@
-"""Command line: many starts of a problem file, in parallel and resumable; distinct optima with their frequencies.
-
-Exit codes: 0 at least one certified optimum, 2 bad problem or option, 3 none found, 130 interrupted (what is done is kept).
-"""
+"""Command line: many starts of a problem file, in parallel and resumable; distinct optima with their frequencies."""
 
 from __future__ import annotations
 

@@ -57,12 +57,7 @@ _CHANGES = ("delta", "delta_start", "intervals", "mesh_tolerance", "scheme", "fo
 
 def changed(problem: Problem, options: argparse.Namespace) -> Problem:
     """The problem with the changes of `add_problem`, and with the gait of the result that ``--start`` names as guess.
-
-    Raises
-    ------
-    ProblemError
-        If a value cannot be used, or the gait cannot be the guess; the message names the file.
-    """
+    `ProblemError` if a value cannot be used, or the gait cannot be the guess; the message names the file."""
     changes = {name: getattr(options, name) for name in _CHANGES if getattr(options, name) is not None}
     problem = problem.with_(**changes) if changes else problem
     if getattr(options, "start", None) is None:
@@ -100,13 +95,8 @@ def add_bound(parser: argparse.ArgumentParser) -> None:
 
 
 def output_kind(options: argparse.Namespace, kinds: Sequence[str]) -> str:
-    """Which of several kinds of files to write: ``--format``, else the ending of ``--output``, else the first.
-
-    Raises
-    ------
-    ProblemError
-        If ``--output`` ends in something else.
-    """
+    """Which of several kinds of files to write: ``--format``, else the ending of ``--output``, else the first. `ProblemError`
+    if ``--output`` ends in something else."""
     ending = "" if _is_folder(options.output) else Path(options.output).suffix
     if options.format is None and ending and ending.lstrip(".") not in kinds:
         raise _wrong_ending(options.output, " or ".join(f".{kind}" for kind in kinds))
@@ -123,19 +113,8 @@ def _wrong_ending(output: str, wanted: str) -> ProblemError:
 
 
 def output_path(output: str | None, default: Path) -> Path:
-    """The file to write, in a folder that exists and can be written.
-
-    Parameters
-    ----------
-    output : str or None
-        What the user named: a folder, or a file with the suffix of `default`; None: `default`.
-    default : Path
-
-    Raises
-    ------
-    ProblemError
-        If nothing can be written there, or it ends in another suffix.
-    """
+    """The file to write, in a folder that exists and can be written: what the user named, a folder or a file with the suffix of
+    `default`, or else that. `ProblemError` if nothing can be written there, or it ends in another suffix."""
     path = default if output is None else Path(output) / default.name if _is_folder(output) else Path(output)
     if path.suffix != default.suffix:
         raise _wrong_ending(str(path), default.suffix)

@@ -1,7 +1,4 @@
-"""Command line: solve a problem file, certify the result, save it and draw it.
-
-Exit codes: 0 solved, 2 bad problem or option, 3 not converged, 4 certificate failed, 130 interrupted.
-"""
+"""Command line: solve a problem file, certify the result, save it and draw it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Command line: run a study file over processes or a Dask cluster; resumable, and nothing finished is ever lost.
-
-Exit codes: 0 every cell has a certified gait, 2 bad study, option or folder, 3 some cells have none, 130 interrupted.
-"""
+"""Command line: run a study file over processes or a Dask cluster; resumable, and nothing finished is ever lost."""
 
 from __future__ import annotations
 

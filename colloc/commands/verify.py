@@ -2,8 +2,6 @@
 
 The gait is replayed anew by the NumPy solver, on other instants than before; optimality (KKT error, violation) is what
 the solver recorded, since it takes derivatives of the whole program.
-
-Exit codes: 0 certified, 2 bad file, 4 a check fails or the file's own certificate says something else.
 """
 
 from __future__ import annotations
@@ -59,12 +57,7 @@ def disagreement(recorded: Certificate, now: Certificate) -> str:
 
 def rechecked(solution: Solution, tolerance: float = 1e-6) -> Solution:
     """The solution with new certificates, on other instants than before; its check of second order is taken over.
-
-    Raises
-    ------
-    ProblemError
-        If there is nothing to check.
-    """
+    `ProblemError` if there is nothing to check."""
     solution.last  # noqa: B018  raises
     before = solution.certificate.instants or 1600
     known = next((check for check in solution.certificate.checks if check.name == "second order"), None)

@@ -132,8 +132,7 @@ class ArcPath(UnitSpeedGait):
 
     def mapped(self, matrix: np.ndarray) -> Corners:
         """A polygon of many corners along the path whose shapes are these, multiplied by a matrix ``(m, n_joint)``."""
-        vertices = matrix @ self.angles(np.linspace(0.0, self.edges[-1], _CORNERS + 1))
-        return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
+        return Corners.through(matrix @ self.angles(np.linspace(0.0, self.edges[-1], _CORNERS + 1)), self.symmetry)
 
     def resampled(self, edges: np.ndarray) -> ArcPath:
         """The same path with other edges; exact if every old edge is a new one."""

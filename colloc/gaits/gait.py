@@ -124,7 +124,6 @@ class UnitSpeedGait(GaitFunction):
         return self.length / (2 * np.pi)
 
     def angles(self, t: np.ndarray) -> np.ndarray:
-        """Joint angles ``(n_joint, n_time)`` at phases t ``(n_time,)``."""
         phase, image = reduced(self.symmetry, t)
         return imaged(self.symmetry, self._angles(phase), image)
 
@@ -220,13 +219,7 @@ class ClassOfGaits:
 
 
 def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
-    """Numbers of a gait as an array of so many dimensions.
-
-    Raises
-    ------
-    ProblemError
-        If they are none, or not finite.
-    """
+    """Numbers of a gait as an array of so many dimensions. `ProblemError` if they are none, or not finite."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):

@@ -54,17 +54,8 @@ def largest_factor(body: Body, joint_limit: Limit, angles: np.ndarray) -> float:
 
 
 def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share: float = _SHARE) -> Fourier:
-    """A wave of bending along a body.
-
-    Parameters
-    ----------
-    body : Body
-    joint_limit : float or tuple of float
-    waves : float
-        How many stand along the body; positive ones travel towards the head.
-    share : float
-        Amplitude over the largest that is admissible; at most 1.5 rad.
-    """
+    """A wave of bending along a body: so many waves stand along it, positive ones travel towards the head. Its amplitude is a
+    share of the largest that is admissible, at most 1.5 rad."""
     cos, sin = body.wave(waves)
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
     size = min(share * largest_factor(body, joint_limit, unit.angles(_PHASES)), _LARGEST)

@@ -1,13 +1,4 @@
-"""Harmonic gaits: joint angles as finite Fourier series of the phase, with or without a symmetry.
-
-Phase t runs over one period, 0 <= t <= 1. Symmetries of a gait q(t), joints counted from the tail:
-
-- ``bilateral``: q_j(-t) = -q_(n+1-j)(t). The body at -t, seen from its head, has the shape it has at t. For any
-  friction the net rotation vanishes (paper, appendix A; `colloc.results.equivalence`) and the second half period repeats the
-  first half's displacement and work.
-- ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
-- ``none``.
-"""
+"""Harmonic gaits: joint angles as finite Fourier series of the phase, with or without a symmetry (`colloc.gaits.symmetry`)."""
 
 from __future__ import annotations
 

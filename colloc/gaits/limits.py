@@ -15,13 +15,7 @@ Limit = float | tuple[float, ...]
 
 
 def checked_limit(body: Body, limit: Any) -> Limit:
-    """A limit as it is, or as a tuple of one for each joint.
-
-    Raises
-    ------
-    ProblemError
-        If it cannot be used for the body.
-    """
+    """A limit as it is, or as a tuple of one for each joint. `ProblemError` if it cannot be used for the body."""
     each, largest = _each(limit), body.usual.largest_limit
     if not each or not all(0 < a <= largest + 1e-12 for a in each):
         most = f"pi/{np.pi / largest:g}".removesuffix("/1")
@@ -52,13 +46,7 @@ def under_one_limit(angles: np.ndarray, limit: Limit) -> tuple[np.ndarray, float
 
 
 def checked_actuator_limit(name: str, limit: Any, n_joint: int) -> Limit | None:
-    """A limit as it is, or as a tuple of one for each joint; None is none.
-
-    Raises
-    ------
-    ProblemError
-        If it cannot be used.
-    """
+    """A limit as it is, or as a tuple of one for each joint; None is none. `ProblemError` if it cannot be used."""
     if limit is None:
         return None
     each = _each(limit)

@@ -159,7 +159,7 @@ def corners_through(gait: Gait, target: Polygon) -> Corners:
         if half:
             # the middle of a side between the last corner and its image
             vertices[:, end] = 0.5 * (vertices[:, inner] - vertices[::-1, inner])
-    return Corners(vertices[:, :-1] if target.symmetry == NONE else vertices, target.symmetry)
+    return Corners.through(vertices, target.symmetry)
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:

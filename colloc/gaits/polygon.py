@@ -41,6 +41,11 @@ class Corners(UnitSpeedGait):
     corners: np.ndarray
     symmetry: str = "none"
 
+    @classmethod
+    def through(cls, vertices: np.ndarray, symmetry: str) -> Corners:
+        """The polygon with these `vertices`, of which without a symmetry the last is the first."""
+        return cls(vertices[:, :-1] if symmetry == NONE else vertices, symmetry)
+
     def __post_init__(self) -> None:
         self._check_symmetry()
         object.__setattr__(self, "corners", finite_array("polygon.corners", self.corners, 2))
@@ -195,8 +200,7 @@ class Polygon(ClassOfGaits):
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Corners:
         """The gait of a parameter vector; the mesh does not matter."""
-        vertices = self.split(parameters, n_joint)
-        return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
+        return Corners.through(self.split(parameters, n_joint), self.symmetry)
 
     def parameters(self, gait: Corners) -> np.ndarray:
         """The parameter vector of a member."""

@@ -100,11 +100,9 @@ class Prescribed(ClassOfGaits):
         return np.concatenate([*parts, self.stages[-1:]])
 
     def describe(self) -> str:
-        """The class in words, for reports."""
         return f"a prescribed motion, symmetry {self.symmetry}"
 
     def size(self, n_joint: int, n_interval: int | None = None) -> int:
-        """Number of parameters."""
         return 0
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Phases:

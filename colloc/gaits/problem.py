@@ -23,7 +23,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
-from colloc.system.arguments import is_number, is_whole, named_arguments
+from colloc.system.arguments import check_finite, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 SMALLEST_DELTA = 1e-14
@@ -172,10 +172,8 @@ class Problem:
             raise ProblemError(f"{what}; leave gait out, or take another body.")
 
     def _check_numbers(self) -> None:
-        for field in ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance"):
-            value = getattr(self, field)
-            if not is_number(value):
-                raise ProblemError(f"{field} must be a finite number, not {value!r}.")
+        numbers = ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance")
+        check_finite(**{name: getattr(self, name) for name in numbers})
         if self.delta <= 0:
             raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
         if self.delta < SMALLEST_DELTA:

@@ -46,32 +46,19 @@ class Reference:
 
 @dataclass(frozen=True)
 class ProblemFile:
-    """What a problem file states.
-
-    Attributes
-    ----------
-    problem : Problem
-    reference : Reference or None
-    source : str
-        Its text.
-    starts : int or None
-        ``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess leads to.
-    """
+    """What a problem file states."""
 
     problem: Problem
     reference: Reference | None
     source: str
+    """Its text."""
     starts: int | None = None
+    """``STARTS``: how many starts its answer is to be the best of; 1 for the optimum that its guess leads to."""
 
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
-    """Execute a problem file.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such file, it cannot be read, it fails (with the line), or states no ``PROBLEM``.
-    """
+    """Execute a problem file. `ProblemError` if there is no such file, it cannot be read, it fails (with the line), or states
+    no ``PROBLEM``."""
     path, names, source = stated_names(path, "problem")
     problem, reference = names.get("PROBLEM"), names.get("REFERENCE")
     if problem is None:
@@ -118,12 +105,7 @@ def problem_file_text(problem: Problem) -> str:
 
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
     """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is for the messages.
-
-    Raises
-    ------
-    ProblemError
-        As for `read_problem_file`.
-    """
+    `ProblemError` as for `read_problem_file`."""
     path = Path(path)
     if not os.path.isfile(path):  # Path.is_file raises for a name that is too long
         raise ProblemError(f"there is no {kind} file {path}.")

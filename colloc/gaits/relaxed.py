@@ -196,8 +196,7 @@ class Mixture:
         vertices = self.unmixed(repeats, sense).shapes
         if self.symmetry == BOTH:
             vertices = np.concatenate([vertices, vertices[::-1, -2::-1]], axis=1)
-        symmetry = BILATERAL if self.symmetry == BOTH else self.symmetry
-        return Corners(vertices[:, :-1] if symmetry == NONE else vertices, symmetry)
+        return Corners.through(vertices, BILATERAL if self.symmetry == BOTH else self.symmetry)
 
 
 @dataclass(frozen=True)
@@ -236,7 +235,6 @@ class Relaxed(ClassOfGaits):
         return max(8, round(min(self.fraction * _PIECES, _PARAMETERS / each)))
 
     def describe(self) -> str:
-        """The class in words, for reports."""
         return f"relaxed gaits that mix {self.directions} directions, symmetry {self.symmetry}"
 
     def series(self, harmonics: int) -> Harmonic:
@@ -255,9 +253,7 @@ class Relaxed(ClassOfGaits):
 
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray) -> Corners:
         """The polygon of a parameter vector; its phases follow from its sides."""
-        vertices = parameters.reshape(-1, n_joint).T
-        symmetry = self.finite.symmetry
-        return Corners(vertices[:, :-1] if symmetry == NONE else vertices, symmetry)
+        return Corners.through(parameters.reshape(-1, n_joint).T, self.finite.symmetry)
 
 
 def _turned(steps: np.ndarray, sense: int) -> np.ndarray:

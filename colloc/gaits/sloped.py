@@ -130,13 +130,7 @@ class SlopeHarmonic(Harmonic):
 
 
 def class_on(slope: Slope | None, gait_class: Any) -> Any:
-    """A class of gaits on a slope, or on the level.
-
-    Raises
-    ------
-    ProblemError
-        If it has no gaits for slopes.
-    """
+    """A class of gaits on a slope, or on the level. `ProblemError` if it has no gaits for slopes."""
     if slope is None:
         return gait_class.level
     if not isinstance(gait_class, Harmonic):
@@ -164,13 +158,8 @@ def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
 
 
 def slope_from(body: Body, friction: Law, grade: object, towards: object) -> Slope | None:
-    """The slope that a problem states; None for the level.
-
-    Raises
-    ------
-    ProblemError
-        If there is none like it, or the body cannot be on it.
-    """
+    """The slope that a problem states; None for the level. `ProblemError` if there is none like it, or the body cannot be on
+    it."""
     tangent = _checked_grade(grade)
     if towards is not None and not is_number(towards):
         raise ProblemError(f"towards must be a finite angle from straight uphill, or None, not {towards!r}.")

@@ -69,12 +69,8 @@ def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndar
 def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
     """Start number `start` of a Latin hypercube over the mean and the harmonics of the problem's class of gaits.
 
-    Harmonic k is sampled with an amplitude that falls like 1/k, so that no harmonic dominates the rates.
-
-    Raises
-    ------
-    ProblemError
-        If no admissible gait moves as fast as the problem's ``smallest_shape_speed``.
+    Harmonic k is sampled with an amplitude that falls like 1/k, so that no harmonic dominates the rates. `ProblemError` if no
+    admissible gait moves as fast as the problem's ``smallest_shape_speed``.
     """
     block, row = divmod(start, BLOCK)
     n_joint, harmonics = problem.body.n_joint, seed_class(problem).harmonics

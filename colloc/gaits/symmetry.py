@@ -1,10 +1,12 @@
 """Symmetries of gaits: the part of a period that has to be solved, and the other part from it.
 
-Symmetries of a gait q(t), joints counted from the tail (their meaning is in `gaits.harmonic`), with the exchange of tail and
-head ``(S q)_j = -q_(n+1-j)``:
+Symmetries of a gait q(t), phase t from 0 to 1 over a period, joints counted from the tail, with the exchange of tail and head
+``(S q)_j = -q_(n+1-j)``:
 
-- ``bilateral``: q(-t) = S q(t); the path starts and ends its half on shapes with S q = q, with tangents that S reverses.
-- ``antipodal``: q(t + 1/2) = -q(t).
+- ``bilateral``: q(-t) = S q(t). The body at -t, seen from its head, has the shape it has at t. For any friction the net
+  rotation vanishes (paper, appendix A; `colloc.results.equivalence`) and the second half period repeats the first half's
+  displacement and work. The path starts and ends its half on shapes with S q = q, with tangents that S reverses.
+- ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
 - ``none``.
 - ``both``: bilateral and antipodal; so q(1/2 - t) is q(t) with its joints in reversed order, and the quarter ends on a shape
   that equals its reverse. For relaxed gaits only.

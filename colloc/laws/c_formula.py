@@ -22,15 +22,8 @@ _ARGUMENTS = "(double vs_, double vn_, double delta_"
 
 
 def own_law_header(tangential: str, normal: str, potential: str = "") -> str:
-    """The header own_law.h of a law stated by formulas that were checked: its force per length, derivatives and potential.
-
-    Parameters
-    ----------
-    tangential, normal : str
-        In terms of vs, vn, speed and delta, as for `colloc.laws.own_law.OwnLaw`.
-    potential : str
-        Whose gradient is minus the force, or nothing.
-    """
+    """The header own_law.h of a law stated by formulas that were checked, as for `colloc.laws.own_law.OwnLaw`: its force per
+    length, derivatives, and the potential whose gradient is minus the force, or nothing."""
     speed = "sqrt(vs_ * vs_ + vn_ * vn_ + delta_ * delta_)"
     numbers = f"const double vs = vs_, vn = vn_, delta = delta_, speed = {speed};"
     unused = "(void)vs, (void)vn, (void)delta, (void)speed;"

@@ -25,16 +25,8 @@ from colloc.numerics.arrays import Array, namespace
 
 
 def joint_moments(body: Body, friction: Law, angles: Array, forces: Array, delta: Array) -> Array:
-    """Moment that every shape coordinate's actuator exerts, ``(n_joint, n_time)``, for a body with a full formulation.
-
-    Parameters
-    ----------
-    body, friction
-    angles : (n_joint, n_time)
-    forces : (n_force, n_time)
-        On the body's parts (`colloc.mechanics.bodies.Body.forces`).
-    delta : float
-    """
+    """Moment that every shape coordinate's actuator exerts, ``(n_joint, n_time)``, for a body with a full formulation, from
+    angles ``(n_joint, n_time)`` and forces ``(n_force, n_time)`` on its parts (`colloc.mechanics.bodies.Body.forces`)."""
     still, moments = np.zeros((3, angles.shape[1])), []
     for joint in range(body.n_joint):
         unit = np.zeros(angles.shape)

@@ -24,14 +24,30 @@ class Instant(NamedTuple):
     force: LinkForce
 
 
+class Moving(NamedTuple):
+    """A chain whose velocities are asked for: joint angles and rates ``(n_joint, n_time)``, the regularisation speed, and an
+    outside force ``(2, n_time)``, or none."""
+
+    body: Links
+    friction: Law
+    angles: np.ndarray
+    rates: np.ndarray
+    delta: float
+    load: np.ndarray | None = None
+
+    def at(self, chosen: np.ndarray) -> Moving:
+        """Some of the instants."""
+        load = None if self.load is None else self.load[:, chosen]
+        return self._replace(angles=self.angles[:, chosen], rates=self.rates[:, chosen], load=load)
+
+    def with_link_at_rest(self, link: int) -> np.ndarray:
+        """Tail velocity ``(3, n_time)`` when one of the links does not move."""
+        still = np.zeros((3, self.angles.shape[1]))
+        return self.body.tail_velocity(self.body.posture(self.angles, link), self.rates, still, link)
+
+
 def instant(
-    body: Links,
-    friction: Law,
-    angles: Array,
-    rates: Array,
-    z: Array,
-    delta: Array,
-    reference: int | None = TAIL,
+    body: Links, friction: Law, angles: Array, rates: Array, z: Array, delta: Array, reference: int | None = TAIL
 ) -> Instant:
     """Posture, link velocities and friction for joint angles, joint rates ``(n_joint, n_time)`` and z ``(3, n_time)``."""
     posture = body.posture(angles, reference)

@@ -12,21 +12,14 @@ from colloc.system.errors import NotConvergedError
 
 
 class Sliding(NamedTuple):
-    """A body that slides with a given tail velocity.
-
-    Attributes
-    ----------
-    force : (3, n_time)
-        Net force and torque about the tail, zero in balance (paper, eq. ftb).
-    centre : (2, n_time)
-        Velocity of the centre of mass, in the body's axes.
-    power : (1, n_time)
-        Dissipated by friction (integrand of the paper's eq. W).
-    """
+    """A body that slides with a given tail velocity."""
 
     force: Array
+    """``(3, n_time)``: net force and torque about the tail, zero in balance (paper, eq. ftb)."""
     centre: Array
+    """Velocity of the centre of mass, in the body's axes, ``(2, n_time)``."""
     power: Array
+    """``(1, n_time)``: dissipated by friction (integrand of the paper's eq. W)."""
 
 
 class Lifted(NamedTuple):
@@ -79,39 +72,27 @@ class BalanceSolution:
 
 
 class BalancedMotion(NamedTuple):
-    """Motion of a balanced body at instants.
-
-    Attributes
-    ----------
-    z : (3, n_time)
-        Tail velocity (u, v, omega) in the body frame.
-    centre : (2, n_time)
-        Velocity of the centre of mass, in the body frame.
-    power : (n_time,)
-        Power dissipated by friction.
-    actuator_power : (n_time,)
-        Power of what bends the body, from the moments of the friction on all that lies ahead; equals `power` in balance.
-    """
+    """Motion of a balanced body at instants."""
 
     z: np.ndarray
+    """Tail velocity (u, v, omega) in the body frame, ``(3, n_time)``."""
     centre: np.ndarray
+    """Velocity of the centre of mass, in the body frame, ``(2, n_time)``."""
     power: np.ndarray
+    """Power dissipated by friction, ``(n_time,)``."""
     actuator_power: np.ndarray
+    """``(n_time,)``: power of what bends the body, from the moments of the friction on all that lies ahead; equals `power` in
+    balance."""
 
 
 class Branches(NamedTuple):
-    """Balanced velocities of instants, from one to `n_root` each.
-
-    Attributes
-    ----------
-    z : (n_root, 3, n_time)
-        Tail velocities (u, v, omega) in the body frame; NaN beyond those that were found.
-    sign : (n_root, n_time)
-        Of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0 beyond those that were found.
-    """
+    """Balanced velocities of instants, from one to `n_root` each."""
 
     z: np.ndarray
+    """``(n_root, 3, n_time)``: tail velocities (u, v, omega) in the body frame; NaN beyond those that were found."""
     sign: np.ndarray
+    """``(n_root, n_time)``: of the determinant of `colloc.mechanics.balance.balance_jacobian`; 0 beyond those that were
+    found."""
 
     @property
     def number(self) -> np.ndarray:

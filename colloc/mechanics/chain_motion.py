@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from colloc.mechanics.balance import balance_jacobian, instant, link_stiffness, total_power
+from colloc.mechanics.balance import Moving, balance_jacobian, instant, link_stiffness, total_power
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.implicit_slopes import Load, implicit_changes
@@ -28,10 +28,10 @@ def chain_motion(
 
     Under a load the actuators' power is that of friction less the load's.
     """
-    library, at = native_kernel(body, friction), (angles, rates, delta, load, solved.anchor, solved.anchor_velocity)
+    library, moving = native_kernel(body, friction), Moving(body, friction, angles, rates, delta, load)
     if library is None:
-        return _named(_by_anchor(_values, (7,), body, friction, *at))
-    return _named(compiled_motion(library, body, friction, *at, with_slopes=False)[0])
+        return _named(_by_anchor(_values, (7,), moving, solved))
+    return _named(compiled_motion(library, moving, solved.anchor, solved.anchor_velocity, with_slopes=False)[0])
 
 
 def chain_slopes(
@@ -45,12 +45,12 @@ def chain_slopes(
 ) -> tuple[BalancedMotion, np.ndarray]:
     """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates); under a
     load two columns more, with respect to its components."""
-    library, at = native_kernel(body, friction), (angles, rates, delta, load, solved.anchor, solved.anchor_velocity)
+    library, moving = native_kernel(body, friction), Moving(body, friction, angles, rates, delta, load)
     if library is not None:
-        values, slopes = compiled_motion(library, body, friction, *at, with_slopes=True)
+        values, slopes = compiled_motion(library, moving, solved.anchor, solved.anchor_velocity, with_slopes=True)
         return _named(values), slopes
-    slopes = _by_anchor(_slopes, (6, 2 * body.n_joint + 2), body, friction, *at)
-    values = _by_anchor(_values, (7,), body, friction, *at)
+    slopes = _by_anchor(_slopes, (6, 2 * body.n_joint + 2), moving, solved)
+    values = _by_anchor(_values, (7,), moving, solved)
     return _named(values), slopes[:, : 2 * body.n_joint] if load is None else slopes
 
 
@@ -59,35 +59,21 @@ def _named(values: np.ndarray) -> BalancedMotion:
 
 
 def _by_anchor(
-    of_one: Callable[..., np.ndarray],
+    of_one: Callable[[Moving, np.ndarray, int, np.ndarray], np.ndarray],
     rows: tuple[int, ...],
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    load: np.ndarray | None,
-    anchor: np.ndarray,
-    anchor_velocity: np.ndarray,
+    moving: Moving,
+    solved: BalanceSolution,
 ) -> np.ndarray:
-    held = np.zeros((2, anchor.size)) if load is None else load
-    found = np.empty((*rows, anchor.size))
-    for link, at in groups(anchor):
-        moving = angles[:, at], rates[:, at], delta, held[:, at], link, anchor_velocity[:, at]
-        found[..., at] = of_one(body, friction, *moving)
+    """What a function says of instants with a common anchor: of them, their load, the anchor and its velocity."""
+    load = np.zeros((2, solved.anchor.size)) if moving.load is None else moving.load
+    found = np.empty((*rows, solved.anchor.size))
+    for link, at in groups(solved.anchor):
+        found[..., at] = of_one(moving.at(at), load[:, at], link, solved.anchor_velocity[:, at])
     return found
 
 
-def _values(
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    load: np.ndarray,
-    anchor: int,
-    z: np.ndarray,
-) -> np.ndarray:
+def _values(moving: Moving, load: np.ndarray, anchor: int, z: np.ndarray) -> np.ndarray:
+    body, friction, angles, rates, delta, _ = moving
     now = instant(body, friction, angles, rates, z, delta, anchor)
     (c, s, x, y), force, weight = now.posture, now.force, body.weight_column()
     fx = force.tangential * c - force.normal * s + weight * load[0]
@@ -103,16 +89,8 @@ def _values(
     return np.concatenate([tail, *centre, total_power(now.velocity, force), actuator[None]])
 
 
-def _slopes(
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    load: np.ndarray,
-    anchor: int,
-    z: np.ndarray,
-) -> np.ndarray:
+def _slopes(moving: Moving, load: np.ndarray, anchor: int, z: np.ndarray) -> np.ndarray:
+    body, friction, angles, rates, delta, _ = moving
     now = instant(body, friction, angles, rates, z, delta, anchor)
     n_joint, n_time = angles.shape
     behind = np.tril(np.ones((body.n_link, n_joint)), -1)

@@ -78,20 +78,13 @@ def tangent_of_minimum(first: Array, second: Array, share: Array, width: float =
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Two parts of a body that must not cross: the smaller of two functions of the shape must not be positive.
-
-    Attributes
-    ----------
-    name : str
-    pair : callable
-        Of shapes ``(n_joint, n_time)``, the two functions, ``(1, n_time)`` each; NumPy and CasADi.
-    width : float
-        Over which the minimum is smoothed.
-    """
+    """Two parts of a body that must not cross: the smaller of two functions of the shape must not be positive."""
 
     name: str
     pair: Callable[[Array], tuple[Array, Array]]
+    """Of shapes ``(n_joint, n_time)``, the two functions, ``(1, n_time)`` each; NumPy and CasADi."""
     width: float
+    """Over which the minimum is smoothed."""
 
     def excess(self, angles: Array) -> Array:
         """The smoothed minimum ``(1, n_time)``."""

@@ -88,22 +88,14 @@ MakeBatch = Callable[[np.ndarray, int], Batch]
 
 @dataclass(eq=False)
 class State:
-    """Current anchors, anchor velocities, residuals and step counts of all instants; updated in place.
+    """Current anchors, anchor velocities, residuals and step counts of all instants; updated in place."""
 
-    Attributes
-    ----------
-    anchor : (n_time,)
-    velocity : (3, n_time)
-    residual : (n_time,)
-        Largest of |net force| and |torque about the anchor| / body length, in units of the friction at unit speed (see
-        `force_unit`).
-    iterations : (n_time,)
-    """
-
-    anchor: np.ndarray
-    velocity: np.ndarray
+    anchor: np.ndarray  # (n_time,)
+    velocity: np.ndarray  # (3, n_time)
     residual: np.ndarray
-    iterations: np.ndarray
+    """Largest of |net force| and |torque about the anchor| / body length, in units of the friction at unit speed (see
+    `force_unit`), ``(n_time,)``."""
+    iterations: np.ndarray  # (n_time,)
 
 
 def starting_state(anchor: np.ndarray, velocity: np.ndarray) -> State:

@@ -1,13 +1,8 @@
 """Solver of the balance, batched over instants: tail velocities from shape and shape rates. No CasADi.
 
-An associated law (`colloc.mechanics.law`) is the gradient of a strictly convex, coercive dissipation potential, so
-Armijo-damped Newton on that potential converges from any start. Other laws have no potential; there Newton steps are taken
-while they reduce the residual. In both cases the paper's fixed point (which minimises a majorant of the potential: iteratively
-reweighted least squares) is the safeguard when a Newton step fails.
-
-Velocities are solved for at the midpoint of the slowest link, the *anchor*: a link at stick moves at speeds of order
-delta, which the tail velocity could only represent to 1e-16 in absolute terms. So forces stay accurate down to
-delta = 1e-14.
+The method is that of `colloc.mechanics.damped_newton`. Velocities are solved for at the midpoint of the slowest link, the
+*anchor*: a link at stick moves at speeds of order delta, which the tail velocity could only represent to 1e-16 in absolute
+terms. So forces stay accurate down to delta = 1e-14.
 
 The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.native_kernel`) takes the same ones.
 """
@@ -20,6 +15,7 @@ import numpy as np
 
 from colloc.mechanics.balance import (
     Instant,
+    Moving,
     balance_jacobian,
     dissipation_potential,
     instant,
@@ -33,17 +29,16 @@ from colloc.mechanics.damped_newton import METHODS, Evaluated, groups, relative_
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import compiled_balance, native_kernel
+from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 
 
 class _Batch:
-    """Instants that share a reference link: what an iteration evaluates on subsets of them."""
+    """Instants that share a reference link: what an iteration evaluates on subsets of them, at deltas that are given."""
 
-    def __init__(
-        self, body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, load: np.ndarray | None, reference: int | None
-    ) -> None:
-        self.body, self.friction, self.reference = body, friction, reference
-        self.angles, self.rates, self.load = angles, rates, load
+    def __init__(self, moving: Moving, reference: int | None) -> None:
+        self.body, self.friction, self.angles, self.rates, _, self.load = moving
+        self.reference = reference
 
     def at(self, select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> Instant:
         return instant(self.body, self.friction, self.angles[:, select], self.rates[:, select], z, delta, self.reference)
@@ -154,9 +149,7 @@ def solve_balance(
             f"angles and rates must both have shape (n_joint, n_time) = ({body.n_joint}, n), "
             f"not {angles.shape} and {rates.shape}."
         )
-    for name, value in (("delta", delta), ("tolerance", tolerance)):
-        if not (isinstance(value, (int, float, np.number)) and np.isfinite(value) and value > 0):
-            raise ProblemError(f"{name} must be a positive finite number, not {value!r}.")
+    check_finite(positive=True, delta=delta, tolerance=tolerance)
     if method not in METHODS:
         raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
     if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
@@ -173,16 +166,15 @@ def solve_balance(
     library = native_kernel(body, friction)
 
     solved = _numpy_balance if library is None else partial(compiled_balance, library)
-    found = solved(body, friction, angles, rates, float(delta), load, start, *settings)
+    moving = Moving(body, friction, angles, rates, float(delta), load)
+    found = solved(moving, start, *settings)
     for link in range(body.n_link if method == "auto" else 0):
         failed = np.flatnonzero(~(found[1] <= tolerance))
         if not failed.size:
             break
         # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
-        some, rates_there = angles[:, failed], rates[:, failed]
-        at_rest = body.tail_velocity(body.posture(some, link), rates_there, np.zeros((3, failed.size)), link)
-        held = None if load is None else load[:, failed]
-        again = solved(body, friction, some, rates_there, float(delta), held, at_rest, *settings)
+        there = moving.at(failed)
+        again = solved(there, there.with_link_at_rest(link), *settings)
         better = again[1] <= tolerance
         for old, new in zip(found, again, strict=True):
             old[..., failed[better]] = new[..., better]
@@ -191,18 +183,10 @@ def solve_balance(
 
 
 def _numpy_balance(
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    load: np.ndarray | None,
-    start: np.ndarray | None,
-    tolerance: float,
-    max_iterations: int,
-    method: str,
+    moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Arguments and results as those of `colloc.mechanics.native_kernel.compiled_balance`, which it is the reference of."""
+    body, friction, angles, rates, delta, load = moving
     n_time = angles.shape[1]
     # work in units of the largest rate, where the law is homogeneous once delta scales along
     speed = np.abs(rates).max(axis=0)
@@ -211,22 +195,20 @@ def _numpy_balance(
     speed[(speed == 0) | (friction.degree is None)] = 1.0
     if load is not None:
         load = load / speed ** (friction.degree or 0.0)
-    scaled_rates, scaled_delta = rates / speed, relative_delta(delta, speed)
+    scaled, scaled_delta = moving._replace(rates=rates / speed, load=load), relative_delta(delta, speed)
     anchor = np.full(n_time, body.n_link // 2)
     velocity = np.zeros((3, n_time))
     if start is not None:
-        tail = _Batch(body, friction, angles, scaled_rates, load, TAIL)
-        velocity = tail.rereferenced(start / speed, scaled_delta, anchor)
+        velocity = _Batch(scaled, TAIL).rereferenced(start / speed, scaled_delta, anchor)
     state = starting_state(anchor, velocity)
 
     def batch(members: np.ndarray, link: int) -> _Batch:
-        held = None if load is None else load[:, members]
-        return _Batch(body, friction, angles[:, members], scaled_rates[:, members], held, link)
+        return _Batch(scaled.at(members), link)
 
     solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
 
     tail_z = np.empty((3, n_time))
     for link, chosen in groups(state.anchor):
         posture = body.posture(angles[:, chosen], link)
-        tail_z[:, chosen] = body.tail_velocity(posture, scaled_rates[:, chosen], state.velocity[:, chosen], link)
+        tail_z[:, chosen] = body.tail_velocity(posture, scaled.rates[:, chosen], state.velocity[:, chosen], link)
     return tail_z * speed, state.residual, state.iterations, state.anchor, state.velocity * speed

@@ -8,6 +8,7 @@ choice keeps the relative precision of a link at rest, which the first loses by 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -40,54 +41,28 @@ class LinkVelocity(NamedTuple):
 
 @dataclass(frozen=True)
 class Links:
-    """Straight links joined end to end: their geometry. `colloc.mechanics.chain.Chain` is the body.
-
-    Parameters
-    ----------
-    lengths : tuple of float
-        Link lengths from tail to head; they add up to the body length, 1.
-    width : float
-        Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines.
-    weights : tuple of float
-        Of the links, in parts of the body's; by default the body is as heavy everywhere.
-    """
+    """Straight links joined end to end: their geometry. `colloc.mechanics.chain.Chain` is the body."""
 
     lengths: tuple[float, ...] = (1 / 3, 1 / 3, 1 / 3)
+    """Link lengths from tail to head; they add up to the body length, 1."""
     width: float = field(default=0.0, metadata=STATED_IF_SET)
+    """Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines."""
     weights: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
+    """Of the links, in parts of the body's; by default the body is as heavy everywhere."""
 
     def __post_init__(self) -> None:
-        try:
-            lengths = tuple(float(value) for value in self.lengths)
-        except (TypeError, ValueError):
-            raise ProblemError(f"body.lengths must be a sequence of numbers, not {self.lengths!r}.") from None
-        object.__setattr__(self, "lengths", lengths)
+        lengths, width = _numbers("lengths", self.lengths), self.width
         if len(lengths) < 2:
             raise ProblemError("body.lengths needs at least two links.")
-        if not all(np.isfinite(lengths)) or min(lengths) <= 0:
-            raise ProblemError(f"body.lengths must be positive and finite, not {lengths}.")
-        if abs(sum(lengths) - 1.0) > 1e-12:
-            raise ProblemError(f"body.lengths must add up to the body length 1, not {sum(lengths):.12g}.")
-        width = self.width
+        _check_parts("lengths", lengths, "the body length")
         if not (is_number(width) and 0 <= width < min(lengths)):
             raise ProblemError(f"body.width must be a number from 0 to below the shortest link, not {width!r}.")
-        object.__setattr__(self, "width", float(width))
-        object.__setattr__(self, "weights", self._checked_weights())
-
-    def _checked_weights(self) -> tuple[float, ...]:
-        try:
-            weights = tuple(float(value) for value in self.weights)
-        except (TypeError, ValueError):
-            raise ProblemError(f"body.weights must be a sequence of numbers, not {self.weights!r}.") from None
-        if not weights:
-            return ()
-        if len(weights) != self.n_link:
-            raise ProblemError(f"body.weights has {len(weights)} values; give one for each of the {self.n_link} links.")
-        if not all(np.isfinite(weights)) or min(weights) <= 0:
-            raise ProblemError(f"body.weights must be positive and finite, not {weights}.")
-        if abs(sum(weights) - 1.0) > 1e-12:
-            raise ProblemError(f"body.weights must add up to the body's weight 1, not {sum(weights):.12g}.")
-        return weights
+        if weights := _numbers("weights", self.weights):
+            if len(weights) != len(lengths):
+                raise ProblemError(f"body.weights has {len(weights)} values; give one for each of the {len(lengths)} links.")
+            _check_parts("weights", weights, "the body's weight")
+        for name, value in (("lengths", lengths), ("width", float(width)), ("weights", weights)):
+            object.__setattr__(self, name, value)
 
     @property
     def in_series(self) -> bool:
@@ -187,3 +162,17 @@ class Links:
             np.concatenate([start, np.cumsum(length * np.cos(phi), axis=0)]),
             np.concatenate([start, np.cumsum(length * np.sin(phi), axis=0)]),
         )
+
+
+def _numbers(name: str, values: Iterable) -> tuple[float, ...]:
+    try:
+        return tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        raise ProblemError(f"body.{name} must be a sequence of numbers, not {values!r}.") from None
+
+
+def _check_parts(name: str, parts: tuple[float, ...], whole: str) -> None:
+    if not all(np.isfinite(parts)) or min(parts) <= 0:
+        raise ProblemError(f"body.{name} must be positive and finite, not {parts}.")
+    if abs(sum(parts) - 1.0) > 1e-12:
+        raise ProblemError(f"body.{name} must add up to {whole} 1, not {sum(parts):.12g}.")

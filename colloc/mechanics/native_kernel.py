@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.mechanics.balance import Moving
 from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
@@ -97,13 +98,8 @@ def _call(function: Callable[..., int], body: Links, friction: Law, n_time: int,
 
 
 def _each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
-    """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large.
-
-    Raises
-    ------
-    MemoryError
-        If a call returns anything but 0.
-    """
+    """Call ``treat(first, last)`` for all of a batch, in pieces, on several threads if it is large. `MemoryError` if a call
+    returns anything but 0."""
     starts = range(0, n_time, _PIECE)
     ends = [min(first + _PIECE, n_time) for first in starts]
     workers = min(available_threads(), len(ends)) if len(ends) > 1 else 1
@@ -117,46 +113,28 @@ def _each_piece(n_time: int, treat: Callable[[int, int], int]) -> None:
 
 
 def compiled_balance(
-    library: ctypes.CDLL,
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    load: np.ndarray | None,
-    start: np.ndarray | None,
-    tolerance: float,
-    max_iterations: int,
-    method: str,
+    library: ctypes.CDLL, moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3, n_time)``."""
-    n_time = angles.shape[1]
-    angles, rates = np.ascontiguousarray(angles), np.ascontiguousarray(rates)
-    load, start = (None if a is None else np.ascontiguousarray(a) for a in (load, start))
+    n_time = moving.angles.shape[1]
+    angles, rates = np.ascontiguousarray(moving.angles), np.ascontiguousarray(moving.rates)
+    load, start = (None if a is None else np.ascontiguousarray(a) for a in (moving.load, start))
     z, anchor_velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
     iterations, anchor = np.empty(n_time, dtype=np.int64), np.empty(n_time, dtype=np.int64)
     found = z, residual, iterations, anchor, anchor_velocity
     before, after = map(address, (angles, rates)), map(address, (load, start))
     how = tolerance, max_iterations, METHODS.index(method)
-    _call(library.colloc_balance, body, friction, n_time, *before, delta, *after, *how, *map(address, found))
+    function, delta = library.colloc_balance, moving.delta
+    _call(function, moving.body, moving.friction, n_time, *before, delta, *after, *how, *map(address, found))
     return found
 
 
 def compiled_motion(
-    library: ctypes.CDLL,
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    load: np.ndarray | None,
-    anchor: np.ndarray,
-    anchor_velocity: np.ndarray,
-    *,
-    with_slopes: bool,
+    library: ctypes.CDLL, moving: Moving, anchor: np.ndarray, anchor_velocity: np.ndarray, *, with_slopes: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """What `colloc.mechanics.chain_motion` speaks of: values ``(7, n_time)``, and derivatives ``(6, n, n_time)`` if asked
     for."""
+    body, friction, angles, rates, delta, load = moving
     n_time = angles.shape[1]
     angles, rates, anchor_velocity = (np.ascontiguousarray(a, dtype=float) for a in (angles, rates, anchor_velocity))
     load = None if load is None else np.ascontiguousarray(load, dtype=float)

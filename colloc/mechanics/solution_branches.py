@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.mechanics.balance import balance_jacobian, instant
+from colloc.mechanics.balance import Moving, balance_jacobian, instant
 from colloc.mechanics.balance_results import BalanceSolution, Branches
 from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import Links
+from colloc.mechanics.links import TAIL, Links
 
 DISTINCT = 1e-5
 """Velocities that differ by less, in units of the largest rate, are one."""
@@ -61,22 +61,21 @@ def all_balanced_velocities(
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
     (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """
-    at = (body, friction, angles, rates, delta, load)
+    moving = Moving(body, friction, angles, rates, delta, load)
     if friction.associated:
-        return Branches(*_solved(*at, np.zeros((1, 3, angles.shape[1]))))
+        return Branches(*_solved(moving, np.zeros((1, 3, angles.shape[1]))))
     middle = body.n_link // 2
     order = (middle, *(link for link in range(body.n_link) if link != middle))
-    z, sign = _solved(*at, np.stack([_with_link_at_rest(body, angles, rates, link) for link in order]))
+    z, sign = _solved(moving, np.stack([moving.with_link_at_rest(link) for link in order]))
     found = _distinct(z, sign, _speed(rates))
     doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
     if not doubtful.size:
         return found
     # where a branch has just ended the solver may hang with a small residual; the solution then lies beside
-    part = (body, friction, angles[:, doubtful], rates[:, doubtful], delta, None if load is None else load[:, doubtful])
-    known = Branches(z[:, :, doubtful], sign[:, doubtful])
-    more = _solved(*part, _between_and_beside(*part, known.z))
+    part, known = moving.at(doubtful), Branches(z[:, :, doubtful], sign[:, doubtful])
+    more = _solved(part, _between_and_beside(part, known.z))
     z, sign = (np.concatenate(pair) for pair in zip(known, more, strict=True))
-    return _merged(found, doubtful, _distinct(z, sign, _speed(part[3])))
+    return _merged(found, doubtful, _distinct(z, sign, _speed(part.rates)))
 
 
 def _speed(rates: np.ndarray) -> np.ndarray:
@@ -84,53 +83,37 @@ def _speed(rates: np.ndarray) -> np.ndarray:
     return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
 
 
-def _with_link_at_rest(body: Links, angles: np.ndarray, rates: np.ndarray, link: int) -> np.ndarray:
-    """Tail velocity ``(3, n_time)`` of the body when one of its links does not move."""
-    return body.tail_velocity(body.posture(angles, link), rates, np.zeros((3, angles.shape[1])), link)
-
-
-def _solved(
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    load: np.ndarray | None,
-    starts: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+def _solved(moving: Moving, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where that is no solution."""
-    count = starts.shape[0]
-    angles, rates, load = np.tile(angles, count), np.tile(rates, count), None if load is None else np.tile(load, count)
-    start = np.concatenate(list(starts), axis=1)
-    at = (body, friction, angles, rates, delta)
+    count, n_time = starts.shape[0], starts.shape[2]
+    body, friction, angles, rates, delta, load = tiled = moving.at(np.tile(np.arange(n_time), count))
+    at, start = (body, friction, angles, rates, delta), np.concatenate(list(starts), axis=1)
     solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
-    accepted = solved.residual <= _ACCEPTED
-    sign = np.where(accepted, np.sign(_determinant(*at, solved)), 0.0)
+    sign = np.where(solved.residual <= _ACCEPTED, np.sign(_determinant(tiled, solved)), 0.0)
     return np.stack(np.split(solved.z, count, axis=1)), sign.reshape(count, -1)
 
 
-def _determinant(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, solved: BalanceSolution
-) -> np.ndarray:
+def _determinant(moving: Moving, solved: BalanceSolution) -> np.ndarray:
     """Of `balance_jacobian`, ``(n_time,)``; the reference does not matter, but the slowest link loses no digits."""
     result = np.empty(solved.anchor.size)
     for link, chosen in groups(solved.anchor):
-        now = instant(body, friction, angles[:, chosen], rates[:, chosen], solved.anchor_velocity[:, chosen], delta, link)
-        everywhere = np.full((1, chosen.size), delta)
-        result[chosen] = np.linalg.det(balance_jacobian(body, friction, now.posture, now.velocity, everywhere))
+        result[chosen] = np.linalg.det(_jacobian(moving.at(chosen), solved.anchor_velocity[:, chosen], link))
     return result
 
 
-def _between_and_beside(
-    body: Links, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, load: np.ndarray | None, z: np.ndarray
-) -> np.ndarray:
+def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np.ndarray:
+    """`balance_jacobian` at velocities z of a reference."""
+    body, friction, angles, rates, delta, _ = moving
+    now = instant(body, friction, angles, rates, z, delta, reference)
+    return balance_jacobian(body, friction, now.posture, now.velocity, np.full((1, z.shape[1]), delta))
+
+
+def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
     """Starts ``(n_start, 3, n_time)``: on the way between some velocities, and along the softest direction of each."""
     starts = [z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN]
-    everywhere = np.full((1, angles.shape[1]), delta)
     for root in z:
-        now = instant(body, friction, angles, rates, root, delta)
-        softest = np.linalg.svd(balance_jacobian(body, friction, now.posture, now.velocity, everywhere))[2][:, 2].T
-        starts += [root + size * _speed(rates) * softest for size in _BESIDE]
+        softest = np.linalg.svd(_jacobian(moving, root))[2][:, 2].T
+        starts += [root + size * _speed(moving.rates) * softest for size in _BESIDE]
     return np.stack(starts)
 
 

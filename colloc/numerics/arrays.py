@@ -17,16 +17,13 @@ Array = Any
 """A NumPy array or a CasADi SX/MX/DM matrix."""
 
 
+_SAME = ("sin", "cos", "sqrt", "log", "exp", "tanh", "sinh", "cosh")
+"""What NumPy and CasADi call alike."""
+
+
 def _numpy_namespace() -> SimpleNamespace:
     return SimpleNamespace(
-        sin=np.sin,
-        cos=np.cos,
-        sqrt=np.sqrt,
-        log=np.log,
-        exp=np.exp,
-        tanh=np.tanh,
-        sinh=np.sinh,
-        cosh=np.cosh,
+        **{name: getattr(np, name) for name in _SAME},
         arcsinh=np.arcsinh,
         where=np.where,
         abs=np.abs,
@@ -39,14 +36,7 @@ def _numpy_namespace() -> SimpleNamespace:
 
 def _casadi_namespace(casadi: ModuleType) -> SimpleNamespace:
     return SimpleNamespace(
-        sin=casadi.sin,
-        cos=casadi.cos,
-        sqrt=casadi.sqrt,
-        log=casadi.log,
-        exp=casadi.exp,
-        tanh=casadi.tanh,
-        sinh=casadi.sinh,
-        cosh=casadi.cosh,
+        **{name: getattr(casadi, name) for name in _SAME},
         arcsinh=casadi.asinh,
         where=casadi.if_else,
         abs=casadi.fabs,

@@ -47,16 +47,8 @@ class ColumnFunction:
 
 
 class ChosenRows:
-    """Some of the constraint rows of an assembly, with its instance parameters as they are now.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        Without implicit blocks.
-    kept : (n_row,) int
-    parameters : list of (n_given, n_instance)
-        Of every block.
-    """
+    """The rows `kept` of an assembly without implicit blocks, with the instance parameters ``(n_given, n_instance)`` of every
+    block as they are now."""
 
     def __init__(self, assembly: Assembly, kept: np.ndarray, parameters: list[np.ndarray]) -> None:
         self._linear, blocks = assembly.linear[kept], []

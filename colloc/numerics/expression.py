@@ -122,19 +122,12 @@ class _Floats(ast.NodeTransformer):
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """A formula that was read.
-
-    Attributes
-    ----------
-    text : str
-        As Python writes it.
-    names : frozenset of str
-        Variables and functions that it speaks of.
-    code : CodeType
-    """
+    """A formula that was read."""
 
     text: str
+    """As Python writes it."""
     names: frozenset[str]
+    """Variables and functions that it speaks of."""
     code: CodeType
 
     def __call__(self, at: Mapping[str, Array]) -> Array:
@@ -153,12 +146,7 @@ class Formula:
 @lru_cache(maxsize=64)
 def formula(text: str, variables: tuple[str, ...]) -> Formula:
     """A formula of some variables, ready to be evaluated. Objects that hold one keep its text: code cannot be pickled.
-
-    Raises
-    ------
-    ProblemError
-        If it is no formula, or speaks of anything but the variables, numbers and `FUNCTIONS`.
-    """
+    `ProblemError` if it is no formula, or speaks of anything but the variables, numbers and `FUNCTIONS`."""
     if not isinstance(text, str):
         raise ProblemError(f"a formula must be text, not {text!r}.")
     if len(text) > _LONGEST:

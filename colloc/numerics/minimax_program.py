@@ -31,20 +31,8 @@ class Minimax(NamedTuple):
 
 
 def smallest_maximum(rows: sparse.csr_matrix, constants: np.ndarray, penalty: sparse.spmatrix) -> Minimax:
-    """Minimise ``max_i (rows x + constants)_i + x.penalty.x / 2``.
-
-    Parameters
-    ----------
-    rows : (m, n) sparse
-    constants : (m,)
-    penalty : (n, n) sparse
-        Symmetric, positive semidefinite.
-
-    Raises
-    ------
-    NotConvergedError
-        If the solver reports neither an optimum nor nearly one.
-    """
+    """Minimise ``max_i (rows x + constants)_i + x.penalty.x / 2``, with sparse rows ``(m, n)`` and a symmetric, positive
+    semidefinite penalty ``(n, n)``. `NotConvergedError` if the solver reports neither an optimum nor nearly one."""
     m, n = rows.shape
     left = sparse.hstack([rows, -np.ones((m, 1))], format="csc")
     quadratic = sparse.block_diag([penalty + _TINY * sparse.eye(n), sparse.csc_matrix((1, 1))])

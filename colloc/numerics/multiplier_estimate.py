@@ -22,15 +22,8 @@ def quasi_definite_factors(jacobian: sparse.csr_matrix) -> SuperLU:
 
 
 def estimated_multipliers(jacobian: sparse.csr_matrix, gradient: np.ndarray) -> np.ndarray:
-    """The multipliers ``(m,)`` that minimise ``|gradient + J' multipliers|``.
-
-    Parameters
-    ----------
-    jacobian : sparse (m, n)
-        Of the equations.
-    gradient : (n,)
-        Of the objective.
-    """
+    """The multipliers ``(m,)`` that minimise ``|gradient + J' multipliers|``, J being the Jacobian ``(m, n)`` of the equations
+    and the gradient ``(n,)`` that of the objective."""
     m, n = jacobian.shape
     factors = quasi_definite_factors(jacobian)
     solution = factors.solve(np.concatenate([-gradient, np.zeros(m)]))

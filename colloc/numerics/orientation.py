@@ -13,14 +13,8 @@ from colloc.numerics.mesh import Mesh
 
 
 class Orientation:
-    """The equation on a mesh whose neighbours share no stage; arrays are ``(n_point,)``, in order of the stages.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    unit : float
-        Rates are those per time divided by it.
-    """
+    """The equation on a mesh whose neighbours share no stage, for rates per time divided by `unit`; arrays are ``(n_point,)``,
+    in order of the stages."""
 
     def __init__(self, mesh: Mesh, unit: float = 1.0) -> None:
         self._shape = mesh.n, mesh.scheme.s

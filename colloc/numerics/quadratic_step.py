@@ -39,19 +39,8 @@ def quadratic_step(
 ) -> QuadraticStep | None:
     """The minimum of the quadratic model; where the rows contradict each other, their violations are removed in part.
 
-    Parameters
-    ----------
-    b : (n, n)
-        Positive definite.
-    gradient : (n,)
-    slopes : (m, n)
-    row_low, row_high : (m,)
-    low, high : (n,)
-
-    Returns
-    -------
-    QuadraticStep or None
-        None if there is no step, or no finite model.
+    b ``(n, n)`` is positive definite, the slopes ``(m, n)`` are those of the rows. None if there is no step, or no finite
+    model.
     """
     if not (np.isfinite(gradient).all() and np.isfinite(slopes).all() and np.isfinite(b).all()):
         return None

@@ -20,24 +20,15 @@ _LARGEST = 12
 
 @dataclass(frozen=True, eq=False)
 class Scheme:
-    """A collocation scheme.
-
-    Attributes
-    ----------
-    name : str
-    c : (s,)
-        Nodes in [0, 1], ascending.
-    A : (s, s)
-    b : (s,)
-    order : int
-        Order of the end-point values for a smooth problem.
-    """
+    """A collocation scheme."""
 
     name: str
     c: np.ndarray
+    """Nodes in [0, 1], ascending, ``(s,)``."""
     order: int
-    A: np.ndarray = field(init=False)
-    b: np.ndarray = field(init=False)
+    """Order of the end-point values for a smooth problem."""
+    A: np.ndarray = field(init=False)  # (s, s)
+    b: np.ndarray = field(init=False)  # (s,)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "A", self.integrals(self.c))
@@ -99,13 +90,8 @@ def _radau_nodes(s: int) -> np.ndarray:
 
 
 def scheme(name: str) -> Scheme:
-    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes.
-
-    Raises
-    ------
-    ProblemError
-        For any other name.
-    """
+    """The scheme called `name`: "trapezoid", "hermite-simpson", "gauss-N" or "radau-N" with N nodes. `ProblemError` for any
+    other name."""
     known = _known(name) if isinstance(name, str) else None
     if known is None:
         raise ProblemError(

@@ -21,23 +21,15 @@ DEGREE = 3
 
 @dataclass(frozen=True)
 class TensorSpline:
-    """The space of tensor-product cubic splines on the cube |angle| <= limit.
-
-    Parameters
-    ----------
-    n_joint : int
-    limit : float
-        Half-width of the cube [rad].
-    intervals : int
-        Knot intervals a joint.
-    graded : tuple of float
-        The ``intervals - 1`` inner knots, ascending and symmetric about 0; evenly spaced if empty.
-    """
+    """The space of tensor-product cubic splines on the cube |angle| <= limit."""
 
     n_joint: int
     limit: float
+    """Half-width of the cube [rad]."""
     intervals: int
+    """Knot intervals a joint."""
     graded: tuple[float, ...] = ()
+    """The ``intervals - 1`` inner knots, ascending and symmetric about 0; evenly spaced if empty."""
 
     def __post_init__(self) -> None:
         if self.intervals < 1 or self.n_joint < 1 or not self.limit > 0:
@@ -90,14 +82,8 @@ class TensorSpline:
         return np.clip(np.searchsorted(self.knots, angle, side="right") - 1, 0, self.intervals - 1)
 
     def matrix(self, angles: np.ndarray, orders: tuple[int, ...] | None = None) -> sparse.csr_matrix:
-        """Values of all functions, or of their partial derivatives of the given orders, ``(n, size)``.
-
-        Parameters
-        ----------
-        angles : (n_joint, n)
-        orders : tuple of int, optional
-            Order of the derivative with respect to each joint angle; zero by default.
-        """
+        """Values of all functions at angles ``(n_joint, n)``, or of their partial derivatives of the given orders in every
+        joint angle, ``(n, size)``."""
         n = angles.shape[1]
         column = np.zeros((1, n), dtype=int)
         value = np.ones((1, n))

@@ -56,25 +56,17 @@ class NonlinearProgram(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Stationarity:
-    """First-order conditions at a point, by the multipliers that come closest to them.
-
-    Attributes
-    ----------
-    kkt_error : float
-        Largest component of the Lagrangian's gradient.
-    violation : float
-        Largest violation of a row or bound.
-    complementarity : float
-        Largest product of a multiplier and its slack.
-    on_rows, on_bounds : array
-        Multipliers, positive at upper bounds.
-    """
+    """First-order conditions at a point, by the multipliers that come closest to them."""
 
     kkt_error: float
+    """Largest component of the Lagrangian's gradient."""
     violation: float
+    """Largest violation of a row or bound."""
     complementarity: float
+    """Largest product of a multiplier and its slack."""
     on_rows: np.ndarray
     on_bounds: np.ndarray
+    """Multipliers of rows and bounds, positive at upper ones."""
 
 
 def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -108,25 +100,16 @@ def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
 
 @dataclass(frozen=True, eq=False)
 class SqpResult:
-    """Where SQP ended.
+    """Where SQP ended."""
 
-    Attributes
-    ----------
-    v : (n,)
-    objective : float
-    iterations, evaluations : int
-    on_edge : bool
-        Whether v lies on the edge of the box round the start.
-    curvature : (n, n)
-        What is known of the Lagrangian's second derivatives.
-    """
-
-    v: np.ndarray
+    v: np.ndarray  # (n,)
     objective: float
     iterations: int
     evaluations: int
     on_edge: bool
+    """Whether v lies on the edge of the box round the start."""
     curvature: np.ndarray
+    """What is known of the Lagrangian's second derivatives, ``(n, n)``."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,26 +14,10 @@ from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
 
-_ARROW = 0.12
-"""Length [body lengths] of the arrow of the largest friction."""
-
 
 def pictures(solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900) -> Iterator[np.ndarray]:
-    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes.
-
-    Parameters
-    ----------
-    solution : Solution
-        With at least one level.
-    count : int
-        Pictures a period.
-    periods : int
-        Fewer are shown where the body turns, since then its path is no straight line.
-    arrows : bool
-        Draw friction.
-    width : int
-        Pixels, even.
-    """
+    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes, of an even width [pixels].
+    Where the body turns fewer periods are shown, since then its path is no straight line; with arrows friction is drawn."""
     shown = frames(solution, count + 1, periods=periods)
     with styled():
         scene = _Scene(solution, shown, arrows, width)
@@ -46,7 +30,7 @@ class _Scene:
 
     def __init__(self, solution: Solution, shown: Frames, arrows: bool, width: int) -> None:
         self.shown, self.hinges = shown, solution.problem.body.hinges
-        low, high = _window(shown)
+        low, high = shown.window
         planar = solution.problem.gait.free and solution.problem.body.n_joint >= 2
         share = 0.68 if planar else 0.97
         span = high - low
@@ -93,7 +77,6 @@ class _Scene:
                 headlength=5,
                 zorder=4,
             )
-            self.scale = _ARROW / max(float(np.hypot(*shown.arrow).max()), 1e-300)
         self.dot = None
         if planar:
             plane = figure.add_axes((0.755, 0.2, 0.235, 0.62))
@@ -113,18 +96,12 @@ class _Scene:
             line.set_data(*np.concatenate([*whole, path[:, : k + 1] + shift[:, None]], axis=1))
         if self.quiver is not None:
             self.quiver.set_offsets((shown.arrow_base[:, :, k] + shift[:, None]).T)
-            self.quiver.set_UVC(*(self.scale * shown.arrow[:, :, k]))
+            self.quiver.set_UVC(*(shown.arrow_scale * shown.arrow[:, :, k]))
         if self.dot is not None:
             self.dot.set_data(shown.angles[:1, k], shown.angles[1:2, k])
         self.phase.set_text(f"t = {period + shown.t[k]:.2f}")
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[: self.size[0], : self.size[1], :3].copy()
-
-
-def _window(shown: Frames) -> tuple[np.ndarray, np.ndarray]:
-    last = (shown.periods - 1) * shown.step[:, None]
-    reach = np.concatenate([shown.ends.reshape(2, -1), shown.ends.reshape(2, -1) + last], axis=1)
-    return reach.min(axis=1) - _ARROW, reach.max(axis=1) + _ARROW
 
 
 def _grid(low: float, high: float) -> np.ndarray:

@@ -12,12 +12,7 @@ _PHASES = np.linspace(0.0, 1.0, 1001)
 
 
 def front_figure(front: ParetoFront) -> Figure:
-    """Left the front, right the paths of its gaits in the plane of the first two joints, in the same colours.
-
-    Parameters
-    ----------
-    front : ParetoFront
-    """
+    """Left the front, right the paths of its gaits in the plane of the first two joints, in the same colours."""
     first, second = front.objectives
     values, colours = front.values, snapshot_colours(len(front.points))
     planar = front.problem.body.n_joint > 1

@@ -10,38 +10,41 @@ from colloc.mechanics.bodies import ARROWS, Body
 from colloc.results.motion import turned
 from colloc.results.solution import Solution
 
+_ARROW = 0.12
+"""Length [body lengths] of the arrow of the largest friction."""
 _STRAIGHT = 1e-2
 """A body that turns by less a period [rad] is shown over several periods, one after the other along a straight line."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """One period of a motion, from phase 0 to 1, both included.
+    """One period of a motion, from phase 0 to 1, both included."""
 
-    Attributes
-    ----------
-    t : (n_time,)
-    angles : (n_joint, n_time)
-    ends : (2, n_point, n_time)
-        Lab positions of the body's outline (the ends of links), tail first.
-    centre : (2, n_time)
-        Of mass.
-    arrow_base, arrow : (2, n_arrow, n_time)
-        Where friction is shown, and the force per length there, in lab axes.
-    step : (2,)
-        What a period adds to every position.
-    periods : int
-        How many periods can be shown in a row.
-    """
-
-    t: np.ndarray
-    angles: np.ndarray
+    t: np.ndarray  # (n_time,)
+    angles: np.ndarray  # (n_joint, n_time)
     ends: np.ndarray
+    """Lab positions of the body's outline (the ends of links), tail first, ``(2, n_point, n_time)``."""
     centre: np.ndarray
+    """Of mass, ``(2, n_time)``."""
     arrow_base: np.ndarray
     arrow: np.ndarray
+    """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow, n_time)`` each."""
     step: np.ndarray
+    """What a period adds to every position, ``(2,)``."""
     periods: int
+    """How many periods can be shown in a row."""
+
+    @property
+    def window(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners ``(2,)``, low and high, of what all periods need with their arrows."""
+        ends = self.ends.reshape(2, -1)
+        reach = np.concatenate([ends, ends + (self.periods - 1) * self.step[:, None]], axis=1)
+        return reach.min(axis=1) - _ARROW, reach.max(axis=1) + _ARROW
+
+    @property
+    def arrow_scale(self) -> float:
+        """Length of an arrow [body lengths] over the force."""
+        return _ARROW / max(float(np.hypot(*self.arrow).max()), 1e-300)
 
 
 def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
@@ -50,19 +53,8 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
 
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
-    """Sample a solution's motion and the friction that acts on it.
-
-    Parameters
-    ----------
-    solution : Solution
-        With at least one level.
-    count : int
-        Instants, both ends of the period included.
-    arrows : int
-        Along the body, about.
-    periods : int
-        How many periods to show where the body does not turn.
-    """
+    """Sample a solution's motion at `count` instants, both ends of the period included, and the friction that acts on it at
+    about so many arrows along the body. `periods` are shown where the body does not turn."""
     problem = solution.problem
     body, delta = problem.body, solution.delta_per_period
     motion = solution.sample(np.linspace(0.0, 1.0, count))

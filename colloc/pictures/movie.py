@@ -41,13 +41,7 @@ def _ffmpeg() -> str:
 
 
 def write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
-    """Write pictures as H.264 video through ffmpeg.
-
-    Raises
-    ------
-    ProblemError
-        If ffmpeg is not installed, or fails.
-    """
+    """Write pictures as H.264 video through ffmpeg. `ProblemError` if ffmpeg is not installed, or fails."""
     ffmpeg = _ffmpeg()
     first = next(pictures)
     size = f"{first.shape[1]}x{first.shape[0]}"

@@ -72,17 +72,8 @@ def environment() -> Environment:
 
 
 def report_page(solution: Solution, reference: Reference | None = None, gap: str = "") -> str:
-    """The page as a string.
-
-    Parameters
-    ----------
-    solution : Solution
-        Also one that failed; what does not exist is left out.
-    reference : Reference, optional
-        The value to hold the result against.
-    gap : str
-        A sentence about the upper bound.
-    """
+    """The page as a string, also of a solution that failed: what does not exist is left out. The reference is the value to hold
+    the result against, `gap` a sentence about the upper bound."""
     found: dict[str, Any] = {"gait_pictures": [], "convergence_pictures": [], "motion": None, "errors": None}
     if solution.levels:
         errors = mesh_errors(solution)
@@ -92,7 +83,9 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
         body = solution.problem.body
         captions = {"angles": f"{body.quantity}s", "speeds": "speeds along the body; what is near δ sticks"}
         captions["power"] = "power against friction; ticks: mesh"
-        found["gait_pictures"] = [_plane(drawn[name], body.coordinate, j) for j, name in enumerate(planes)]
+        found["gait_pictures"] = [
+            _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1)) for j, name in enumerate(planes)
+        ]
         found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
         if solution.relaxed is not None:
             mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
@@ -163,10 +156,6 @@ def _commands(solution: Solution) -> str:
     )
 
 
-def _plane(panel: Panel, coordinate: str, j: int) -> Drawn:
-    return _picture(panel, f"{coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1))
-
-
 def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, has_phase: bool = False) -> Drawn:
     """The panel as SVG that takes its text colour and font from the page; nothing in it comes from a file but numbers."""
     text, figure = StringIO(), panel.figure()
@@ -189,10 +178,7 @@ def _picture(panel: Panel, caption: str, joints: tuple[int, int] | None = None, 
 
 def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     """What report.js draws: rows over time, the window that holds all of it, the length of the arrows."""
-    last = (shown.periods - 1) * shown.step
-    reach = np.concatenate([shown.ends.reshape(2, -1), shown.ends.reshape(2, -1) + last[:, None]], axis=1)
-    low, high = reach.min(axis=1) - 0.12, reach.max(axis=1) + 0.12
-    strongest = max(float(np.hypot(*shown.arrow).max()), 1e-300)
+    low, high = shown.window
     grid = next(step for step in (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9) if (high - low).max() / step < 16)
     rows = {
         "t": shown.t, "angles": shown.angles, "x": shown.ends[0], "y": shown.ends[1], "centre": shown.centre,
@@ -202,7 +188,7 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
         "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
-        "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": 0.12 / strongest,
+        "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": shown.arrow_scale,
         "grid": grid,
         "shape": float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 1.2, 4.0)),
     }  # fmt: skip

@@ -28,13 +28,7 @@ def _function(body: Body, friction: Law, limits: ActuatorLimits | None) -> ca.Fu
 
 
 def _evaluated(
-    body: Body,
-    friction: Law,
-    limits: ActuatorLimits | None,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    z: np.ndarray,
-    delta: float,
+    body: Body, friction: Law, limits: ActuatorLimits | None, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
 ) -> tuple[np.ndarray, np.ndarray]:
     done, slope = _function(body, friction, limits)(np.concatenate([angles, rates]), z, delta)
     return done.full(), slope.full().reshape(-1, 2 * len(angles), angles.shape[1])

@@ -17,18 +17,11 @@ from colloc.numerics.mesh import Mesh
 
 
 class HarmonicSpace:
-    """Members of a class of harmonics by their parameters v, in which angles and rates are linear.
+    """Members of a class of harmonics by their parameters v, in which angles and rates are linear, on a mesh (by default the
+    problem's first), with pairs of links `far` apart that are kept from crossing; what it answers is
+    told by `colloc.reduced.program.SearchSpace`.
 
     Rows: shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed.
-
-    Parameters
-    ----------
-    problem : Problem
-    edges : (n_interval + 1,), optional
-        Of the mesh; uniform by default.
-    scheme : str, optional
-        By default the problem's.
-    far : pairs of links more than two apart that are kept from crossing.
     """
 
     knots: np.ndarray | None = None
@@ -51,7 +44,6 @@ class HarmonicSpace:
         self.move_checks(np.zeros(self.n))
 
     def member(self, v: np.ndarray) -> Fourier:
-        """The gait of parameters v."""
         return self.problem.gait.fourier(v, self.problem.body.n_joint)
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
@@ -61,7 +53,6 @@ class HarmonicSpace:
     laid = parameters
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        """The parameters as the full program has them."""
         return v
 
     def phase_mesh(self, gait: Fourier) -> Mesh:
@@ -73,17 +64,14 @@ class HarmonicSpace:
         return type(self)(self.problem, edges, scheme, self.far)
 
     def with_far(self, far: Pairs) -> HarmonicSpace:
-        """The class with other pairs of links kept apart."""
         return type(self)(self.problem, self.mesh.edges, self.mesh.scheme.name, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
-        y = (self._matrix @ v).T
-        angles, rates = np.split(y, 2)
+        angles, rates = np.split((self._matrix @ v).T, 2)
         return angles, rates, self._pace
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """See `colloc.reduced.motion.Shapes`."""
         return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
@@ -110,7 +98,6 @@ class HarmonicSpace:
         return None
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        """Values of the rows."""
         values = [self._value(v, *placed) for placed in self._placed]
         return np.concatenate([*values, [v @ self._square @ v]])
 
@@ -127,5 +114,4 @@ class HarmonicSpace:
         return np.einsum("jt,tjp->tp", check.slope((matrix @ v).T, shares[None]).full(), matrix)
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        """Derivatives of the rows, ``(n_row, n)``."""
         return np.vstack([*(self._slope(v, *placed) for placed in self._placed), 2 * self._square @ v])

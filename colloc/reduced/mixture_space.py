@@ -78,7 +78,6 @@ class MixtureSpace:
         return durations, raw, raw / np.linalg.norm(raw, axis=2, keepdims=True)
 
     def member(self, v: np.ndarray) -> Mixture:
-        """The gait of parameters v."""
         durations, _, directions = self._split(v)
         return Mixture(np.maximum(durations, 0.0), directions, v[: self.n_joint], self.problem.gait.symmetry)
 
@@ -123,7 +122,6 @@ class MixtureSpace:
         return MixtureSpace(self.problem.with_(scheme=scheme), edges.size - 1, self.far)
 
     def with_far(self, far: Pairs) -> MixtureSpace:
-        """The class with other pairs of links kept apart."""
         return MixtureSpace(self.problem, self.pieces, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -135,7 +133,6 @@ class MixtureSpace:
         return np.tile(angles, self.n_direction), rates, durations[self._piece].T.ravel()
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """See `colloc.reduced.motion.Shapes`."""
         durations, raw, directions = self._split(v)
         on = on_shape.reshape(len(on_shape), self.n_direction, self.mesh.n_point, -1)
         on_angles = on[..., : self.n_joint].sum(axis=1)
@@ -199,7 +196,6 @@ class MixtureSpace:
         return None
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        """Values of the rows."""
         shapes = self.member(v).shapes
         values = [
             check.along(shapes @ self._watch[at].T) for check, at in zip(self._checks, self._placed, strict=True) if at.size
@@ -207,7 +203,6 @@ class MixtureSpace:
         return np.concatenate([self._first @ shapes[:, 0] + self._last @ shapes[:, -1], *values, [v[self.time].sum()]])
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        """Derivatives of the rows, ``(n_row, n)``."""
         shapes = self.member(v).shapes
         closing = np.zeros((len(self._first), self.pieces + 1, self.n_joint))
         closing[:, 0] += self._first

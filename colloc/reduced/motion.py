@@ -69,18 +69,8 @@ class _State:
 
 
 class ReducedMotion:
-    """What a period of gaits on a mesh comes to, as functions of their parameters.
-
-    Parameters
-    ----------
-    body, friction
-    symmetry : {"none", "bilateral", "antipodal"}
-    mesh : Mesh
-        Of the part of the period that is solved.
-    shapes : Shapes
-    besides : sequence of str
-        Which of "length" and "driven_work" are asked for, too.
-    """
+    """What a period of gaits comes to, as functions of their parameters; the mesh is that of the part of the period that is
+    solved, and `besides` says which of "length" and "driven_work" are asked for, too."""
 
     def __init__(
         self, body: Body, friction: Law, symmetry: str, mesh: Mesh, shapes: Shapes, besides: Sequence[str] = ()

@@ -39,18 +39,8 @@ _LEAST_CURVATURE, _SOFT = 1e-4, 0.1
 
 
 class PathSpace:
-    """Members of a class of paths near one of them; attributes as `colloc.reduced.program.SearchSpace`.
-
-    Parameters
-    ----------
-    problem : Problem
-    near : AnyGait
-        Fixes winding, start phase, and which interval lies on which side.
-    edges : (n_interval + 1,), optional
-        Of the mesh, in phases of `near`.
-    scheme : str, optional
-    far : pairs of links
-    """
+    """Members of a class of paths near one of them, which fixes winding, start phase, and which interval lies on which side;
+    edges of the mesh are phases of that one. Attributes as `colloc.reduced.program.SearchSpace`."""
 
     def __init__(
         self, problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
@@ -153,17 +143,11 @@ class PathSpace:
         return self.from_full(v, np.eye(self._fixed.size)[self.shapes.ravel(order="F")])
 
     def member(self, v: np.ndarray) -> ArcPath | Corners:
-        """The gait of parameters v."""
         return self._fit.member(self.full_parameters(v))
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait, in the sum of squared distances where arcs or sides meet.
-
-        Raises
-        ------
-        NotConvergedError
-            If no path of the class is found near the gait.
-        """
+        `NotConvergedError` if no path of the class is found near the gait."""
         laid = self._through(gait)
         v, target, accuracy = laid[self.own], laid, _NEAR
         for _ in range(_ROUNDS):
@@ -192,7 +176,6 @@ class PathSpace:
         return self.problem.gait.parameters(path_through(self.problem, gait, self.mesh.edges)[0])
 
     def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
-        """The mesh in phases of a member."""
         return self._fit.phase_mesh(gait)
 
     def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
@@ -200,7 +183,6 @@ class PathSpace:
         return PathSpace(self.problem, self.problem.gait.laid_on(gait, edges), edges, scheme, self.far)
 
     def with_far(self, far: Pairs) -> PathSpace:
-        """The class with other pairs of links kept apart."""
         return PathSpace(self.problem, self.near, self.mesh.edges, self.mesh.scheme.name, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -210,12 +192,10 @@ class PathSpace:
         return angles, rates, out[-1]
 
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
-        """See `colloc.reduced.motion.Shapes`."""
         on_local = self._pulled(self.full_parameters(v)[self._gather], self._given, on_shape, on_pace)
         return self.from_full(v, on_local.reshape(len(on_local), -1) @ self._scatter)
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
-        """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad]."""
         p, fit = self.full_parameters(v), self._fit
         gait, limit = fit.member(p), self.problem.joint_limit
         mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
@@ -248,11 +228,9 @@ class PathSpace:
         return np.asarray(metric + _SOFT * metric.diagonal().max() * np.eye(self.n))
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        """Values of the rows."""
         return self._rows.values(self.full_parameters(v))
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        """Derivatives of the rows, ``(n_row, n)``."""
         return self.from_full(v, self._rows.slopes(self.full_parameters(v)))
 
 

@@ -35,27 +35,18 @@ _ONE_ROW = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Curvature:
-    """Second-order conditions of a reduced program at a point.
-
-    Attributes
-    ----------
-    smallest : float
-        Smallest eigenvalue of the Hessian of the Lagrangian on the free directions, a negative one as far as it is confirmed;
-        infinite if there are none.
-    error : float
-        Of it: what half the step changes along its direction, and the part of the Hessian that is not symmetric.
-    n_free : int
-    direction : (n,)
-        Unit vector of parameters along which the curvature is smallest.
-    kkt_error : float
-        What the multipliers leave over of the gradient: the rest means something only where this is small.
-    """
+    """Second-order conditions of a reduced program at a point."""
 
     smallest: float
+    """Smallest eigenvalue of the Hessian of the Lagrangian on the free directions, a negative one as far as it is confirmed;
+    infinite if there are none."""
     error: float
+    """Of it: what half the step changes along its direction, and the part of the Hessian that is not symmetric."""
     n_free: int
     direction: np.ndarray
+    """Unit vector of parameters along which the curvature is smallest, ``(n,)``."""
     kkt_error: float
+    """What the multipliers leave over of the gradient: the rest means something only where this is small."""
 
 
 class CheckedProgram(NonlinearProgram, Protocol):

@@ -69,7 +69,6 @@ class SlopedMotion(ReducedMotion):
         return found | {name: float(weight @ np.linalg.norm(s.rates, axis=0)) for name in self._besides}
 
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
-        """Derivatives of `values`, ``(n,)`` each."""
         s, w = self._moved(v, delta), self._orientation.weight
         p, none, ahead = s.points, np.zeros_like(w), np.exp(1j * self._slope.ahead)
         # what a velocity in the plane adds to each value: the real part of its product with the conjugate of these

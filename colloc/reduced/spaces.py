@@ -28,18 +28,12 @@ from colloc.system.errors import ProblemError
 
 
 class Searched(NamedTuple):
-    """How a class of gaits is collocated, and how a search sees it.
-
-    Attributes
-    ----------
-    program : callable
-        Of a problem, a gait near, the edges of a mesh, and pairs of links that must not cross: its nonlinear program.
-    space : callable
-        Of a problem, a gait near, the edges of a mesh, and a scheme: its parameters.
-    """
+    """How a class of gaits is collocated, and how a search sees it."""
 
     program: Callable[[Problem, AnyGait, np.ndarray | None, Pairs], GaitProgram]
+    """Of a problem, a gait near, the edges of a mesh, and pairs of links that must not cross: its nonlinear program."""
     space: Callable[[Problem, AnyGait, np.ndarray | None, str], SearchSpace]
+    """Of a problem, a gait near, the edges of a mesh, and a scheme: its parameters."""
 
 
 _LINEAR = Searched(
@@ -83,12 +77,7 @@ def space_near(
     problem: Problem, gait: AnyGait, edges: np.ndarray | None = None, scheme: str = ""
 ) -> tuple[SearchSpace, np.ndarray]:
     """The class of a problem on its first mesh, or a given one, and the parameters of its member nearest to a gait.
-
-    Raises
-    ------
-    NotConvergedError
-        If no path of the class is found near the gait.
-    """
+    `NotConvergedError` if no path of the class is found near the gait."""
     space = _searched(problem).space(problem, gait, edges, scheme)
     return space, space.parameters(gait)
 

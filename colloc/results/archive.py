@@ -27,7 +27,7 @@ from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.distinct_optima import basins, fourier_series
-from colloc.results.outcome import Outcome, outcome_fields, outcome_from
+from colloc.results.outcome import UNITS, Outcome, outcome_fields, outcome_from
 from colloc.results.solution import versions
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.file_lock import locked
@@ -37,20 +37,7 @@ from colloc.system.store_file import mark, new_file, put, put_attribute
 KIND, VERSION = "colloc archive", 4
 ROWS = "colloc starts 1"
 _PROBLEM = "problem"
-_COLUMNS = {
-    "status": "text",
-    "message": "text",
-    "efficiency": "1/weight",
-    "efficiency_error": "1/weight",
-    "value": "of the objective",
-    "value_error": "of the objective",
-    "distance": "length",
-    "work": "weight length",
-    "delta": "length/period",
-    "iterations": "1",
-    "seconds": "s",
-    "cpu_seconds": "s",
-}
+_COLUMNS = {"status": "text", "message": "text", **UNITS, "iterations": "1", "cpu_seconds": "s"}
 
 
 class StartName(NamedTuple):
@@ -110,19 +97,8 @@ def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], in
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
-    """The archive of a problem with all starts that are on the disk, begun if there is none.
-
-    Parameters
-    ----------
-    problem : Problem
-    path : path-like
-        Of its HDF5 file.
-
-    Raises
-    ------
-    StoreError
-        If what is there is damaged, of an older colloc or about another problem, or the folder cannot be written.
-    """
+    """The archive of a problem with all starts that are on the disk, begun if there is none; the path is that of its HDF5 file.
+    `StoreError` if what is there is damaged, of an older colloc or about another problem, or the folder cannot be written."""
     path = Path(path)
     with locked(_lock(path), wait=True):
         found = _rows_of(problem, path)
@@ -137,13 +113,7 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
 
 
 def archive_at(path: str | os.PathLike[str]) -> Archive:
-    """The archive with this HDF5 file, whatever its problem is.
-
-    Raises
-    ------
-    StoreError
-        If there is none, or it is damaged.
-    """
+    """The archive with this HDF5 file, whatever its problem is. `StoreError` if there is none, or it is damaged."""
     rows = row_path(path)
     stated = read_rows(rows, ROWS).values.get(_PROBLEM) if rows.exists() else None
     if stated is None:
@@ -155,13 +125,8 @@ def archive_at(path: str | os.PathLike[str]) -> Archive:
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:
-    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written; the file that was there before is left.
-    """
+    """Write the HDF5 file of all starts on the disk, those of other runs too, which `archive` then holds as well. `StoreError`
+    if the folder cannot be written; the file that was there before is left."""
     with locked(_lock(archive.path), wait=True):
         found = _rows_of(archive.problem, archive.path)
         archive.outcomes |= found[0] if found else {}

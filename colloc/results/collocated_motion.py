@@ -20,27 +20,17 @@ from colloc.results.motion import SampledMotion, turned
 
 @dataclass(frozen=True, eq=False)
 class CollocatedMotion:
-    """A gait with everything that its variables say of the motion.
-
-    Attributes
-    ----------
-    problem : Problem
-        As the program stated it.
-    mesh : Mesh
-    layout : Layout
-    x : (n,)
-        The variables.
-    gait : AnyGait
-    delta : float
-        Regularisation speed per period.
-    """
+    """A gait with everything that its variables say of the motion."""
 
     problem: Problem
+    """As the program stated it."""
     mesh: Mesh
     layout: Layout
     x: np.ndarray
+    """The variables, ``(n,)``."""
     gait: AnyGait
     delta: float
+    """Regularisation speed per period."""
 
     def sliding(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> Sliding:
         """The body with given tail velocities."""

@@ -38,13 +38,8 @@ def is_former(path: str | os.PathLike[str]) -> bool:
 
 @contextlib.contextmanager
 def converted(path: str | os.PathLike[str], kind: str, version: int) -> Iterator[Path]:
-    """A file of the present format with what one of the former holds; it is there while the block runs.
-
-    Raises
-    ------
-    StoreError
-        If the file has no unbroken seal, or is not of the former format.
-    """
+    """A file of the present format with what one of the former holds; it is there while the block runs. `StoreError` if the
+    file has no unbroken seal, or is not of the former format."""
     check_seal(Path(path), LARGEST_FILE, kind)
     with tempfile.TemporaryDirectory(prefix="colloc-") as folder:
         present = Path(folder) / "present.h5"

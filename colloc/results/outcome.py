@@ -14,6 +14,17 @@ from colloc.gaits.gait_fields import fields as gait_fields
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED
 
 TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
+UNITS = {
+    "efficiency": "1/weight",
+    "efficiency_error": "1/weight",
+    "value": "of the objective",
+    "value_error": "of the objective",
+    "distance": "length",
+    "work": "weight length",
+    "delta": "length/period",
+    "seconds": "s",
+}
+"""Of the numbers of an outcome, for files."""
 RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 """What may end otherwise when it is tried again."""
 STATUSES = (SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED, TIME_LIMIT, ERROR, CRASHED)

@@ -78,13 +78,8 @@ def realised_gaits(
 ) -> tuple[Realised, ...]:
     """Finite gaits for several numbers of repeats, of either sense of their loops the better one.
 
-    Where none of them comes near the relaxed efficiency `tends_to`, since loops are large, the last number is doubled until
-    one does, or has too many corners to be of use.
-
-    Raises
-    ------
-    NotConvergedError
-        If there are to be none.
+    Where none of them comes near the relaxed efficiency `tends_to`, since loops are large, the last number is doubled until one
+    does, or has too many corners to be of use. `NotConvergedError` if there are to be none.
     """
     found: list[Realised] = []
     wanted = list(repeats)

@@ -46,14 +46,7 @@ _STEPS, _SHARE = 2, 0.1
 
 
 def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
-    """What a constraint row states, and the phase at which it does.
-
-    Parameters
-    ----------
-    transcription : GaitProgram
-    row : int
-        Index among all constraint rows.
-    """
+    """What a constraint row, by its index among all, states, and the phase at which it does."""
     name, rows = next((n, s) for n, s in transcription.groups.items() if s.start <= row < s.stop)
     index, body, mesh = row - rows.start, transcription.problem.body, transcription.mesh
     if name in ("angles", "rates"):
@@ -130,15 +123,8 @@ def _advice(group: str) -> str:
 
 
 def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
-    """Kinds of equations that are (nearly) linear combinations of others at x; an optimiser fails on those.
-
-    Parameters
-    ----------
-    solver : Solver
-    x : (n,)
-    delta : float
-        Regularisation speed, per period.
-    """
+    """Kinds of equations that are (nearly) linear combinations of others at x ``(n,)`` and delta per period; an optimiser fails
+    on those."""
     transcription = solver.transcription
     jacobian, equality = solver.equality_jacobian(x, delta)
     scale = np.sqrt(np.asarray(jacobian.multiply(jacobian).sum(axis=1)).ravel())

@@ -27,8 +27,7 @@ from colloc.search.reduced_search import Found
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
-_OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60}
-_SECONDS = 20.0
+_OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60, "max_cpu_time": 20.0}
 STATIONARY_ROWS = 1e-8
 """Violation of the full program up to which its equations hold at the gait of a search."""
 _ROUNDS, _ADMISSIBLE, _LET_PASS = 4, 1e-8, 1e-6
@@ -101,18 +100,12 @@ def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -
     )
 
 
-def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
+def answer(found: Found) -> tuple[Level, str]:
     """The gait of a search as a solution of the full program, and what does not hold, or "".
 
-    Where IPOPT strays from a gait at which the first-order conditions of the full program hold, the gait is kept: at a kink
-    of the collocated objective its second derivatives mislead. So it is where those of the reduced program hold alone. A gait
-    that rests on a kink is not given to IPOPT.
-
-    Parameters
-    ----------
-    found : Found
-    seconds : float
-        IPOPT's limit of processor time.
+    Where IPOPT strays from a gait at which the first-order conditions of the full program hold, the gait is kept: at a kink of
+    the collocated objective its second derivatives mislead. So it is where those of the reduced program hold alone. A gait that
+    rests on a kink is not given to IPOPT.
     """
     space, delta = found.space, found.delta
     problem = space.problem.with_(scheme=space.mesh.scheme.name)
@@ -120,7 +113,7 @@ def answer(found: Found, seconds: float = _SECONDS) -> tuple[Level, str]:
     x = feasible_point(program, space.full_parameters(found.v), delta)
     reduced = found.program or ReducedProgram(space, delta)
     program = _limited(reduced, heading(program, x))
-    solver = Solver(program, {**_OPTIONS, "max_cpu_time": seconds})
+    solver = Solver(program, _OPTIONS)
     before = solver.measured(x, delta, *_multipliers(found, program))
     if found.conditions.violation > RADIUS:  # no gait within reach is admissible
         kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)

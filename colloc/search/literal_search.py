@@ -28,14 +28,8 @@ _MESHES, _ITERATIONS = 8, 1500
 
 
 def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None = None) -> Solution:
-    """A local optimum by IPOPT alone, not certified yet; it ends at the first level that fails.
-
-    Parameters
-    ----------
-    problem : Problem
-    on_level : callable, optional
-        Called with every `Level` as it ends.
-    """
+    """A local optimum by IPOPT alone, not certified yet; it ends at the first level that fails. `on_level` is called with every
+    `Level` as it ends."""
     begin, stated, (problem, unit) = time.perf_counter(), problem, in_friction_units(problem)
     levels: list[Level] = []
     program = transcribed(problem)

@@ -42,41 +42,26 @@ needs no such leash and is slowed by it."""
 
 @dataclass(frozen=True, eq=False)
 class NlpResult:
-    """A point IPOPT returned, with its multipliers and what we measured there ourselves.
+    """A point IPOPT returned, with its multipliers and what we measured there ourselves."""
 
-    Attributes
-    ----------
-    x, lam_x : (n,)
-    lam_g : (m,)
-    objective : float
-    kkt_error : float
-        Largest component of the Lagrangian's gradient, unscaled.
-    violation : float
-        Largest violation of a constraint or bound.
-    complementarity : float
-        Largest product of a multiplier with its distance to the bound.
-    status : str
-        IPOPT's own word; not a verdict.
-    iterations : int
-    seconds : float
-    evaluation_seconds : float
-        The part spent evaluating functions and derivatives.
-    excess : (m,)
-        How far each constraint is violated.
-    """
-
-    x: np.ndarray
-    lam_x: np.ndarray
-    lam_g: np.ndarray
+    x: np.ndarray  # (n,)
+    lam_x: np.ndarray  # (n,)
+    lam_g: np.ndarray  # (m,)
     objective: float
     kkt_error: float
+    """Largest component of the Lagrangian's gradient, unscaled."""
     violation: float
+    """Largest violation of a constraint or bound."""
     complementarity: float
+    """Largest product of a multiplier with its distance to the bound."""
     status: str
+    """IPOPT's own word; not a verdict."""
     iterations: int
     seconds: float
     evaluation_seconds: float
+    """The part spent evaluating functions and derivatives."""
     excess: np.ndarray
+    """How far each constraint is violated, ``(m,)``."""
 
     def accumulated(self, earlier: NlpResult) -> NlpResult:
         """This result with the effort of an earlier solve of the same level added."""
@@ -119,11 +104,7 @@ class Solver:
         self._solver = ca.nlpsol("colloc", "ipopt", self.oracles.nlp, settings)
 
     def solve(
-        self,
-        x: np.ndarray,
-        delta: float,
-        multipliers: tuple[np.ndarray, np.ndarray] | None = None,
-        radius: float = np.inf,
+        self, x: np.ndarray, delta: float, multipliers: tuple[np.ndarray, np.ndarray] | None = None, radius: float = np.inf
     ) -> NlpResult:
         """Maximise efficiency from x.
 
@@ -177,15 +158,8 @@ class Solver:
         return self.oracles.parameter_vector(delta / t.speed_unit, t.block_parameters(x[t.layout.parameters[:, 0]]))
 
     def measured(self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray) -> NlpResult:
-        """The first-order conditions at x, solving nothing, with multipliers of the equations that come closest to them.
-
-        Parameters
-        ----------
-        x : (n,)
-        delta : float
-        lam_x, lam_g : (n,), (m,)
-            Multipliers of the bounds and of the inequalities.
-        """
+        """The first-order conditions at x ``(n,)``, solving nothing, from multipliers of the bounds and of the inequalities;
+        those of the equations are the ones that come closest to the conditions."""
         parameters = self._parameters(x, delta)
         multipliers = self._completed(x, parameters, lam_x, lam_g)
         bounds = self.transcription.lower, self.transcription.upper
@@ -208,9 +182,8 @@ class Solver:
         """Jacobian of the equations in the free variables at x, and their row numbers among all constraints."""
         t = self.transcription
         equality = np.flatnonzero(t.constraint_lower == t.constraint_upper)
-        return as_sparse(self.oracles.options["jac_g"](x, self._parameters(x, delta))[1])[equality][
-            :, t.lower < t.upper
-        ], equality
+        jacobian = as_sparse(self.oracles.options["jac_g"](x, self._parameters(x, delta))[1])
+        return jacobian[equality][:, t.lower < t.upper], equality
 
     def _measured(
         self,

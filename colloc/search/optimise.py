@@ -65,20 +65,9 @@ def is_trivial(solution: Solution) -> bool:
 
 
 def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
-    """A local optimum of a problem, not certified yet.
+    """A local optimum of a problem, not certified yet; arguments are those of `maximise_efficiency`.
 
-    Parameters
-    ----------
-    problem : Problem
-    on_level : callable, optional
-        Called with every `colloc.results.solution.Level` as it ends.
-    before : sequence of Level
-        Levels of an interrupted run of the same problem; it goes on from the last one.
-
-    Returns
-    -------
-    Solution
-        Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
+    Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
     """
     begin, levels = time.perf_counter(), list(before)
     if not problem.gait.free:

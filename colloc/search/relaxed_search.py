@@ -43,12 +43,12 @@ _ROUNDS = 2
 """Of SQP on a mesh. For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value."""
 
 
-def directions_tried(n_joint: int, count: int = _DIRECTIONS) -> np.ndarray:
-    """Unit vectors of joint rates ``(count, n_joint)``, evenly spread for two joints, else at random; for more joints more."""
+def directions_tried(n_joint: int) -> np.ndarray:
+    """Unit vectors of joint rates ``(n, n_joint)``, evenly spread for two joints, else at random; for more joints more."""
     if n_joint == 2:
-        turn = 2 * np.pi * np.arange(count) / count
+        turn = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         return np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    points = np.random.default_rng(_SEED).standard_normal((count * (n_joint - 1), n_joint))
+    points = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * (n_joint - 1), n_joint))
     return points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
@@ -214,13 +214,12 @@ def best_relaxed_gait(
     seconds: float = np.inf,
     report: Callable[[str], object] = lambda _: None,
     first: tuple = (),
-    least_extent: float = 0.0,
 ) -> Solution:
     """The best relaxed gait that so many starts lead to, and finite gaits near it, all certified.
 
     Parameters
     ----------
-    problem, starts, seconds, report, first, least_extent
+    problem, starts, seconds, report, first
         See `relaxed_gaits`.
     repeats : tuple of int
         Of the directions on every piece, in the finite gaits; more if these lose more than half a percent.
@@ -228,7 +227,7 @@ def best_relaxed_gait(
     if problem.objective != EFFICIENCY or problem.at_least or problem.rotation != 0:
         raise ProblemError("relaxed gaits are measured by their efficiency alone; leave objective, rotation and at_least out.")
     begin = time.perf_counter()
-    ends = relaxed_gaits(problem, starts, seconds, report, first, least_extent)
+    ends = relaxed_gaits(problem, starts, seconds, report, first)
     solution = certified(ends[0][0], repeats, report)
     solution.seconds, solution.starts = time.perf_counter() - begin, starts
     solution.others = tuple(Alternative(-f.objective, f.delta, count, False, f.gait) for f, count in ends)

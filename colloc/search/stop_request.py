@@ -10,13 +10,7 @@ from colloc.system.interruption import interrupted
 
 
 class StopRequest(ca.Callback):
-    """The ``iteration_callback`` of nlpsol for a program.
-
-    Parameters
-    ----------
-    nlp : mapping of str to casadi.MX
-        What nlpsol is given: x, p, f and g.
-    """
+    """The ``iteration_callback`` of nlpsol for a program, of which it is given x, p, f and g."""
 
     def __init__(self, nlp: Mapping[str, ca.MX]) -> None:
         ca.Callback.__init__(self)

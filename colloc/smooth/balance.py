@@ -17,6 +17,7 @@ from colloc.mechanics.law import Law
 from colloc.smooth.batch import PanelBatch, PanelFields
 from colloc.smooth.curve import Curve, PanelGrid, bending_power, mean_velocity, node_velocity
 from colloc.smooth.motion import Motion
+from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
 
 _MOST_PANELS, _REFINEMENTS = 600, 40
@@ -151,8 +152,7 @@ def solve_smooth(
     ProblemError
         If delta is not positive or the tangent angle is not finite.
     """
-    if not (np.isfinite(delta) and delta > 0):
-        raise ProblemError(f"delta must be a positive finite number, not {delta!r}.")
+    check_finite(positive=True, delta=delta)
     t = np.atleast_1d(np.asarray(t, dtype=float))
     n = t.size
     out = {name: np.zeros(n) for name in ("power", "bending_power", "power_inside", "slowest", "residual", "quadrature_error")}

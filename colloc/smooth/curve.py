@@ -38,18 +38,13 @@ def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, sparse.csc_m
 
 @dataclass(frozen=True, eq=False)
 class PanelGrid:
-    """Gauss panels on the arc length, one column per instant (or a single column for all).
-
-    Parameters
-    ----------
-    edges : (n_panel + 1, n_time)
-        Ascending from 0 to 1; panels of width zero are allowed (they fill up columns that need fewer).
-    order : int
-        Gauss nodes a panel.
-    """
+    """Gauss panels on the arc length, one column per instant (or a single column for all)."""
 
     edges: np.ndarray
+    """``(n_panel + 1, n_time)``: ascending from 0 to 1; panels of width zero are allowed (they fill up columns that need
+    fewer)."""
     order: int = 8
+    """Gauss nodes a panel."""
 
     @property
     def n(self) -> int:
@@ -111,18 +106,8 @@ class Curve(NamedTuple):
 
 
 def curve(panels: PanelGrid, angle: Array, rate: Array, reference: int, reference_rate: Array) -> Curve:
-    """The curve of tangent angles and rates at the nodes, ``(n_node, n_time)`` (paper, eqs. x0, y0 and dtz0).
-
-    Parameters
-    ----------
-    panels : PanelGrid
-    angle, rate : (n_node, n_time)
-        Theta [rad] and its rate [rad/time].
-    reference : int
-        Index of the panel edge that serves as reference.
-    reference_rate : (1, n_time)
-        Rate of Theta there.
-    """
+    """The curve of tangent angles [rad] and rates [rad/time] at the nodes, ``(n_node, n_time)``, seen from the panel edge
+    number `reference`, where Theta has the rate ``(1, n_time)`` (paper, eqs. x0, y0 and dtz0)."""
     xp = namespace(angle, rate)
     width = panels.widths
     c, s = xp.cos(angle), xp.sin(angle)

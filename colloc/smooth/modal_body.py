@@ -65,7 +65,6 @@ class ModalBody(PanelBody):
 
     @property
     def grid(self) -> PanelGrid:
-        """The panels, the same at all times."""
         return PanelGrid(np.linspace(0.0, 1.0, self.panels + 1)[:, None], self.order)
 
     def modes_at(self, s: np.ndarray) -> np.ndarray:

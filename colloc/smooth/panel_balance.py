@@ -67,18 +67,10 @@ def solved_on_panels(
     start: np.ndarray | None = None,
     tolerance: float = 1e-11,
 ) -> BalanceSolution:
-    """Velocities z that balance the body at shapes and rates ``(n_joint, n_time)``.
+    """Velocities z that balance the body at shapes and rates ``(n_joint, n_time)``, begun at `start` ``(3, n_time)`` or at
+    rest.
 
-    Parameters
-    ----------
-    body : PanelShapes
-    friction : Law
-    q, rates : (n_joint, n_time)
-    delta : float
-        Regularisation speed in body lengths per unit of time of the rates.
-    start : (3, n_time), optional
-    tolerance : float
-        Largest residual that counts as converged.
+    Delta is in body lengths per unit of time of the rates; the tolerance is the largest residual that counts as converged.
     """
     n = q.shape[1]
     # work in units of the largest rate: the law is homogeneous once delta scales along

@@ -130,11 +130,9 @@ class Wave(PrescribedBody):
     def prescribed(self) -> Motion:
         if self.profile == "sine":
             return sine_wave(self.amplitude, self.waves)
-        return (
-            standing_wave(self.amplitude)
-            if self.profile == "standing"
-            else tanh_wave(self.amplitude, self.steepness, self.waves)
-        )
+        if self.profile == "standing":
+            return standing_wave(self.amplitude)
+        return tanh_wave(self.amplitude, self.steepness, self.waves)
 
     def describe(self) -> str:
         return f"smooth, a {self.profile} wave of amplitude {self.amplitude:g} rad"

@@ -55,57 +55,37 @@ class Attempt:
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What a worker needs to know about a cell.
-
-    Attributes
-    ----------
-    cell : tuple of int
-    problem : Problem
-    first : bool
-        Whether the cell has its own starts, the guess and the cold ones, still before it.
-    inside : tuple of tuple of int
-        Cells of the same task, earlier in it, whose gaits are warm starts.
-    gaits : tuple of Fourier, ArcPath or Corners
-        Warm starts from elsewhere.
-    cold : tuple of int
-        Numbers of the seeded starts.
-    incumbent : float
-        The best certified value so far; 0 if there is none.
-    tried : frozenset of str
-        Keys of starts solved before.
-    warm_starts, warm_delta_start, time_limit, seed
-        See `colloc.studies.study.Study`.
-    """
+    """What a worker needs to know about a cell."""
 
     cell: Index
     problem: Problem
     first: bool
+    """Whether the cell has its own starts, the guess and the cold ones, still before it."""
     inside: tuple[Index, ...]
+    """Cells of the same task, earlier in it, whose gaits are warm starts."""
     gaits: tuple[AnyGait, ...]
+    """Warm starts from elsewhere."""
     cold: tuple[int, ...]
+    """Numbers of the seeded starts."""
     incumbent: float
+    """The best certified value so far; 0 if there is none."""
     tried: frozenset[str]
+    """Keys of starts solved before."""
     warm_starts: int
     warm_delta_start: float
     time_limit: float
     seed: int
+    """These four: see `colloc.studies.study.Study`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Visit:
-    """What working on a cell gave.
-
-    Attributes
-    ----------
-    cell : tuple of int
-    attempts : list of Attempt
-    scores : dict
-        The value there of every gait that came from elsewhere, as it is, by its `start_key`; NaN if nobody knows.
-    """
+    """What working on a cell gave."""
 
     cell: Index
     attempts: list[Attempt]
     scores: dict[str, float] = field(default_factory=dict)
+    """The value there of every gait that came from elsewhere, as it is, by its `start_key`; NaN if nobody knows."""
 
 
 def failed_visit(work: Work, status: str, message: str) -> Visit:

@@ -25,33 +25,24 @@ _DELTA = 1e-3
 
 @dataclass(frozen=True)
 class GaitClass:
-    """The kind of a gait.
-
-    Attributes
-    ----------
-    bilateral, antipodal : bool
-        Symmetries it has (see `colloc.gaits.harmonic`), whatever class it was searched in.
-    retraced : bool
-        It goes back the way it came.
-    winding : int
-        Turns of the path (angle 1, angle 2) about its mean over a period, positive counter-clockwise.
-    wave : float
-        Direction in which bending travels (see `wave_direction`): 1 if every joint repeats the one behind it a quarter
-        period later, which is a wave towards the head.
-    forward : float
-        Displacement per period along the mean direction of the body, tail to head, over the distance: 1 is head first.
-    """
+    """The kind of a gait."""
 
     bilateral: bool
     antipodal: bool
+    """Symmetries it has (see `colloc.gaits.symmetry`), whatever class it was searched in."""
     retraced: bool
+    """It goes back the way it came."""
     winding: int
+    """Turns of the path (angle 1, angle 2) about its mean over a period, positive counter-clockwise."""
     wave: float
+    """Direction in which bending travels (see `wave_direction`): 1 if every joint repeats the one behind it a quarter period
+    later, which is a wave towards the head."""
     forward: float
+    """Displacement per period along the mean direction of the body, tail to head, over the distance: 1 is head first."""
 
     @property
     def symmetry(self) -> str:
-        """In the words of `colloc.gaits.harmonic`; "both" if it has both."""
+        """In the words of `colloc.gaits.symmetry`; "both" if it has both."""
         if self.bilateral and self.antipodal:
             return "both"
         return "bilateral" if self.bilateral else "antipodal" if self.antipodal else "none"
@@ -67,10 +58,6 @@ class GaitClass:
     def label(self) -> str:
         """For tables and legends, for example "retrograde, bilateral"."""
         return f"{self.kind}{' (retraced)' if self.retraced else ''}, {self.symmetry}"
-
-
-def _amplitude(gait: Fourier) -> float:
-    return float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
 
 
 def winding(gait: Fourier) -> int:
@@ -111,7 +98,8 @@ def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
 
 def gait_class(gait: Fourier, body: Body, friction: Law) -> GaitClass:
     """The kind of a gait of a body with at least two joints or modes."""
-    close = _SAME * max(_amplitude(gait), 1e-12)
+    amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
+    close = _SAME * max(amplitude, 1e-12)
     bilateral = body.symmetric and phase_distance(gait, reversed_in_time(swapped(gait, body))) < close
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])
     antipodal = np.linalg.norm(even) < close

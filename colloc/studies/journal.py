@@ -47,13 +47,8 @@ def _record_from(entry: dict[str, Any]) -> Record:
 
 
 def read_journal(folder: Path) -> Journal:
-    """All records of a folder; none if there is no such folder.
-
-    Raises
-    ------
-    StoreError
-        If the journal cannot be read, is damaged beyond single rows, or was written by an older colloc.
-    """
+    """All records of a folder; none if there is no such folder. `StoreError` if the journal cannot be read, is damaged beyond
+    single rows, or was written by an older colloc."""
     old = next(folder.glob("journal-*.jsonl"), None)
     if old is not None:
         raise StoreError(f"{old} was written by an older colloc, which this one does not read; choose another --output.")

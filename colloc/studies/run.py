@@ -122,10 +122,7 @@ class StudyRun:
     ) -> Iterator[Progress]:
         """Work on all that is missing; each cell is on the disk before it is yielded. Cells in which nothing was tried are not.
 
-        Parameters
-        ----------
-        workers, executor, ahead
-            As for `colloc.system.task_pool.completed`; `ahead` is a quarter of the workers, and one, by default.
+        Arguments are those of `colloc.system.task_pool.completed`; `ahead` is a quarter of the workers, and one, by default.
         """
         ahead = 1 + workers // 4 if ahead is None else ahead
         number, chunks = 0, self._first_chunks()
@@ -150,12 +147,7 @@ class StudyRun:
         ]
 
     def _round(
-        self,
-        number: int,
-        chunks: Sequence[tuple[Index, ...]],
-        workers: int,
-        executor: Callable[[int], Executor],
-        ahead: int,
+        self, number: int, chunks: Sequence[tuple[Index, ...]], workers: int, executor: Callable[[int], Executor], ahead: int
     ) -> Iterator[Progress]:
         waiting: dict[int, set[Index]] = {}
         free: deque[int] = deque()

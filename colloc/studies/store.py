@@ -46,13 +46,8 @@ class StudyFile:
 
 
 def save_study(table: StudyTable, path: str | os.PathLike[str], *, source: str = "", command: str = "") -> Path:
-    """Write the consolidated result; an existing file is replaced only once the new one is complete.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be made or written.
-    """
+    """Write the consolidated result; an existing file is replaced only once the new one is complete. `StoreError` if the folder
+    cannot be made or written."""
     path = Path(path)
     with new_file(path) as file:
         mark(file, KIND, VERSION)
@@ -76,13 +71,8 @@ def _no_truth_values(values: np.ndarray) -> np.ndarray:
 
 
 def load_study(path: str | os.PathLike[str]) -> StudyFile:
-    """The result in a file that `save_study` wrote.
-
-    Raises
-    ------
-    StoreError
-        If the file is missing, damaged, or not the result of a study. Nothing in it is executed.
-    """
+    """The result in a file that `save_study` wrote. `StoreError` if the file is missing, damaged, or not the result of a study.
+    Nothing in it is executed."""
     with sealed_file(path, KIND, VERSION) as file:
         if len(file) > _MOST_VARIABLES:
             raise StoreError(f"{path} holds {len(file)} variables, where {_MOST_VARIABLES} are allowed.")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -174,11 +174,9 @@ class Study:
         for a, axis in enumerate(self.axes):
             if not axis.travels:
                 continue
-            near = (
-                [cell[a] + step for step in steps]
-                if not axis.of_texts
-                else list(range(self.shape[a] if 1 in steps else cell[a]))
-            )
+            near: Iterable[int] = (cell[a] + step for step in steps)
+            if axis.of_texts:
+                near = range(self.shape[a] if 1 in steps else cell[a])
             found += [(*cell[:a], i, *cell[a + 1 :]) for i in near if 0 <= i < self.shape[a] and i != cell[a]]
         return found
 
@@ -189,13 +187,8 @@ class Study:
 
 
 def read_study_file(path: str | os.PathLike[str]) -> tuple[Study, str]:
-    """Execute a study file; its study and its text.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such file, it fails (with the line), or states no ``STUDY``.
-    """
+    """Execute a study file; its study and its text. `ProblemError` if there is no such file, it fails (with the line), or
+    states no ``STUDY``."""
     path, names, source = stated_names(path, "study")
     study = names.get("STUDY")
     if not isinstance(study, Study):

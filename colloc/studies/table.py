@@ -12,6 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.law import rate_independent
 from colloc.results.distinct_optima import fourier_series, series_class
+from colloc.results.outcome import UNITS as OF_OUTCOMES
 from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.gait_class import GaitClass, gait_class
@@ -24,23 +25,14 @@ if TYPE_CHECKING:
 
 NO_PROBLEM, NOT_TRIED = "no problem", "not tried"
 UNITS = {
-    "efficiency": "1/weight",
-    "efficiency_error": "1/weight",
-    "value": "of the objective",
-    "value_error": "of the objective",
+    **OF_OUTCOMES,
     "trivial_bound": "1/weight",
     "upper_bound": "1/weight",
     "neighbour_value": "of the objective",
-    "distance": "length",
-    "work": "weight length",
-    "delta": "length/period",
-    "seconds": "s",
-    "mean": "rad",
-    "cos": "rad",
-    "sin": "rad",
+    **dict.fromkeys(("mean", "cos", "sin"), "rad"),
 }
 _NUMBERS = ("value", "value_error", "efficiency", "efficiency_error", "distance", "work")
-_COUNTS = ("starts", "starts_certified")
+_COUNTS = ("bilateral", "antipodal", "retraced", "at_slowest", "winding", "below_neighbour", "starts", "starts_certified")
 KnownBound = Callable[[Problem], float | None]
 
 
@@ -68,14 +60,8 @@ class StudyTable:
 
 
 def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> StudyTable:
-    """All cells of a run.
-
-    Parameters
-    ----------
-    run : StudyRun
-    known_bound : callable
-        An upper bound on the efficiency of every gait of a problem's body, if one is known.
-    """
+    """All cells of a run; `known_bound` gives an upper bound on the efficiency of every gait of a problem's body, if one is
+    known."""
     study = run.study
     axes = tuple(axis.name for axis in study.axes)
     problems = [state.problem for state in run.cells.values() if state.problem is not None]
@@ -90,16 +76,7 @@ def study_table(run: StudyRun, known_bound: KnownBound = lambda _: None) -> Stud
 
     for name in (*_NUMBERS, "delta", "trivial_bound", "upper_bound", "neighbour_value", "seconds", "wave", "forward"):
         variable(name, float, np.nan)
-    for name in (
-        "bilateral",
-        "antipodal",
-        "retraced",
-        "at_slowest",
-        "winding",
-        "below_neighbour",
-        "starts",
-        "starts_certified",
-    ):
+    for name in _COUNTS:
         variable(name, int, 0)
     for name in ("status", "message", "origin", "gait_class", "problem_hash"):
         variable(name, object, "")

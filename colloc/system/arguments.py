@@ -60,9 +60,13 @@ def is_whole(value: object, least: float = -math.inf, most: float = math.inf) ->
     return whole and bool(least <= value <= most)  # type: ignore[operator]
 
 
+def check_finite(positive: bool = False, **numbers: object) -> None:
+    """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
+    for name, value in numbers.items():
+        if not is_number(value) or (positive and not value > 0):
+            raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
+
+
 def check_positive(owner: object, *names: str, of: str = "") -> None:
-    """A `ProblemError` about the first of some numbers of an object that is not positive and finite; `of` heads its name."""
-    for name in names:
-        value = getattr(owner, name)
-        if not (is_number(value) and value > 0):
-            raise ProblemError(f"{of}{name} must be a positive finite number, not {value!r}.")
+    """The same for numbers of an object that have to be positive; `of` heads their names."""
+    check_finite(positive=True, **{of + name: getattr(owner, name) for name in names})

@@ -20,25 +20,13 @@ def bind(places: Mapping[str, str]) -> None:
 
 
 def bound(name: str) -> Callable[..., Any]:
-    """The function of that name.
-
-    Raises
-    ------
-    KeyError
-        If nobody has said where it is.
-    """
+    """The function of that name. `KeyError` if nobody has said where it is."""
     module, _, function = _WHERE[name].partition(":")
     return getattr(importlib.import_module(module), function)
 
 
 def optional(library: str) -> Any:
-    """A library that colloc can do without.
-
-    Raises
-    ------
-    CollocError
-        If it is not installed.
-    """
+    """A library that colloc can do without. `CollocError` if it is not installed."""
     try:
         return importlib.import_module(library)
     except ImportError:

@@ -28,13 +28,8 @@ def is_private(file: Path) -> bool:
 
 
 def make_private(folder: Path) -> None:
-    """Make the folder for its user alone (0700), if it is not there.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be made, or is there and others could write to it.
-    """
+    """Make the folder for its user alone (0700), if it is not there. `StoreError` if it cannot be made, or is there and others
+    could write to it."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         wrong = trespass(folder)

@@ -23,15 +23,8 @@ def duration(seconds: float) -> str:
 class StatusLine:
     """A line at the bottom of the terminal: what is being done, for how long, and how long it will take.
 
-    Rich redraws it twice a second, since a solve reports nothing for long, and it vanishes at the end. Where the stream is
-    not a terminal nothing is written, and Rich is not loaded.
-
-    Parameters
-    ----------
-    stream : text stream, optional
-        Standard error by default.
-    enabled : bool
-        False writes nothing anywhere.
+    Rich redraws it twice a second, since a solve reports nothing for long, and it vanishes at the end. Where the stream (by
+    default standard error) is not a terminal, or the line is not enabled, nothing is written, and Rich is not loaded.
     """
 
     def __init__(self, stream: TextIO | None = None, *, enabled: bool = True) -> None:

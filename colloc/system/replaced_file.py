@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
 import secrets
 import time
@@ -18,12 +19,7 @@ _FORGOTTEN = 3600.0
 @contextlib.contextmanager
 def replaced_file(path: Path) -> Iterator[str]:
     """Name of a temporary file beside `path`, which takes its place if the block ends well and vanishes if it does not.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be made, or the file not written.
-    """
+    `StoreError` if the folder cannot be made, or the file not written."""
     temporary = ""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -49,14 +45,10 @@ def replaced_file(path: Path) -> Iterator[str]:
 
 def _sweep(path: Path) -> None:
     """Remove what killed processes left of earlier attempts."""
-    for left in path.parent.glob(f".{_escaped(path.name)}.*.part"):
+    for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         with contextlib.suppress(OSError):
             if time.time() - left.stat().st_mtime > _FORGOTTEN:
                 left.unlink()
-
-
-def _escaped(name: str) -> str:
-    return "".join(f"[{c}]" if c in "*?[" else c for c in name)
 
 
 def _flush(folder: Path) -> None:

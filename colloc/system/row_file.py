@@ -89,13 +89,8 @@ def _table(kind: str) -> str:
 
 
 def read_rows(path: Path, kind: str) -> Rows:
-    """All rows of a file; none if there is no such file.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be read, is too large, of another kind, or damaged beyond single rows.
-    """
+    """All rows of a file; none if there is no such file. `StoreError` if the file cannot be read, is too large, of another
+    kind, or damaged beyond single rows."""
     values, damaged = {}, 0
     try:
         if not path.exists():
@@ -124,20 +119,14 @@ def read_rows(path: Path, kind: str) -> Rows:
 
 
 def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:
-    """Add rows, or replace those of the same keys: all of them, or none. Writers wait for each other.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written, or is of another kind. It then holds what it held.
-    """
+    """Add rows, or replace those of the same keys: all of them, or none. Writers wait for each other. `StoreError` if the file
+    cannot be written, or is of another kind. It then holds what it held."""
     texts = [(key, json.dumps(value)) for key, value in rows.items()]
     filled = [(key, _sum(key.encode(), text.encode()).decode(), text) for key, text in texts]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(
-            FileExistsError
-        ):  # with 0o666 less the umask, where SQLite would take 0o644: a group may share it
+        # with 0o666 less the umask, where SQLite would take 0o644: a group may share it
+        with contextlib.suppress(FileExistsError):
             os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         with _opened(path, "rw") as connection:
             connection.execute("BEGIN IMMEDIATE")

@@ -40,12 +40,7 @@ def write_sealed(path: str | os.PathLike[str], content: bytes) -> None:
 
 def is_sealed(path: Path, largest: int, kind: str) -> bool:
     """Whether a file is as colloc left it; False if it carries no seal at all. `kind` is for the message, "colloc solution".
-
-    Raises
-    ------
-    StoreError
-        If the file is missing or too large, or if its seal does not fit.
-    """
+    `StoreError` if the file is missing or too large, or if its seal does not fit."""
     try:
         if not path.is_file():
             raise StoreError(f"there is no file {path}.")
@@ -70,12 +65,7 @@ def is_sealed(path: Path, largest: int, kind: str) -> bool:
 
 
 def check_seal(path: Path, largest: int, kind: str) -> None:
-    """Refuse a file that is missing, too large, or not as colloc left it.
-
-    Raises
-    ------
-    StoreError
-    """
+    """Refuse a file that is missing, too large, or not as colloc left it, by a `StoreError`."""
     if not is_sealed(path, largest, kind):
         raise StoreError(
             f"{path} is not a readable {kind}: it carries no checksum, so it is damaged, was changed after colloc "

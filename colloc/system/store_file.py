@@ -52,11 +52,7 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     """An HDF5 file to write; it takes its place, sealed, only if the block ends well.
 
     It is made in memory: where the disk is full, HDF5 closing a file on it can end the process (a segmentation fault).
-
-    Raises
-    ------
-    StoreError
-        If the folder or the file cannot be written.
+    `StoreError` if the folder or the file cannot be written.
     """
     with replaced_file(Path(path)) as temporary:
         # no image of an open file: that of HDF5 1.14.2 has a wrong checksum in its first block
@@ -70,23 +66,10 @@ def new_file(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 def sealed_file(
     path: str | os.PathLike[str], kind: str, version: int, *, largest: int = LARGEST_FILE, unsealed: bool = False
 ) -> Iterator[h5py.File]:
-    """An HDF5 file of a kind ("colloc solution") to read.
+    """An HDF5 file of a kind ("colloc solution") and version to read, of so many bytes at most; `unsealed` ones, since they
+    `was_changed`, without a look at their seal.
 
-    Parameters
-    ----------
-    path : path-like
-    kind : str
-    version : int
-        Of the format.
-    largest : int
-        Bytes.
-    unsealed : bool
-        Read it without looking at its seal, since `was_changed`.
-
-    Raises
-    ------
-    StoreError
-        If it is missing, too large, damaged, of another kind or of another version, or if reading in the block fails.
+    `StoreError` if it is missing, too large, damaged, of another kind or version, or if reading in the block fails.
     """
     path = Path(path)
     if not unsealed:
@@ -112,15 +95,10 @@ def sealed_file(
         raise StoreError(f"{path} is not a readable {kind} ({type(error).__name__}: {error}).") from None
 
 
-def was_changed(path: Path, kind: str, largest: int = LARGEST_FILE) -> bool:
-    """Whether another program opened a file to write: it has no seal, but is as long as its own first block says.
-
-    Raises
-    ------
-    StoreError
-        If the file is missing or too large, or has a seal that does not fit.
-    """
-    if is_sealed(path, largest, kind):
+def was_changed(path: Path, kind: str) -> bool:
+    """Whether another program opened a file to write: it has no seal, but is as long as its own first block says. `StoreError`
+    if the file is missing or too large, or has a seal that does not fit."""
+    if is_sealed(path, LARGEST_FILE, kind):
         return False
     with open(path, "rb") as file:
         block, size = file.read(_END_OF_FILE.stop), os.fstat(file.fileno()).st_size
@@ -149,14 +127,8 @@ def mark(file: h5py.File, kind: str, version: int) -> None:
 def put(group: h5py.Group, name: str, value: Any, **described: str) -> h5py.Dataset:
     """A new dataset of numbers or texts, with texts such as its units as attributes.
 
-    ``dims="joint, time"`` names its dimensions also in the way of netCDF (`_name_dimensions`).
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
-    StoreError
-        If a text is too long to be read again.
+    ``dims="joint, time"`` names its dimensions also in the way of netCDF (`_name_dimensions`). `TypeError` if the
+    value is neither; `StoreError` if a text is too long to be read again.
     """
     dataset = group.create_dataset(name, data=_stored(value, name))
     if dataset.dtype.kind == "S":
@@ -214,11 +186,8 @@ def _is_text(stored: h5d.DatasetID | h5py.h5a.AttrID, where: str, largest: int) 
         raise StoreError(f"{where} holds neither numbers nor texts of fixed length.")
     if space.get_simple_extent_type() == h5s.NULL:
         raise StoreError(f"{where} is empty.")
-    # decoded, NumPy takes four bytes a character
-    if (
-        space.get_simple_extent_npoints() * kind.get_size() * (4 if is_text and space.get_simple_extent_ndims() else 1)
-        > largest
-    ):
+    times = 4 if is_text and space.get_simple_extent_ndims() else 1  # decoded, NumPy takes four bytes a character
+    if space.get_simple_extent_npoints() * kind.get_size() * times > largest:
         raise StoreError(f"{where} is too large.")
     return is_text
 
@@ -229,13 +198,8 @@ def _decoded(value: Any) -> Any:
 
 
 def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
-    """An attribute: a number or text of Python, or an array of them.
-
-    Raises
-    ------
-    StoreError
-        If it is missing, too large, or neither number nor text.
-    """
+    """An attribute: a number or text of Python, or an array of them. `StoreError` if it is missing, too large, or neither
+    number nor text."""
     where = f"attribute {name} of {owner.name}"
     if name not in owner.attrs:
         raise StoreError(f"{where} is missing.")
@@ -247,13 +211,8 @@ def attribute(owner: h5py.Group | h5py.Dataset, name: str) -> Any:
 
 
 def array(group: h5py.Group, name: str, *, largest: int = LARGEST_ARRAY) -> Any:
-    """The data of a dataset: numbers as a NumPy array, texts decoded.
-
-    Raises
-    ------
-    StoreError
-        If it is no plain dataset of this file, or too large.
-    """
+    """The data of a dataset: numbers as a NumPy array, texts decoded. `StoreError` if it is no plain dataset of this file, or
+    too large."""
     where = f"{group.name.rstrip('/')}/{name}"
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         raise StoreError(f"{where} is missing, or a link.")

@@ -37,15 +37,18 @@ class Rates:
     power: np.ndarray
     driven: np.ndarray
 
+    def of(self, chosen: np.ndarray) -> Rates:
+        """Those of some intervals."""
+        return Rates(self.z[:, chosen], self.centre[chosen], self.power[chosen], self.driven[chosen])
+
+    def joined(self, other: Rates) -> Rates:
+        """Those of these intervals, then of others."""
+        pairs = ((self.centre, other.centre), (self.power, other.power), (self.driven, other.driven))
+        return Rates(np.concatenate([self.z, other.z], axis=1), *map(np.concatenate, pairs))
+
 
 def rates_at(
-    body: Body,
-    friction: Law,
-    path: Path,
-    delta: float,
-    t: np.ndarray,
-    near: np.ndarray | None = None,
-    driven: bool = False,
+    body: Body, friction: Law, path: Path, delta: float, t: np.ndarray, near: np.ndarray | None = None, driven: bool = False
 ) -> Rates:
     """Solved velocities of a path at phases t of any shape, per period; `near` ``(3, ...)``: tail velocities to start from."""
     angles, rates = path(t.ravel())
@@ -81,27 +84,21 @@ def increments(rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | 
 
 @dataclass(frozen=True, eq=False)
 class FineMotion:
-    """The motion of a gait over its solved part.
-
-    Attributes
-    ----------
-    edges : (n + 1,)
-        Panel edges.
-    rates : Rates
-        At the panel nodes, ``(n, s)``.
-    theta, path, work, driven_work : (n + 1,)
-        Orientation, displacement in the lab (complex, starting with orientation 0), work and driven work at the edges.
-    unresolved : (n,)
-        Relative error of the objective that a panel may still hold: what halving it last changed, at its end and half way.
-    """
+    """The motion of a gait over its solved part."""
 
     edges: np.ndarray
+    """Panel edges, ``(n + 1,)``."""
     rates: Rates
+    """At the panel nodes, ``(n, s)``."""
     theta: np.ndarray
     path: np.ndarray
     work: np.ndarray
     driven_work: np.ndarray
+    """Orientation, displacement in the lab (complex, starting with orientation 0), work and driven work at the edges,
+    ``(n + 1,)`` each."""
     unresolved: np.ndarray
+    """``(n,)``: relative error of the objective that a panel may still hold: what halving it last changed, at its end and half
+    way."""
 
     @property
     def nodes(self) -> np.ndarray:
@@ -153,7 +150,6 @@ def fine_motion(
         First panels; the mesh to be measured is a good choice.
     tolerance : float
         Panels are halved until the sum of their disagreements is below this. The sum that remains is in the result.
-
     shares : callable
         From distance, work, rotation and driven work to what a small change of each changes in the objective, relative to it.
     driven : bool
@@ -183,8 +179,7 @@ def fine_motion(
         start = np.repeat(left[chosen], 2)
         start[1::2] += half[1::2]
         new_rates, new = solved(start, half, (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1))
-        before = Rates(rates.z[:, chosen], *(a[chosen] for a in (rates.centre, rates.power, rates.driven)))
-        middle = increments(PANEL_RULE, width[chosen], before, _TO_MIDDLE)
+        middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
         # the whole panel, and its polynomials half way, against the two halves
         turn, move = new[0][0::2] + new[0][1::2], new[1][0::2] + np.exp(1j * new[0][0::2]) * new[1][1::2]
         sums = list(zip(new[2:], parts[2:], strict=True))
@@ -195,12 +190,7 @@ def fine_motion(
         kept = np.ones(left.size, dtype=bool)
         kept[chosen] = False
         place = np.argsort(np.concatenate([left[kept], start]))
-        rates = Rates(
-            np.concatenate([rates.z[:, kept], new_rates.z], axis=1)[:, place],
-            np.concatenate([rates.centre[kept], new_rates.centre])[place],
-            np.concatenate([rates.power[kept], new_rates.power])[place],
-            np.concatenate([rates.driven[kept], new_rates.driven])[place],
-        )
+        rates = rates.of(kept).joined(new_rates).of(place)
         parts = tuple(np.concatenate([a[kept], b])[place] for a, b in zip(parts, new, strict=True))  # type: ignore[assignment]
         turned, travelled, spent, delivered = _accumulated(parts)
         distance, work = max(abs(travelled[-1]), 1e-300), max(spent[-1], 1e-300)

@@ -28,30 +28,20 @@ _OUTPUTS, _LOAD = slice(2, 6), slice(-2, None)
 
 
 class PointsOnSlope(NamedTuple):
-    """A collocated motion at the points of a mesh.
+    """A collocated motion at the points of a mesh."""
 
-    Attributes
-    ----------
-    theta : (n,)
-    z : (3, n)
-        Tail velocities.
-    centre : (2, n)
-        Velocities of the centre of mass, in the body's axes.
-    power : (n,)
-        Against friction.
-    on_shape, on_theta : (4, 2 n_joint, n), (4, n)
-        Derivatives of rotation rate, centre and power along (angles, rates) and theta.
-    held : bool
-        Whether there is such a motion: friction holds the body everywhere.
-    """
-
-    theta: np.ndarray
+    theta: np.ndarray  # (n,)
     z: np.ndarray
+    """Tail velocities, ``(3, n)``."""
     centre: np.ndarray
+    """Velocities of the centre of mass, in the body's axes, ``(2, n)``."""
     power: np.ndarray
+    """Against friction, ``(n,)``."""
     on_shape: np.ndarray
     on_theta: np.ndarray
+    """Derivatives of rotation rate, centre and power along (angles, rates), ``(4, 2 n_joint, n)``, and theta, ``(4, n)``."""
     held: bool
+    """Whether there is such a motion: friction holds the body everywhere."""
 
     def travelled(self) -> np.ndarray:
         """Velocity of the centre of mass in the plane, its real part uphill, ``(n,)``."""

@@ -21,19 +21,13 @@ FORWARDS, BACKWARDS = 1, -1
 
 
 class FollowedMotion(NamedTuple):
-    """One motion through the branches at instants, and the range of all of them.
-
-    Attributes
-    ----------
-    z : (3, n_time)
-        Tail velocities of the branch that is followed; NaN where no solution was found.
-    apart : (3, n_time)
-        How far the velocities of the centre of mass, the rotation rates and the powers of the stable solutions lie apart; 0
-        where there is one.
-    """
+    """One motion through the branches at instants, and the range of all of them."""
 
     z: np.ndarray
+    """``(3, n_time)``: tail velocities of the branch that is followed; NaN where no solution was found."""
     apart: np.ndarray
+    """``(3, n_time)``: how far the velocities of the centre of mass, the rotation rates and the powers of the stable solutions
+    lie apart; 0 where there is one."""
 
 
 def followed_motion(

@@ -22,18 +22,8 @@ _SEPARATE = 1e-6
 
 
 def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineMotion) -> np.ndarray:
-    """Phases of kinks inside the solved part of a gait, ascending, to 1e-3 of the spacing of the panels of `fine` there.
-
-    Parameters
-    ----------
-    body, friction
-    path : callable
-        Joint angles and rates at phases.
-    delta : float
-        Regularisation speed, per period.
-    fine : FineMotion
-        The gait's motion; its panels are narrow where velocities change quickly.
-    """
+    """Phases of kinks inside the solved part of a gait, ascending, to 1e-3 of the spacing of the panels of its motion there,
+    which are narrow where velocities change quickly; delta is per period."""
     t = fine.nodes.ravel()
     speed = _slowness(body, friction, path, delta, t, fine.rates.z.reshape(3, -1))
     inner = speed[:, 1:-1]

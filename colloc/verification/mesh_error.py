@@ -33,47 +33,43 @@ _LENGTH_PIECES = 200
 
 @dataclass(frozen=True, eq=False)
 class MeshError:
-    """Errors of collocating one gait on one mesh, ``(n_interval,)`` each.
-
-    Attributes
-    ----------
-    rotation : (n,)
-        Error of the rotation over the interval [rad].
-    displacement : (n,)
-        Magnitude of the error of the displacement over the interval [body lengths].
-    work : (n,)
-        Error of the work over the interval.
-    velocity : (n,)
-        Largest error between the nodes of the interpolated velocity of the tail or, times a body length, of its rotation
-        rate [body lengths per period].
-    value : (n,)
-        Contribution to the error of the problem's objective, relative to its magnitude, signed, to first order.
-    violation : (n,)
-        Largest excess over a joint limit [rad] or penetration of links [rad or body lengths] inside the interval.
-    total : float
-        Relative error of the collocated objective as a whole: all contributions, not linearised.
-    unresolved : float
-        What the panels that measured all this may have missed, relative to the objective.
-    turning : float
-        Rotation that collocation misses over a whole period, times the body's reach (half a length) over the distance; 0 where
-        a symmetry closes the rotation. It is what makes the distance of a closed gait ambiguous.
-    """
+    """Errors of collocating one gait on one mesh, ``(n_interval,)`` each."""
 
     rotation: np.ndarray
+    """Error of the rotation over the interval [rad], ``(n,)``."""
     displacement: np.ndarray
+    """Magnitude of the error of the displacement over the interval [body lengths], ``(n,)``."""
     work: np.ndarray
+    """Error of the work over the interval, ``(n,)``."""
     velocity: np.ndarray
+    """Largest error between the nodes of the interpolated velocity of the tail or, times a body length, of its rotation rate
+    [body lengths per period], ``(n,)``."""
     value: np.ndarray
+    """Contribution to the error of the problem's objective, relative to its magnitude, signed, to first order, ``(n,)``."""
     violation: np.ndarray
+    """Largest excess over a joint limit [rad] or penetration of links [rad or body lengths] inside the interval, ``(n,)``."""
     total: float
+    """Relative error of the collocated objective as a whole: all contributions, not linearised."""
     unresolved: float
+    """What the panels that measured all this may have missed, relative to the objective."""
     turning: float
+    """Rotation that collocation misses over a whole period, times the body's reach (half a length) over the distance; 0 where a
+    symmetry closes the rotation. It is what makes the distance of a closed gait ambiguous."""
 
     @property
     def estimate(self) -> float:
         """Estimated relative error of the objective: the magnitudes of all intervals, so that errors of opposite sign do not
         cancel, and what is unresolved. An optimiser exploits cancellation; so this also covers its search."""
         return float(np.abs(self.value).sum() + self.unresolved)
+
+
+class Known(NamedTuple):
+    """A gait of a problem, delta per period, and its motion (`gait_motion`)."""
+
+    problem: Problem
+    gait: AnyGait
+    delta: float
+    fine: Any
 
 
 def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> Any:
@@ -111,31 +107,16 @@ def _whole_length(problem: Problem, gait: AnyGait) -> float:
 def mesh_error(
     problem: Problem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float = 1e-6, fine: Any = None
 ) -> MeshError:
-    """Errors of collocating `gait` on `mesh`.
-
-    Parameters
-    ----------
-    problem : Problem
-    mesh : Mesh
-    gait : AnyGait
-    delta : float
-        Regularisation speed, per period.
-    tolerance : float
-        Relative error of interest; smaller ones need not be exact.
-    fine : FineMotion or SlopeCourse, optional
-        The gait's motion, if known.
-
-    Raises
-    ------
-    NotConvergedError
-        If the balance cannot be solved at some instant.
-    """
+    """Errors of collocating a gait on a mesh, with delta per period; relative ones below the tolerance need not be exact.
+    `fine` is the gait's motion, if it is known. `NotConvergedError` if the balance cannot be solved at some instant."""
     if fine is None:
         fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
     if problem.slope is not None:
         off, violation = slope_defects(problem, mesh, gait, delta, fine), constraint_violation(problem, mesh, gait)
         return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
-    own = _collocated_intervals(problem, mesh.scheme, mesh.edges[:-1], mesh.edges[1:], gait, delta, fine)
+    known = Known(problem, gait, delta, fine)
+    own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
+    exact = problem.objective(_period(problem, _fine_part(known), _whole_length(problem, gait)))
     return MeshError(
         own.rotation,
         np.abs(own.displacement),
@@ -143,19 +124,17 @@ def mesh_error(
         _velocity_error(mesh, own.rates, fine),
         own.value,
         constraint_violation(problem, mesh, gait),
-        _collocated_value(problem, own, gait) / _fine_value(problem, fine, gait) - 1,
+        _collocated_value(known, own) / exact - 1,
         float(fine.unresolved.sum()),
-        abs(float(_turning(problem, own, fine).sum())),
+        abs(float(_turning(known, own).sum())),
     )
 
 
-def interval_shares(
-    problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
-) -> np.ndarray:
+def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """What collocating on each of the intervals from left to right adds to the relative error of the objective and to the
     rotation that is missed (as `MeshError.turning`), magnitudes, ``(n,)``."""
-    own = _collocated_intervals(problem, rule, left, right, gait, delta, fine)
-    return np.abs(own.value) + np.abs(_turning(problem, own, fine))
+    own = _collocated_intervals(known, rule, left, right)
+    return np.abs(own.value) + np.abs(_turning(known, own))
 
 
 class _Own(NamedTuple):
@@ -170,14 +149,11 @@ class _Own(NamedTuple):
     increments: Increments
 
 
-def _collocated_intervals(
-    problem: Problem, rule: Scheme, left: np.ndarray, right: np.ndarray, gait: AnyGait, delta: float, fine: FineMotion
-) -> _Own:
+def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Own:
+    problem, gait, delta, fine = known
     nodes = left[:, None] + (right - left)[:, None] * rule.c
-    rates = rates_at(
-        problem.body, problem.friction, gait, delta, nodes, fine.velocity(nodes),
-        problem.uses("driven_work"),
-    )  # fmt: skip
+    at = problem.body, problem.friction, gait, delta, nodes
+    rates = rates_at(*at, fine.velocity(nodes), problem.uses("driven_work"))
     turned, moved, spent, delivered = increments(rule, right - left, rates)
     (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
     rotation, energy = turned - (theta_right - theta), spent - (work_right - work)
@@ -188,16 +164,16 @@ def _collocated_intervals(
     if problem.uses("length") and not problem.gait.unit_speed:  # else arc length is the clock, and exact
         pace = np.linalg.norm(gait.rates(nodes.ravel()), axis=0).reshape(nodes.shape)
         length = (right - left) * (pace @ rule.b) - path_lengths(gait, left, right, 4)
-    shares = _shares(problem, _fine_part(problem, fine), _whole_length(problem, gait))
+    shares = _shares(problem, _fine_part(known), _whole_length(problem, gait))
     ahead = (pull * np.conj(direction)).real
     value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length
     value += shares["driven_work"] * (delivered - (driven_right - driven))
     return _Own(rotation, displacement, energy, length, value, rates, (turned, moved, spent, delivered))
 
 
-def _turning(problem: Problem, own: _Own, fine: FineMotion) -> np.ndarray:
+def _turning(known: Known, own: _Own) -> np.ndarray:
     """Rotation missed by intervals, times the body's reach over the distance, ``(n,)``."""
-    return own.rotation * (0.5 / abs(fine.path[-1]) if problem.gait.symmetry == NONE else 0.0)
+    return own.rotation * (0.5 / abs(known.fine.path[-1]) if known.problem.gait.symmetry == NONE else 0.0)
 
 
 def _part(problem: Problem, end: complex, work: float, rotation: float, driven_work: float) -> dict[str, float]:
@@ -205,21 +181,19 @@ def _part(problem: Problem, end: complex, work: float, rotation: float, driven_w
     return {"distance": distance, "work": float(work), "rotation": float(rotation), "driven_work": float(driven_work)}
 
 
-def _fine_part(problem: Problem, fine: FineMotion) -> dict[str, float]:
+def _fine_part(known: Known) -> dict[str, float]:
     """What the solved part comes to."""
-    return _part(problem, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
+    fine = known.fine
+    return _part(known.problem, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
 
 
-def _fine_value(problem: Problem, fine: FineMotion, gait: AnyGait) -> float:
-    return problem.objective(_period(problem, _fine_part(problem, fine), _whole_length(problem, gait)))
-
-
-def _collocated_value(problem: Problem, own: _Own, gait: AnyGait) -> float:
+def _collocated_value(known: Known, own: _Own) -> float:
     """The objective as the scheme sees it."""
+    problem = known.problem
     turned, moved, spent, delivered = own.increments
     theta = np.concatenate([[0.0], np.cumsum(turned)])
     part = _part(problem, (np.exp(1j * theta[:-1]) * moved).sum(), spent.sum(), theta[-1], delivered.sum())
-    length = _whole_length(problem, gait) + float(own.length.sum()) / problem.gait.fraction
+    length = _whole_length(problem, known.gait) + float(own.length.sum()) / problem.gait.fraction
     return problem.objective(_period(problem, part, length))
 
 

@@ -24,9 +24,8 @@ from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.adaptive_motion import FineMotion
-from colloc.verification.collocated_slope import SlopeCourse
 from colloc.verification.kinks import kink_phases
-from colloc.verification.mesh_error import FINER, MeshError, gait_motion, interval_shares, mesh_error
+from colloc.verification.mesh_error import FINER, Known, MeshError, gait_motion, interval_shares, mesh_error
 
 VIOLATION = 5e-7
 """Largest violation of a joint limit or of self-contact between nodes that needs no refinement [rad, body lengths]."""
@@ -52,25 +51,16 @@ _WORST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class MeshPlan:
-    """A mesh on which a gait is collocated as accurately as requested, or as the budget allows.
-
-    Attributes
-    ----------
-    scheme : str
-    edges : (n + 1,)
-    estimate : float
-        Relative error of the gait's value on that mesh.
-    reached : bool
-        Whether that is below the request; if not, the budget of points was exhausted.
-    kept : array
-        Phases that have to stay knots: they split intervals in which a constraint was violated.
-    """
+    """A mesh on which a gait is collocated as accurately as requested, or as the budget allows."""
 
     scheme: str
-    edges: np.ndarray
+    edges: np.ndarray  # (n + 1,)
     estimate: float
+    """Relative error of the gait's value on that mesh."""
     reached: bool
+    """Whether that is below the request; if not, the budget of points was exhausted."""
     kept: np.ndarray
+    """Phases that have to stay knots: they split intervals in which a constraint was violated."""
 
 
 def kink_knots(problem: Problem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
@@ -143,7 +133,7 @@ def planned_mesh(
         If the balance cannot be solved at some instant.
     """
     fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
-    error = mesh_error(problem, mesh, gait, delta, tolerance, fine)
+    known, error = Known(problem, gait, delta, fine), mesh_error(problem, mesh, gait, delta, tolerance, fine)
     accurate = error.estimate <= tolerance and error.turning <= TURNING
     if accurate and error.violation.max() <= VIOLATION:
         return None
@@ -151,7 +141,7 @@ def planned_mesh(
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
     if problem.slope is not None:
-        return _split_on_slope(problem, mesh.scheme, knots, gait, delta, fine, tolerance, aim, most_points)
+        return _split_on_slope(known, mesh.scheme, knots, tolerance, aim, most_points)
     given = scheme(problem.scheme)
     kinks = kink_knots(problem, gait, delta, fine)
     switches = not problem.friction.reversible
@@ -164,7 +154,7 @@ def planned_mesh(
         first = np.union1d(mesh.edges if nested else problem.gait.first_edges(mesh.edges), knots)
         edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
-        plan = _split(problem, rule, edges, knots, on_knots, gait, delta, fine, tolerance, aim, budget)
+        plan = _split(known, rule, edges, knots, on_knots, tolerance, aim, budget)
         if best is None or (plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best))):
             best = plan
     return best
@@ -201,22 +191,19 @@ def _points(plan: MeshPlan) -> float:
 
 
 def _split(
-    problem: Problem,
+    known: Known,
     rule: Scheme,
     edges: np.ndarray,
     kept: np.ndarray,
     kinks: np.ndarray,
-    gait: AnyGait,
-    delta: float,
-    fine: FineMotion,
     tolerance: float,
     aim: float,
     budget: float,
 ) -> MeshPlan:
     """Cut the intervals with the largest errors until all together are small enough, or the budget is exhausted."""
     left, right = edges[:-1], edges[1:]
-    shares = interval_shares(problem, rule, left, right, gait, delta, fine)
-    unresolved = float(fine.unresolved.sum())
+    shares = interval_shares(known, rule, left, right)
+    unresolved = float(known.fine.unresolved.sum())
     wanted = max(aim * tolerance - unresolved, 0.25 * aim * tolerance)
     while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
         order = np.argsort(shares)[::-1]
@@ -228,7 +215,7 @@ def _split(
             break
         middle = _cut(left[chosen], right[chosen], kinks)
         new_left, new_right = np.concatenate([left[chosen], middle]), np.concatenate([middle, right[chosen]])
-        new = interval_shares(problem, rule, new_left, new_right, gait, delta, fine)
+        new = interval_shares(known, rule, new_left, new_right)
         left, right, shares = (
             np.concatenate([np.delete(old, chosen), added])
             for old, added in ((left, new_left), (right, new_right), (shares, new))
@@ -237,18 +224,9 @@ def _split(
     return MeshPlan(rule.name, np.sort(np.append(left, right.max())), estimate, estimate <= tolerance, kept)
 
 
-def _split_on_slope(
-    problem: Problem,
-    rule: Scheme,
-    kept: np.ndarray,
-    gait: AnyGait,
-    delta: float,
-    fine: SlopeCourse,
-    tolerance: float,
-    aim: float,
-    most_points: int,
-) -> MeshPlan:
+def _split_on_slope(known: Known, rule: Scheme, kept: np.ndarray, tolerance: float, aim: float, most_points: int) -> MeshPlan:
     """A uniform mesh whose intervals with the largest errors are halved until all together are small enough."""
+    problem, gait, delta, fine = known
     edges = np.union1d(np.linspace(0.0, 1.0, problem.intervals + 1), kept)
     while True:
         error = mesh_error(problem, Mesh(rule, edges), gait, delta, tolerance, fine)

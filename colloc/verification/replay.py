@@ -165,7 +165,7 @@ def _evaluated(
         near = None  # which is a mean, and of no one direction
     shares = mixed[0] if mixed else np.ones((1, t.size))
     motions, residual, apart = [], np.zeros(t.size), np.zeros((3, t.size))
-    delivered, used = np.zeros(t.size), np.full((len(limits.names), t.size), -np.inf)
+    pace, delivered, used = np.zeros(t.size), np.zeros(t.size), np.full((len(limits.names), t.size), -np.inf)
     for share, some in zip(shares, rates if mixed else rates[None], strict=True):
         start = near
         if not friction.associated:
@@ -174,6 +174,7 @@ def _evaluated(
                 start, apart = np.nan_to_num(followed.z), apart + share * followed.apart
         motion, left = body.replayed(friction, angles, some, delta, start)
         motions.append(motion)
+        pace += share * np.linalg.norm(some, axis=0)
         if driven:
             delivered += share * driven_power_in_balance(body, friction, angles, some, motion.z, delta)
         if limits.names:
@@ -187,9 +188,6 @@ def _evaluated(
     centre = mean("centre")
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     lever = np.hypot(x - gx, y - gy).max(axis=0)
-    pace = sum(
-        share * np.linalg.norm(some, axis=0) for share, some in zip(shares, rates if mixed else rates[None], strict=True)
-    )
     values = (centre[0] + 1j * centre[1], mean("power"), mean("actuator_power"), pace, delivered, residual, lever)
     z, apart = (a.T.reshape(*t.shape, 3) for a in (mean("z"), apart))
     return z, *(value.reshape(t.shape) for value in values), used.T.reshape(*t.shape, -1), apart

@@ -9,19 +9,12 @@ import numpy as np
 from colloc.gaits.sloped import checked_chain
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.system.arguments import is_number
+from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 from colloc.verification.gait_on_slope import GaitOnSlope, SlopeMotion
 from colloc.verification.replay import Path
 
 _LOOSER = 30.0
-
-
-def check_finite(positive: bool = False, **numbers: object) -> None:
-    """A `ProblemError` for the first of some numbers that is not finite (and positive, if that is asked)."""
-    for name, value in numbers.items():
-        if not is_number(value) or (positive and not value > 0):
-            raise ProblemError(f"{name} must be a {'positive ' * positive}finite number, not {value!r}.")
 
 
 def gait_on_slope(

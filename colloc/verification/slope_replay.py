@@ -52,12 +52,8 @@ def slope_replay(
     """A period of a gait that says where it points, on a slope: arguments as of `colloc.verification.replay.replay`.
 
     Of the result the distance is the way in the direction that counts, the work that of the joints; what other balanced motions
-    would change is not known, only for which part of the time there are any.
-
-    Raises
-    ------
-    NotConvergedError
-        If no balance is found at some instant, or rounding hides the accuracy that is asked for.
+    would change is not known, only for which part of the time there are any. `NotConvergedError` if no balance is found at some
+    instant, or rounding hides the accuracy that is asked for.
     """
     on, aim = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), _FIRST * tolerance
     length, rougher = (float(path_lengths(gait, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)

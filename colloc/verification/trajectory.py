@@ -26,27 +26,18 @@ _MOST_SAMPLES = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """One period at a fixed rate of samples; the sample after the last is the first.
-
-    Attributes
-    ----------
-    time : (n,)
-        Seconds, 0, 1/rate, ..., period - 1/rate.
-    phase : (n,)
-        Of the gait, in [0, 1).
-    angles : (n_joint, n)
-        Joint angles [rad].
-    speeds : (n_joint, n)
-        Their time derivatives [rad/s].
-    period : float
-        Seconds; a whole number of samples.
-    """
+    """One period at a fixed rate of samples; the sample after the last is the first."""
 
     time: np.ndarray
+    """Seconds, 0, 1/rate, ..., period - 1/rate, ``(n,)``."""
     phase: np.ndarray
+    """Of the gait, in [0, 1), ``(n,)``."""
     angles: np.ndarray
+    """Joint angles [rad], ``(n_joint, n)``."""
     speeds: np.ndarray
+    """Their time derivatives [rad/s], ``(n_joint, n)``."""
     period: float
+    """Seconds; a whole number of samples."""
 
 
 def timed(path: Path, rate: float, period: float | None = None, limits: np.ndarray | float | None = None) -> Trajectory:

@@ -1,7 +1,7 @@
 """Distance, work and efficiency of many ellipse gaits: direct, or through the velocity map; local maxima, refined.
 
 With a body that reads the same from both ends and mu_b = mu_f, the second half period of an ellipse gait repeats the
-displacement and the work of the first (see `gaits.harmonic`), so instants ``t_k = (k + 1/2)/n``, k < n/2, are the midpoint
+displacement and the work of the first (see `gaits.symmetry`), so instants ``t_k = (k + 1/2)/n``, k < n/2, are the midpoint
 rule with n instants over the whole period. The rule is of second order: velocities have kinks where links stick.
 Displacement is that of the middle of the body, which the symmetry maps to itself; its velocity and rotation are those of
 the middle link, so no sines and cosines of the posture enter.
