@@ -29,7 +29,8 @@ def test_every_public_name_has_one_home():
 
 @pytest.mark.parametrize("name", colloc.__all__)
 def test_every_public_docstring_has_an_example(name):
-    assert ">>> " in (getattr(colloc, name).__doc__ or "")
+    home = next(module for module, names in colloc._HOME.items() if name in names)  # colloc.solve may be the module by now
+    assert ">>> " in (getattr(importlib.import_module(f"colloc.{home}"), name).__doc__ or "")
 
 
 WITH_EXAMPLES = [
