@@ -59,7 +59,7 @@ SPEED, LOOP_DELTA = 0.02, 2e-5
 """Of small loops: least path over 2 pi [rad], and delta at unit shape speed."""
 SYMMETRIES = ("both", "bilateral")
 """Of relaxed gaits: loops about the straight body have both; those to one side of it (10, 1, 1 and 3, 1, 1) have one."""
-BUDGET, DIRECTED = Budget(intervals=8, starts=150, tolerance=2e-3), (0, 1, 2)
+BUDGET, DIRECTED = Budget(starts=150), (0, 1, 2)
 """Of bounds; where mu_b differs from mu_f these headings, as the second is worth 5 % at (0.5, 1, 5)."""
 STORE, GAITS, TABLE = Path("results/curated/frontier.json"), Path("results/frontier"), Path("results/curated/frontier.md")
 HEAD = """# The best gaits from both sides

@@ -35,6 +35,9 @@ from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
 from colloc.mechanics.native_kernel import compiled_balance, native_kernel
 from colloc.system.errors import ProblemError
 
+_SMOOTHER = 2.0
+"""Times delta, at which a balance is solved first that cannot be solved at delta itself."""
+
 
 class _Batch:
     """Instants that share a reference link: what an iteration evaluates on subsets of them."""
@@ -120,7 +123,8 @@ def solve_balance(
     tolerance : float
         Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
-        Steps allowed to an instant in each of at most four attempts; with each link at rest as many again.
+        Steps allowed to an instant in each of at most four attempts; with each link at rest as many again, and from the
+        balance of a larger delta.
     method : {"auto", "newton", "fixed_point"}
         "auto" damps Newton and falls back on the paper's fixed point; the others are for comparison.
 
@@ -174,15 +178,24 @@ def solve_balance(
 
     solved = _numpy_balance if library is None else partial(compiled_balance, library)
     found = solved(body, friction, angles, rates, float(delta), load, start, *settings)
-    for link in range(body.n_link if method == "auto" else 0):
+    for begun in (*range(body.n_link), None) if method == "auto" else ():
         failed = np.flatnonzero(~(found[1] <= tolerance))
         if not failed.size:
             break
-        # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
         some, rates_there = angles[:, failed], rates[:, failed]
-        at_rest = body.tail_velocity(body.posture(some, link), rates_there, np.zeros((3, failed.size)), link)
         held = None if load is None else load[:, failed]
-        again = solved(body, friction, some, rates_there, float(delta), held, at_rest, *settings)
+        if begun is not None:
+            # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
+            first = body.tail_velocity(body.posture(some, begun), rates_there, np.zeros((3, failed.size)), begun)
+        elif load is None and delta < np.abs(rates_there).max():
+            # several rest nearly, each where the others let it: followed from where friction is smoother
+            smoother = _SMOOTHER * float(delta)
+            first = solve_balance(
+                body, friction, some, rates_there, smoother, tolerance=tolerance, max_iterations=max_iterations
+            ).z
+        else:
+            break
+        again = solved(body, friction, some, rates_there, float(delta), held, first, *settings)
         better = again[1] <= tolerance
         for old, new in zip(found, again, strict=True):
             old[..., failed[better]] = new[..., better]
