@@ -8,7 +8,7 @@ writes `results/curated/frontier.md` from all there is. `--seconds` begins no ot
 
 - gait: the best relaxed gait that travels through shapes, of either symmetry, and the best certified finite gait near it;
 - few: the best certified polygon with 60 corners near it;
-- small: the best gait of no size at one shape;
+- small: the best gait of no size at one shape (three and four links);
 - loop: the best certified polygon of a short path near that shape;
 - bound: the sampled upper bound (three links; four if asked for); of a kept potential (`scripts.check_potential`) what a check
   finds, and the seconds are those of the check.
@@ -250,7 +250,7 @@ def asked(options: argparse.Namespace) -> Iterator[Row]:
 def wanted(row: Row, part: str, known: dict) -> bool:
     """Whether a part can be computed and is not known."""
     possible = {
-        "gait": True, "few": row.file("gait").exists(), "small": True, "loop": f"{row.name} small" in known,
+        "gait": True, "few": row.file("gait").exists(), "small": row.links <= 4, "loop": f"{row.name} small" in known,
         "bound": row.links <= 4,
     }  # fmt: skip
     return f"{row.name} {part}" not in known and possible[part]
