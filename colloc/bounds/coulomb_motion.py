@@ -1,8 +1,9 @@
 """How a balanced body moves and what it pays, sampled: the velocity map at vanishing delta.
 
 Everything that a bound on efficiency needs to know of friction is here: for a shape and joint rates, the velocity of the
-*middle link* ``n_link // 2`` (its midpoint, in its own axes) and the power. The middle link is used, not the tail, because
-the symmetries of the body are then plain: turning the body end for end negates that velocity.
+*middle* of the body and the power. That is the midpoint of the middle link, in its own axes; for an even number of links it
+is the middle joint, in axes along the mean heading of the two links that meet there. The middle is used, not the tail,
+because the symmetries of the body are then plain: turning the body end for end negates that velocity.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_bounds, gap
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.links import LinkVelocity
 from colloc.mechanics.solution_branches import all_balanced_velocities
 
 DELTA = 1e-9
@@ -37,7 +39,7 @@ class CoulombMotion:
     angles, rates : (n_joint, n)
         Shapes and unit directions of joint rates.
     velocity : (2, n)
-        Velocity of the midpoint of the middle link, in its own axes.
+        Velocity of the middle, in its own axes.
     spin : (n,)
         Its rotation rate.
     power : (n,)
@@ -102,9 +104,18 @@ def _motion(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float
 ) -> CoulombMotion:
     now = instant(body, friction, angles, rates, z, delta)
-    middle = body.n_link // 2
-    velocity = np.stack([now.velocity.vs[middle], now.velocity.vn[middle]])
-    return CoulombMotion(angles, rates, velocity, now.velocity.w[middle], total_power(now.velocity, now.force)[0])
+    velocity, spin = _of_the_middle(body, angles, rates, now.velocity)
+    return CoulombMotion(angles, rates, velocity, spin, total_power(now.velocity, now.force)[0])
+
+
+def _of_the_middle(body: Chain, angles: np.ndarray, rates: np.ndarray, link: LinkVelocity) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity ``(2, n)`` and rotation rate ``(n,)`` of the middle (see above)."""
+    k = body.n_link // 2
+    if body.n_link % 2:
+        return np.stack([link.vs[k], link.vn[k]]), link.w[k]
+    # link k begins at the joint, and is half of its angle ahead of the mean heading
+    velocity = (link.vs[k] + 1j * (link.vn[k] - 0.5 * body.lengths[k] * link.w[k])) * np.exp(0.5j * angles[k - 1])
+    return np.stack([velocity.real, velocity.imag]), link.w[k] - 0.5 * rates[k - 1]
 
 
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:
@@ -136,8 +147,8 @@ def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:
 
 
 def swaps_ends(body: Chain) -> bool:
-    """Whether turning the body end for end maps its middle link onto itself."""
-    return body.symmetric and body.n_link % 2 == 1
+    """Whether turning the body end for end maps it onto itself."""
+    return body.symmetric
 
 
 def one_joint(n_joint: int, half: bool) -> np.ndarray:
@@ -149,12 +160,25 @@ def one_joint(n_joint: int, half: bool) -> np.ndarray:
     return np.eye(n_joint) if half else np.concatenate([np.eye(n_joint), -np.eye(n_joint)], axis=1)
 
 
-def unit_directions(n_joint: int, count: int, half: bool) -> np.ndarray:
-    """About `count` directions of joint rates spread evenly over the sphere, or over half of it, ``(n_joint, count)``."""
+def random_directions(n_joint: int, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Directions of joint rates at random, in every other of which some joints rest, ``(n_joint, count)``; for three joints and
+    more.
+
+    Where joints rest links may stick together to the floor, and the ratio has creases there, as where one joint turns alone.
+    """
+    points = rng.standard_normal((n_joint, count))
+    resting = np.where(np.arange(count) % 2, rng.integers(1, n_joint - 1, count), 0)
+    points[rng.random((n_joint, count)).argsort(axis=0) < resting] = 0.0
+    return points / np.linalg.norm(points, axis=0)
+
+
+def unit_directions(n_joint: int, count: int, half: bool, shift: float = 0.0) -> np.ndarray:
+    """About `count` directions of joint rates spread evenly over the sphere, or over half of it, ``(n_joint, count)``; of two
+    joints moved by the part `shift` of their spacing."""
     if n_joint == 1:
         return np.array([[1.0]]) if half else np.array([[1.0, -1.0]])
     if n_joint == 2:
-        turn = np.arange(count) * ((np.pi if half else 2 * np.pi) / count)
+        turn = (np.arange(count) + shift) * ((np.pi if half else 2 * np.pi) / count)
         return np.stack([np.cos(turn), np.sin(turn)])
     points = np.random.default_rng(n_joint).standard_normal((n_joint, count))
     points /= np.linalg.norm(points, axis=0)

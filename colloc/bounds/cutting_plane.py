@@ -19,14 +19,20 @@ from colloc.bounds.recheck import near_the_top, summits_met
 from colloc.bounds.sampling import Domain
 from colloc.numerics.minimax_program import Minimax, smallest_maximum
 
-_LARGEST_CUT = 1500
+_LARGEST_CUT = 500
 _INNER_ROUNDS = 15
 _HELD = 2e-4
-_WEIGHTY = 1e-5
+_WEIGHTY = 1e-7
+"""Share of the largest multiplier that a motion of the measure needs: without those below 1e-5 it closes too badly to tell what
+knots are worth."""
 _NEAR = 0.005
-"""Inequalities this near to the program's value stay; dropping them sooner saves time in a solve and costs more solves."""
+_PATIENCE = 3
+"""An inequality that is more than `_NEAR` below the program's value, so many programs in a row, goes. Dropped at once it is
+missed soon after: the exchange then goes in circles, and samples may exceed the value tenfold while that creeps."""
 _RIPE = 5e-3
 """Surprise at which the multipliers say where knots are wanted."""
+_UNKNOWN = 0.1
+"""Surprise expected of a program that no climbs have tried."""
 _SIDES = (0.0, 0.08, -0.08)
 """A motion enters with the heading of its largest gain and these [rad] to the sides of it, as the best heading will move."""
 _HOPELESS = 0.005
@@ -63,7 +69,7 @@ class _Program:
         self.samples = samples
         self.rng = rng
         self.rows, self.constants = sparse.csr_matrix((0, self.space.size)), np.empty(0)
-        self.index, self.heading = np.empty(0, dtype=int), np.empty(0)
+        self.index, self.heading, self.slack = np.empty(0, dtype=int), np.empty(0), np.empty(0, dtype=int)
         self._hold(held)
         self.best = self._solved()
 
@@ -75,11 +81,10 @@ class _Program:
 
     def moved_to(self, space: PotentialSpace) -> _Program:
         """With the same inequalities, as other potentials have them."""
-        kept = self._kept()
-        return _Program(Samples(space, self.samples.motion), [(self.index[kept], self.heading[kept])], self.rng, self.smoothing)
+        return _Program(Samples(space, self.samples.motion), [(self.index, self.heading)], self.rng, self.smoothing)
 
-    def _kept(self) -> np.ndarray:
-        """Mask of inequalities that matter."""
+    def _matters(self) -> np.ndarray:
+        """Mask of inequalities that hold the optimum, or nearly."""
         near = self.rows @ self.best.x + self.constants > self.best.value - _NEAR
         return near | (self.best.weights > 1e-6 * self.best.weights.max())
 
@@ -90,6 +95,7 @@ class _Program:
         self.constants = np.concatenate([p[1] for p in pieces])
         self.index = np.concatenate([self.index[kept], *(index for index, _ in added)])
         self.heading = np.concatenate([self.heading[kept], *(heading for _, heading in added)])
+        self.slack = np.concatenate([self.slack[kept], *(np.zeros(index.size, dtype=int) for index, _ in added)])
 
     def measure(self) -> Measure:
         """The multipliers of the inequalities: the optimal mixture of motions."""
@@ -102,12 +108,13 @@ class _Program:
         return smallest_maximum(self.rows, self.constants, self.smoothing * self.roughness)
 
     def _exchange(self, ratio: np.ndarray, heading: np.ndarray) -> None:
-        """Keep inequalities that matter, add those that are violated."""
+        """Add inequalities that are violated, drop those that have not mattered for a while."""
         level = self.best.value
         broken = np.flatnonzero(ratio > level + 0.5 * _HELD)
         broken = broken[np.argsort(-ratio[broken])[: 4 * _LARGEST_CUT]]
         broken = self.rng.permutation(broken)[:_LARGEST_CUT]
-        self._hold([(broken, heading[broken] + side) for side in _SIDES], self._kept())
+        self.slack = np.where(self._matters(), 0, self.slack + 1)
+        self._hold([(broken, heading[broken] + side) for side in _SIDES], self.slack < _PATIENCE)
         self.best = self._solved()
 
     def settle(self, excess: float) -> float:
@@ -161,7 +168,7 @@ def exchanged_optimum(
     rng = np.random.default_rng(seed)
     program = _Program.begun(Samples(space, domain.lattice(shapes, directions)), rng, smoothing)
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
-    seen, quiet, surprise = program.samples.motion.size, 0, 0.1
+    seen, quiet, surprise = program.samples.motion.size, 0, _UNKNOWN
     for count in range(1, rounds + 1):
         # a potential that the next climbs will refute need not be exact
         held = program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
@@ -196,7 +203,7 @@ def exchanged_optimum(
                 break
             program.add(motion.take(np.flatnonzero(checked > level + tolerance)))
         if coarse and surprise < max(_RIPE, tolerance):
-            space, quiet = with_more_knots(space, program.measure(), intervals), 0
+            space, quiet, surprise = with_more_knots(space, program.measure(), intervals), 0, _UNKNOWN
             program = program.moved_to(space)
     assert held <= top
     return Optimum(space, free, program.best.value, top, best, seen, count, quiet == 2, program.measure())

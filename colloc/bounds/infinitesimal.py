@@ -44,7 +44,7 @@ class SmallGait(NamedTuple):
 
 
 _DELTA = 1e-6
-_CLIMBED = 12
+_CLIMBED, _WAYS = 12, 4
 _STEPS = 14
 _ROUNDS = 12
 _GAIN = 1e-7
@@ -86,15 +86,15 @@ class _Program:
         gain = reduced(motion)
         start = np.argsort(-gain)[:_CLIMBED]
         rates, best, size = motion.rates[:, start], gain[start], np.full(start.size, turn)
-        axes = [(i, j) for i in range(len(rates)) for j in range(i)]
+        rng = np.random.default_rng(len(rates))
         for _ in range(_STEPS):
             tried = []
-            for i, j in axes:
-                for sign in (-size, size):
-                    other = rates.copy()
-                    other[i] = np.cos(sign) * rates[i] - np.sin(sign) * rates[j]
-                    other[j] = np.sin(sign) * rates[i] + np.cos(sign) * rates[j]
-                    tried.append(other)
+            # creases run at any angle to the axes; of two joints there is one way, and back
+            for _ in range(1 if len(rates) == 2 else _WAYS * (len(rates) - 1)):
+                way = rng.standard_normal(rates.shape)
+                way -= (way * rates).sum(axis=0) * rates
+                way /= np.linalg.norm(way, axis=0)
+                tried += [np.cos(size) * rates + np.sin(sign * size) * way for sign in (-1, 1)]
             new = self.motion(np.concatenate(tried, axis=1))
             if new.size != len(tried) * start.size:
                 break
@@ -150,7 +150,7 @@ def best_small_gait(
     shapes = drawn_in(body, shapes, np.zeros_like(shapes), _EDGE)
 
     def rough(shape: np.ndarray) -> float:
-        return small_gait(body, friction, shape, 180, 4, 0).efficiency
+        return small_gait(body, friction, shape, 180, 4, 0 if body.n_joint < 3 else 2).efficiency
 
     values = np.array([small_gait(body, friction, s, 36, 3, 0).efficiency for s in shapes.T])
     moves = np.concatenate([np.eye(body.n_joint), -np.eye(body.n_joint)])

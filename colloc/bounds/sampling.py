@@ -14,6 +14,7 @@ from colloc.bounds.coulomb_motion import (
     drawn_in,
     fundamental,
     one_joint,
+    random_directions,
     unit_directions,
 )
 from colloc.mechanics.chain import Chain
@@ -60,14 +61,18 @@ class Domain:
         joint turning alone, on a finer one.
 
         One of each class of mirror images; with directed friction the end swap reverses time, so both senses of every rate
-        are sampled. `shift` in [0, 1) moves the lattice by that part of its spacing (then without its last value).
+        are sampled. `shift` in [0, 1) moves the lattice by that part of its spacing (then without its last value). More than
+        two joints have directions at random, others at every shape; another shift draws others.
         """
-        rates = unit_directions(self.body.n_joint, directions, self.friction.reversible)
-        if shift and self.body.n_joint == 2:
-            turn = shift * (np.pi if self.friction.reversible else 2.0 * np.pi) / directions
-            rates = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ rates
-        alone = one_joint(self.body.n_joint, self.friction.reversible)
-        return self._at_all(shapes, shift, rates).joined(self._at_all(_FINER * shapes, shift, alone))
+        n_joint, half = self.body.n_joint, self.friction.reversible
+        angles = self._representatives(shapes, shift)
+        if n_joint > 2:
+            rng = np.random.default_rng(round(1e9 * shift))
+            every = np.repeat(angles, directions, axis=1), random_directions(n_joint, directions * angles.shape[1], rng)
+        else:
+            every = _pairs(angles, unit_directions(n_joint, directions, half, shift))
+        alone = _pairs(self._representatives(_FINER * shapes, shift), one_joint(n_joint, half))
+        return self.solved(*every)[0].joined(self.solved(*alone)[0])
 
     def _shapes(self, steps: int, shift: float) -> np.ndarray:
         """Shapes ``(n_joint, n)`` of a lattice, with those where a joint is at its limit, and where on its lines links touch.
@@ -86,10 +91,10 @@ class Domain:
                 found.append(drawn_in(self.body, outside[:, touches], inside[:, touches], _EDGE))
         return np.concatenate(found, axis=1)
 
-    def _at_all(self, shapes: int, shift: float, rates: np.ndarray) -> CoulombMotion:
+    def _representatives(self, shapes: int, shift: float) -> np.ndarray:
+        """One of each class of mirror images of those."""
         angles = self._shapes(shapes, shift)
-        angles = angles[:, fundamental(self.body, angles)]
-        return self.solved(np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1]))[0]
+        return angles[:, fundamental(self.body, angles)]
 
     def summits(
         self,
@@ -118,8 +123,10 @@ class Domain:
                 top, best, size, n = top.take(going), best[going], size[going], going.size
                 angles, rates = top.angles, top.rates
             move = rng.standard_normal((2 * n_joint, n, _FRAMES))
-            # along a crease that holds for the same rates at many shapes, as where one joint turns and the rest sticks
+            # along a crease that holds for the same rates at many shapes, as where one joint turns and the rest sticks;
             move[n_joint:, :, :_STEADY] = 0.0
+            # along one that holds as long as some joints rest
+            move[n_joint:, :, _STEADY] *= rates != 0.0
             # a direction of rates means nothing along the rates themselves
             along = (move[n_joint:] * rates[:, :, None]).sum(axis=0)
             move[n_joint:] -= along * rates[:, :, None]
@@ -147,3 +154,8 @@ class Domain:
             best = np.where(up, found[choice], best)
             size = np.where(up, _GROW * size, _SHRINK * size)
         return top
+
+
+def _pairs(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every shape with all rates, ``(n_joint, n)`` each."""
+    return np.repeat(angles, rates.shape[1], axis=1), np.tile(rates, angles.shape[1])

@@ -32,6 +32,9 @@ from colloc.mechanics.native_kernel import compiled_balance, native_kernel
 from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 
+_SMOOTHER = 2.0
+"""Times delta, at which a balance is solved first that cannot be solved at delta itself."""
+
 
 class _Batch:
     """Instants that share a reference link: what an iteration evaluates on subsets of them, at deltas that are given."""
@@ -115,7 +118,8 @@ def solve_balance(
     tolerance : float
         Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
-        Steps allowed to an instant in each of at most four attempts; with each link at rest as many again.
+        Steps allowed to an instant in each of at most four attempts; with each link at rest as many again, and from the
+        balance of a larger delta.
     method : {"auto", "newton", "fixed_point"}
         "auto" damps Newton and falls back on the paper's fixed point; the others are for comparison.
 
@@ -168,13 +172,20 @@ def solve_balance(
     solved = _numpy_balance if library is None else partial(compiled_balance, library)
     moving = Moving(body, friction, angles, rates, float(delta), load)
     found = solved(moving, start, *settings)
-    for link in range(body.n_link if method == "auto" else 0):
+    for link in (*range(body.n_link), None) if method == "auto" else ():
         failed = np.flatnonzero(~(found[1] <= tolerance))
         if not failed.size:
             break
-        # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
         there = moving.at(failed)
-        again = solved(there, there.with_link_at_rest(link), *settings)
+        if link is not None:
+            # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
+            begun = there.with_link_at_rest(link)
+        elif load is None and delta < np.abs(there.rates).max():
+            # several rest nearly, each where the others let it: followed from where friction is smoother
+            begun = solve_balance(*there[:4], _SMOOTHER * delta, tolerance=tolerance, max_iterations=max_iterations).z
+        else:
+            break
+        again = solved(there, begun, *settings)
         better = again[1] <= tolerance
         for old, new in zip(found, again, strict=True):
             old[..., failed[better]] = new[..., better]
