@@ -26,6 +26,8 @@ the rest is looked at again when the gait has moved."""
 _HELD_SHARE, _HELD_NEAR = 1e-3, 0.05
 """A check is replaced by its tangent plane where both sums have at least this share in it and where it is nearer to its bound
 than this [rad]: elsewhere the gait may move far, and the plane would forbid what is free."""
+_STEP, _LARGEST, _STEPS = 1e-3, 0.1, 4
+"""Of Newton's method for a moving worst instant, as shares of its cell: between the samples, and the largest; and how many."""
 
 
 def worst_instants(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck]) -> list[np.ndarray]:
@@ -73,6 +75,34 @@ def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray) -> np.n
         offset = np.where(curvature < 0, 0.5 * (low - high) / curvature, 0.0)
     offset = np.where(best == inner, np.clip(offset, -1, 1), 0.0)
     return times[rows, best] + offset * width / _SAMPLES
+
+
+def followed(
+    check: ShapeCheck, shares: np.ndarray, gait: Gait, times: np.ndarray, left: np.ndarray, right: np.ndarray
+) -> np.ndarray:
+    """The worst instants of a gait near those of another one, in the same cells and with the shares held, ``(n,)``.
+
+    By Newton's method on the check along the gait. What was on the edge of its cell stays there: the next cell has it too.
+    """
+    step = _STEP * (right - left)
+    inside = np.flatnonzero((left + step < times) & (times < right - step))
+    if not inside.size:
+        return times
+    least, most, step, held = (left + step)[inside], (right - step)[inside], step[inside], np.tile(shares[inside], 3)[None]
+
+    def heights(t: np.ndarray) -> np.ndarray:
+        return check.cut(gait.angles(np.concatenate([t - step, t, t + step])), held).full().reshape(3, -1)
+
+    now, largest = times[inside], _LARGEST / _STEP * step
+    sign = 1.0 if check.row is None else np.sign(heights(now)[1])  # angles are bounded both ways
+    for _ in range(_STEPS):
+        before, here, after = sign * heights(now)
+        bend = before - 2 * here + after
+        move = np.where(bend < 0, 0.5 * (before - after) / np.where(bend < 0, bend, 1.0), 0.0) * step
+        now = np.clip(now + np.clip(move, -largest, largest), least, most)
+    worst = times.copy()
+    worst[inside] = now
+    return worst
 
 
 def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
 from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.collocation.worst_instants import check_values, held_shares, peaks
+from colloc.collocation.worst_instants import check_values, followed, held_shares, peaks
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import widest
@@ -14,6 +17,7 @@ from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
+from colloc.numerics.sqp import remembered
 
 
 class HarmonicSpace:
@@ -25,6 +29,7 @@ class HarmonicSpace:
     """
 
     knots: np.ndarray | None = None
+    _follows: Callable[[np.ndarray], list[_Placed]] | None
 
     def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
         self.problem, self.far = problem, far
@@ -77,14 +82,14 @@ class HarmonicSpace:
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
         """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad]."""
         gait, n_joint, limit = self.member(v), self.problem.body.n_joint, self.problem.joint_limit
-        self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
+        self._placed, self._follows, self.watched, low, high, excess = [], None, {}, [], [], -np.inf
         for check, (cells, times) in zip(self.checks, peaks(gait, self.mesh, self.checks, limit), strict=True):
             self.watched[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
             values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
-            self._placed.append((check, held_shares(check, gait, times), matrix))
+            self._placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells))
             excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
             low.append(lower)
             high.append(upper)
@@ -93,25 +98,47 @@ class HarmonicSpace:
         self.row_upper = np.concatenate([*high, [np.inf]])
         return excess
 
+    def follow_worst(self) -> None:
+        self._follows = remembered(self._at_worst)
+
+    def _at_worst(self, v: np.ndarray) -> list[_Placed]:
+        gait, n_joint, moved = self.member(v), self.problem.body.n_joint, []
+        for check, shares, _, times, cells in self._placed:
+            worst = followed(check, shares, gait, times, self.mesh.edges[cells], self.mesh.edges[cells + 1])
+            moved.append(_Placed(check, shares, self.problem.gait.angle_matrix(worst, n_joint), times, cells))
+        return moved
+
+    def _rows_at(self, v: np.ndarray) -> list[_Placed]:
+        return self._placed if self._follows is None else self._follows(v)
+
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """None: parameters are alike."""
         return None
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        values = [self._value(v, *placed) for placed in self._placed]
+        values = [placed.value(v) for placed in self._rows_at(v)]
         return np.concatenate([*values, [v @ self._square @ v]])
 
-    @staticmethod
-    def _value(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        if check.row is not None:
-            return (check.row @ matrix) @ v
-        return check.cut((matrix @ v).T, shares[None]).full().ravel()
-
-    @staticmethod
-    def _slope(v: np.ndarray, check: ShapeCheck, shares: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        if check.row is not None:
-            return check.row @ matrix
-        return np.einsum("jt,tjp->tp", check.slope((matrix @ v).T, shares[None]).full(), matrix)
-
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        return np.vstack([*(self._slope(v, *placed) for placed in self._placed), 2 * self._square @ v])
+        return np.vstack([*(placed.slope(v) for placed in self._rows_at(v)), 2 * self._square @ v])
+
+
+class _Placed(NamedTuple):
+    """A check at instants, one in each of some mesh cells: the shares that its cuts hold, and what the shapes there are of the
+    parameters, ``(n, n_joint, n_parameter)``."""
+
+    check: ShapeCheck
+    shares: np.ndarray
+    matrix: np.ndarray
+    times: np.ndarray
+    cells: np.ndarray
+
+    def value(self, v: np.ndarray) -> np.ndarray:
+        if self.check.row is not None:
+            return (self.check.row @ self.matrix) @ v
+        return self.check.cut((self.matrix @ v).T, self.shares[None]).full().ravel()
+
+    def slope(self, v: np.ndarray) -> np.ndarray:
+        if self.check.row is not None:
+            return self.check.row @ self.matrix
+        return np.einsum("jt,tjp->tp", self.check.slope((self.matrix @ v).T, self.shares[None]).full(), self.matrix)

@@ -191,6 +191,9 @@ class MixtureSpace:
         self.row_upper = np.concatenate([closing, *high, [np.inf]])
         return excess
 
+    def follow_worst(self) -> None:
+        """Nothing: ends and middles of pieces move with those alone."""
+
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """None: parameters are alike."""
         return None

@@ -59,6 +59,10 @@ class SearchSpace(Shapes, Protocol):
         """Place every check at the worst instants of the gait v, or later by a share of its mesh cell; how far the gait exceeds
         any bound there [rad]."""
 
+    def follow_worst(self) -> None:
+        """Until they are placed again, the rows of checks are those at the worst instants of whatever gait they are
+        asked for, in the cells where they stand. As long as such an instant is not on an edge, their slopes are the same."""
+
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near an optimum; None for 1."""
 

@@ -165,6 +165,9 @@ def at_rest(
     for _ in range(rounds or _ROUNDS[accuracy]):
         before, worse = v, violation
         fresh = curvature is None
+        if len(ends) > 1:
+            # with the instants held, every round overshoots where they move far with the gait
+            program.space.follow_worst()
         if fresh and accuracy < VERY_ROUGH:
             curvature = program.space.metric(v)
         result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
