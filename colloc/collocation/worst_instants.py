@@ -77,32 +77,33 @@ def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray) -> np.n
     return times[rows, best] + offset * width / _SAMPLES
 
 
+def moving(values: np.ndarray, check: ShapeCheck, limit: Limit, times: np.ndarray, mesh: Mesh, cells: np.ndarray) -> np.ndarray:
+    """Which of the worst instants of cells move with the gait and might bind, ``(k,)`` int: those near their bound and off the
+    edges of their cells. What is on an edge stays there: the next cell has it too."""
+    near = check.excess(values, limit) > -_NEAR
+    share = (times - mesh.edges[cells]) / mesh.h[cells]
+    return np.flatnonzero(near & (share > _STEP) & (share < 1 - _STEP))
+
+
 def followed(
-    check: ShapeCheck, shares: np.ndarray, gait: Gait, times: np.ndarray, left: np.ndarray, right: np.ndarray
+    check: ShapeCheck, shares: np.ndarray, gait: Gait, times: np.ndarray, left: np.ndarray, h: np.ndarray
 ) -> np.ndarray:
     """The worst instants of a gait near those of another one, in the same cells and with the shares held, ``(n,)``.
 
-    By Newton's method on the check along the gait. What was on the edge of its cell stays there: the next cell has it too.
+    By Newton's method on the check along the gait. Cells begin at `left` and are `h` wide.
     """
-    step = _STEP * (right - left)
-    inside = np.flatnonzero((left + step < times) & (times < right - step))
-    if not inside.size:
-        return times
-    least, most, step, held = (left + step)[inside], (right - step)[inside], step[inside], np.tile(shares[inside], 3)[None]
+    step, held = _STEP * h, np.tile(shares, 3)[None]
 
     def heights(t: np.ndarray) -> np.ndarray:
         return check.cut(gait.angles(np.concatenate([t - step, t, t + step])), held).full().reshape(3, -1)
 
-    now, largest = times[inside], _LARGEST / _STEP * step
-    sign = 1.0 if check.row is None else np.sign(heights(now)[1])  # angles are bounded both ways
+    sign = 1.0 if check.row is None else np.sign(heights(times)[1])  # angles are bounded both ways
     for _ in range(_STEPS):
-        before, here, after = sign * heights(now)
+        before, here, after = sign * heights(times)
         bend = before - 2 * here + after
         move = np.where(bend < 0, 0.5 * (before - after) / np.where(bend < 0, bend, 1.0), 0.0) * step
-        now = np.clip(now + np.clip(move, -largest, largest), least, most)
-    worst = times.copy()
-    worst[inside] = now
-    return worst
+        times = np.clip(times + np.clip(move, -_LARGEST * h, _LARGEST * h), left + step, left + h - step)
+    return times
 
 
 def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:

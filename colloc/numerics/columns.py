@@ -6,9 +6,6 @@ takes longer than the functions themselves.
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import replace
-
 import casadi as ca
 import numpy as np
 
@@ -54,11 +51,10 @@ class ChosenRows:
     block as they are now."""
 
     def __init__(self, assembly: Assembly, kept: np.ndarray, parameters: list[np.ndarray]) -> None:
-        self._linear, self._used, blocks = assembly.linear[kept], [], []
+        self._linear, blocks = assembly.linear[kept], []
         for block, given in zip(assembly.blocks, parameters, strict=True):
             scatter, n_out = block.scatter[kept], block.function.n_out
             used = np.unique(scatter.indices // n_out)
-            self._used.append(used)
             if used.size:
                 columns = (used[:, None] * n_out + np.arange(n_out)).ravel()
                 blocks.append(Block(block.function, block.gather[:, used], scatter[:, columns], given[:, used]))
@@ -66,13 +62,6 @@ class ChosenRows:
         key = terms.row.astype(int) * assembly.n + terms.column
         self._places, self._weights = summed(key, terms.source, terms.weight, terms.n_source)
         self._parts = [_Part(block) for block in blocks]
-
-    def given(self, parameters: list[np.ndarray]) -> ChosenRows:
-        """The same rows with other instance parameters."""
-        rows, parts = copy(self), iter(self._parts)
-        pairs = zip(self._used, parameters, strict=True)
-        rows._parts = [next(parts).given(values[:, used]) for used, values in pairs if used.size]
-        return rows
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """``(n_row,)`` at the variables x."""
@@ -91,12 +80,6 @@ class _Part:
     def __init__(self, block: Block) -> None:
         self._block, self._no_delta = block, np.zeros((1, block.n_instance))
         self._value, self._jacobian = ColumnFunction(block.function.value), ColumnFunction(block.function.jacobian)
-
-    def given(self, parameters: np.ndarray) -> _Part:
-        """The same with other instance parameters."""
-        part = copy(self)
-        part._block = replace(self._block, parameters=parameters)
-        return part
 
     def _arguments(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return x[self._block.gather], self._block.parameters, self._no_delta

@@ -9,7 +9,7 @@ import numpy as np
 
 from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.collocation.worst_instants import check_values, followed, held_shares, peaks
+from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, peaks
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import widest
@@ -89,7 +89,8 @@ class HarmonicSpace:
                 continue
             times = times + later * self.mesh.h[cells]
             values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
-            self._placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells))
+            may_move = moving(values, check, limit, times, self.mesh, cells)
+            self._placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move))
             excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
             low.append(lower)
             high.append(upper)
@@ -102,11 +103,17 @@ class HarmonicSpace:
         self._follows = remembered(self._at_worst)
 
     def _at_worst(self, v: np.ndarray) -> list[_Placed]:
-        gait, n_joint, moved = self.member(v), self.problem.body.n_joint, []
-        for check, shares, _, times, cells in self._placed:
-            worst = followed(check, shares, gait, times, self.mesh.edges[cells], self.mesh.edges[cells + 1])
-            moved.append(_Placed(check, shares, self.problem.gait.angle_matrix(worst, n_joint), times, cells))
-        return moved
+        gait, found = self.member(v), []
+        for placed in self._placed:
+            which, matrix = placed.moving, placed.matrix
+            if which.size:
+                cells = placed.cells[which]
+                at = placed.times[which], self.mesh.edges[cells], self.mesh.h[cells]
+                matrix = matrix.copy()
+                worst = followed(placed.check, placed.shares[which], gait, *at)
+                matrix[which] = self.problem.gait.angle_matrix(worst, self.problem.body.n_joint)
+            found.append(placed._replace(matrix=matrix))
+        return found
 
     def _rows_at(self, v: np.ndarray) -> list[_Placed]:
         return self._placed if self._follows is None else self._follows(v)
@@ -124,14 +131,15 @@ class HarmonicSpace:
 
 
 class _Placed(NamedTuple):
-    """A check at instants, one in each of some mesh cells: the shares that its cuts hold, and what the shapes there are of the
-    parameters, ``(n, n_joint, n_parameter)``."""
+    """A check at instants, one in each of some mesh cells: the shares that its cuts hold, what the shapes there are of the
+    parameters, ``(n, n_joint, n_parameter)``, and which instants move with the gait."""
 
     check: ShapeCheck
     shares: np.ndarray
     matrix: np.ndarray
     times: np.ndarray
     cells: np.ndarray
+    moving: np.ndarray
 
     def value(self, v: np.ndarray) -> np.ndarray:
         if self.check.row is not None:

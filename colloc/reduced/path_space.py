@@ -7,13 +7,11 @@ of the first where the path closes smoothly. A polygon is its vertices.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import casadi as ca
 import numpy as np
 
 from colloc.collocation.path_transcription import path_through, transcribe_fit
-from colloc.collocation.worst_instants import check_values, followed, held_shares, peaks
+from colloc.collocation.worst_instants import check_values, held_shares, peaks
 from colloc.gaits.free_path import ArcPath
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.path_samples import arcs_through
@@ -201,46 +199,24 @@ class PathSpace:
         p, fit = self.full_parameters(v), self._fit
         gait, limit = fit.member(p), self.problem.joint_limit
         mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
-        self._placed: list[tuple] = []
-        self._follows: Callable[[np.ndarray], ChosenRows] | None = None
         given = {name: block.parameters.copy() for name, block in zip(self._geometry.blocks, fit.assembly.blocks, strict=True)}
         for check, (cells, times) in zip(fit.checks, peaks(gait, mesh, fit.checks, limit), strict=True):
             self.watched[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * mesh.h[cells]
-            tau, shares = np.clip((times - mesh.edges[cells]) / mesh.h[cells], 0.0, 1.0), held_shares(check, gait, times)
-            self._placed.append((check, cells, tau, shares))
-            given[check.name][:-1] = self._at_fractions(cells, tau)
-            given[check.name][-1, cells] = shares
-            excess = max(excess, float(check.excess(check_values(check, gait, times), limit).max()))
-        self._of_blocks = given
+            tau, values = np.full(mesh.n, 0.5), check_values(check, gait, times)
+            tau[cells] = np.clip((times - mesh.edges[cells]) / mesh.h[cells], 0.0, 1.0)
+            given[check.name][:-1] = self._geometry.given(tau)
+            given[check.name][-1, cells] = held_shares(check, gait, times)
+            excess = max(excess, float(check.excess(values, limit).max()))
         kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
         self.row_lower, self.row_upper = fit.constraint_lower[kept], fit.constraint_upper[kept]
         self._rows = ChosenRows(fit.assembly, kept, list(given.values()))
         return excess
 
-    def _at_fractions(self, cells: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """Instance parameters of a check at fractions of some intervals, and in the middle of the others."""
-        everywhere = np.full(self.mesh.n, 0.5)
-        everywhere[cells] = tau
-        return self._geometry.given(everywhere)
-
     def follow_worst(self) -> None:
-        self._follows = remembered(self._rows_at_worst)
-
-    def _rows_at_worst(self, v: np.ndarray) -> ChosenRows:
-        gait, given = self.member(v), dict(self._of_blocks)
-        mesh = self.phase_mesh(gait)
-        for check, cells, tau, shares in self._placed:
-            left, width = mesh.edges[cells], mesh.h[cells]
-            worst = followed(check, shares, gait, left + tau * width, left, left + width)
-            held = given[check.name][-1:]
-            given[check.name] = np.vstack([self._at_fractions(cells, (worst - left) / width), held])
-        return self._rows.given(list(given.values()))
-
-    def _rows_at(self, v: np.ndarray) -> ChosenRows:
-        return self._rows if self._follows is None else self._follows(v)
+        """Nothing: no path was seen to swing, and rows that follow cost as much as all else."""
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """The mean squared distance that a step of the parameters moves the shapes, and a little for every parameter.
@@ -255,10 +231,10 @@ class PathSpace:
         return np.asarray(metric + _SOFT * metric.diagonal().max() * np.eye(self.n))
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        return self._rows_at(v).values(self.full_parameters(v))
+        return self._rows.values(self.full_parameters(v))
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        return self.from_full(v, self._rows_at(v).slopes(self.full_parameters(v)))
+        return self.from_full(v, self._rows.slopes(self.full_parameters(v)))
 
 
 class _Nearest:

@@ -165,7 +165,7 @@ def at_rest(
     for _ in range(rounds or _ROUNDS[accuracy]):
         before, worse = v, violation
         fresh = curvature is None
-        if len(ends) > 1:
+        if len(ends) > 1 and accuracy < VERY_ROUGH:
             # with the instants held, every round overshoots where they move far with the gait
             program.space.follow_worst()
         if fresh and accuracy < VERY_ROUGH:
