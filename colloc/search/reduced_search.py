@@ -165,7 +165,7 @@ def at_rest(
     for _ in range(rounds or _ROUNDS[accuracy]):
         before, worse = v, violation
         fresh = curvature is None
-        if len(ends) > 1 and accuracy < VERY_ROUGH:
+        if len(ends) > 1:
             # with the instants held, every round overshoots where they move far with the gait
             program.space.follow_worst()
         if fresh and accuracy < VERY_ROUGH:
@@ -289,7 +289,11 @@ def refined(found: Found, report: Report) -> tuple[Found, str]:
         if plan is not None:
             count, kept, radius = count + 1, np.concatenate([kept, plan.kept]), REMESH_RADIUS
             space = space.remeshed(found.gait, plan.edges, plan.scheme)
-            v, accuracy = space.parameters(found.gait), FINE if count > _SAME_AIM else ROUGH
+            accuracy = FINE if count > _SAME_AIM else ROUGH
+            try:
+                v = space.parameters(found.gait)
+            except NotConvergedError:
+                v = space.laid(found.gait)  # breaks a row a little, as its own mesh lets it
         known = found.curvature if found.v.size == v.size else None
         found = settled_apart(space, v, found.delta, radius, accuracy, known)
         report(found)

@@ -76,7 +76,8 @@ def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
     outcome = Outcome(start, status, solution.message, guess, solution.gait)
     if measured is not None:
         found = {name: getattr(measured, name) for name in ("value", "efficiency", "distance", "work")}
-        outcome = replace(outcome, delta=optimal[-1].delta, **found)
+        level = solution.last if certificate.replayed else optimal[-1]
+        outcome = replace(outcome, delta=level.delta, **found)
     if certificate.replayed:
         errors = {name: getattr(certificate, name) for name in ("value_error", "efficiency_error")}
         outcome = replace(outcome, **errors)

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import Harmonic, Problem, ellipse
+from colloc import Harmonic, NotConvergedError, Polygon, Problem, ellipse
 from colloc.numerics.sqp import stationarity
+from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.search.full_program import RADIUS, answer
 from colloc.search.reduced_search import FINE, Found, at_rest, kink_or_not, searched
@@ -81,3 +82,19 @@ def test_a_kink_may_be_missed_by_more_where_the_slopes_beside_it_are_small(slope
     found = Found(PROBLEM, v, 1e-4, vee.objective(v), stationarity(vee, v), FINE, 0, 0, 0.0, program=vee)
     assert not found.optimal
     assert kink_or_not(found).on_kink == kink
+
+
+def test_a_gait_that_a_finer_mesh_finds_no_member_near_goes_on_from_about_it(monkeypatch):
+    problem = Problem("sides", gait=Polygon(4, "bilateral"))
+    member, asked = PathSpace.parameters, []
+
+    def near_once(space, gait):
+        asked.append(space)
+        if len(asked) > 1:
+            raise NotConvergedError("found none near the guess.")
+        return member(space, gait)
+
+    monkeypatch.setattr(PathSpace, "parameters", near_once)
+    found, lacks = searched(problem, problem.guess, lambda level: None)
+    assert len(asked) > 1
+    assert (found.optimal, lacks) == (True, "")

@@ -3,6 +3,7 @@
 import json
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -136,6 +137,22 @@ def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     assert is_trivial(solution)
     assert solution.status != SOLVED
     assert "goes nowhere" in solution.message
+
+
+def test_a_start_that_reached_no_optimum_is_told_with_what_its_replay_measured(monkeypatch):
+    """Replayed it is in any case; no level has to be optimal for that."""
+    problem = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=10)
+
+    def stopped(*asked, **how):
+        solution = maximise_efficiency(*asked, **how)
+        solution.levels[:] = [replace(level, optimal=False) for level in solution.levels]
+        return solution
+
+    monkeypatch.setattr(campaign, "maximise_efficiency", stopped)
+    outcome = campaign.run_guess(problem, lambda: problem.guess, 3, np.inf)
+    assert outcome.status not in (ERROR, SOLVED)
+    assert outcome.delta == problem.delta
+    assert outcome.efficiency > 0
 
 
 def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
