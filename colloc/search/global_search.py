@@ -1,9 +1,9 @@
 """The best gait, not the nearest one: many starts, cheaply told apart, the promising ones followed to the end.
 
 A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it meets a gait that an
-earlier start came through, at the same delta, it goes on as that one did, and is dropped. After every four new starts come
-four hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). What is left is sorted by its value;
-the first few are followed to the final delta, and the best of those is refined, answered and certified.
+earlier start came through, at the same delta, it goes on as that one did, and is dropped. After every sixteen new starts
+come as many hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). What is left is sorted by its
+value; the first few are followed to the final delta, and the best of those is refined, answered and certified.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _BROKEN = 1e-2
 _FOLLOWED, _PROMISING, _CLOSE = 3, 0.8, 0.01
 """How many gaits are followed to the final delta, the share of the best value that they need at the coarse one, and how
 far they may be from the best at the final one to be optimised on the whole mesh."""
-_TURN, _HOP_SIZES, _HOP_SEED = 4, (0.2, 0.4, 0.8), 1
+_TURN, _HOP_SIZES, _HOP_SEED = 16, (0.2, 0.4, 0.8), 1
 """Starts and hops from the best gait known take turns of so many, and how far hops go [rad], in turn. At 0.2 a hop mostly falls
 back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start k is depends on
 what came before alone: more starts go wherever fewer do."""

@@ -39,6 +39,7 @@ def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside
 @pytest.mark.parametrize(
     ("changed", "starts"),
     [
+        ({}, 4),
         ({}, 8),
         ({}, 16),
         ({}, 32),
@@ -99,7 +100,7 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
 
 
 def test_more_starts_go_wherever_fewer_do(monkeypatch):
-    """New starts and hops take turns of four, and what a hop begins from depends on what came before alone."""
+    """New starts and hops take turns, and what a hop begins from depends on what came before alone."""
     begun = {}
 
     def follow(space, v, number, deltas, known):
@@ -109,11 +110,11 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
 
     monkeypatch.setattr(global_search, "_follow", follow)
     problem = Problem("turns", gait=Harmonic(1, "bilateral"))
-    candidates(problem, 6, lambda: True, lambda step: None)
+    candidates(problem, 18, lambda: True, lambda step: None)
     fewer, begun = begun, {}
-    candidates(problem, 20, lambda: True, lambda step: None)
-    assert [deltas for _, deltas in begun.values()] == 2 * ([2] * 4 + [1] * 4) + [2] * 4
-    assert 6 < len(fewer) < 20
+    candidates(problem, 40, lambda: True, lambda step: None)
+    assert [deltas for _, deltas in begun.values()] == [2] * 16 + [1] * 16 + [2] * 8
+    assert len(fewer) == 18
     for number, (v, deltas) in fewer.items():
         assert deltas == begun[number][1]
         np.testing.assert_array_equal(v, begun[number][0])
