@@ -98,6 +98,11 @@ def described(problem: Problem) -> str:
     return f"{best}{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}{limit}{slope}"
 
 
+def known_bests() -> dict[str, float]:
+    """The best value ever found, by name of problem."""
+    return json.loads(BEST.read_text(encoding="utf-8")) if BEST.exists() else {}
+
+
 def main() -> None:
     """Run the zoo and print what came out."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -106,7 +111,7 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=STARTS, metavar="N", help="more look for better answers")
     parser.add_argument("--laws", action="store_true", help="the family of other laws, objectives and limits")
     options = parser.parse_args()
-    best = json.loads(BEST.read_text(encoding="utf-8")) if BEST.exists() else {}
+    best = known_bests()
     solved, quality, seconds = [], [], []
     for number in range(options.first, options.first + options.problems):
         problem = law_problem(number) if options.laws else zoo_problem(number)
@@ -119,7 +124,7 @@ def main() -> None:
         seconds.append(time.process_time() - begin)
         solved.append(status == SOLVED)
         if status == SOLVED and value > best.get(problem.name, 0.0):
-            best[problem.name] = value
+            best = {**known_bests(), problem.name: value}  # another run may have written meanwhile
             BEST.write_text(json.dumps(best, indent=1, sort_keys=True) + "\n", encoding="utf-8")
         quality.append(value / best[problem.name] if solved[-1] else 0.0)
         line = f"{number:4d} {status:18s} {value:9.6f} {quality[-1]:7.4f} {seconds[-1]:7.2f} s  {described(problem)}"
