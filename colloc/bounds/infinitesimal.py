@@ -34,9 +34,9 @@ class SmallGait(NamedTuple):
     rates: np.ndarray
     weights: np.ndarray
 
-    def path(self, shape: np.ndarray, size: float) -> np.ndarray:
-        """Corners ``(n_joint, m)`` of the closed polygon about `shape` that runs through the directions by angle."""
-        order = np.argsort(np.arctan2(self.rates[-1], self.rates[0]))
+    def path(self, shape: np.ndarray, size: float, *, back: bool = False) -> np.ndarray:
+        """Corners ``(n_joint, m)`` of the closed polygon about `shape` that runs through the directions by angle, or `back`."""
+        order = np.argsort(np.arctan2(self.rates[-1], self.rates[0]))[:: -1 if back else 1]
         sides = (self.rates * self.weights)[:, order]
         corners = np.cumsum(sides, axis=1)
         corners = corners - corners.mean(axis=1, keepdims=True)
@@ -50,8 +50,21 @@ _ROUNDS = 12
 _GAIN = 1e-7
 
 
-class _Program:
-    """The linear program over the motions at one shape."""
+def best_mixture(motion: CoulombMotion, heading: float) -> tuple[float, np.ndarray, np.ndarray]:
+    """The linear program over motions at one shape: efficiency along `heading`, weights ``(m,)`` for unit work, and multipliers
+    of closure, rotation and work."""
+    along = np.cos(heading) * motion.velocity[0] + np.sin(heading) * motion.velocity[1]
+    closed = np.vstack([motion.rates, motion.spin, motion.power])
+    right = np.zeros(len(closed))
+    right[-1] = 1.0
+    program = linprog(-along, A_eq=closed, b_eq=right, bounds=(0, None), method="highs-ds")
+    if program.status != 0:
+        raise NotConvergedError(f"the linear program of the small gait failed: {program.message}")
+    return -program.fun, program.x, -program.eqlin.marginals
+
+
+class _Columns:
+    """Motions at one shape that the linear program may use."""
 
     def __init__(self, body: Chain, friction: Friction, shape: np.ndarray, delta: float) -> None:
         self.body, self.friction, self.shape, self.delta = body, friction, np.asarray(shape, dtype=float), delta
@@ -59,17 +72,6 @@ class _Program:
     def motion(self, rates: np.ndarray) -> CoulombMotion:
         angles = np.repeat(self.shape[:, None], rates.shape[1], axis=1)
         return balanced_motion(self.body, self.friction, angles, rates, self.delta)
-
-    def solve(self, motion: CoulombMotion, heading: float) -> tuple[float, np.ndarray, np.ndarray]:
-        """Efficiency along `heading`, weights of the motions, and multipliers of closure, rotation and work."""
-        along = np.cos(heading) * motion.velocity[0] + np.sin(heading) * motion.velocity[1]
-        closed = np.vstack([motion.rates, motion.spin, motion.power])
-        right = np.zeros(len(closed))
-        right[-1] = 1.0
-        program = linprog(-along, A_eq=closed, b_eq=right, bounds=(0, None), method="highs-ds")
-        if program.status != 0:
-            raise NotConvergedError(f"the linear program of the small gait failed: {program.message}")
-        return -program.fun, program.x, -program.eqlin.marginals
 
     def turned(self, motion: CoulombMotion, weights: np.ndarray) -> tuple[float, np.ndarray]:
         """Direction of travel and displacement of a mixture."""
@@ -117,22 +119,22 @@ def small_gait(
     the heading becomes the direction of travel of its optimum, until neither gains. Sharp stick-slip creases are found so,
     which no fixed set of directions does.
     """
-    program = _Program(body, friction, shape, _DELTA)
-    motion = program.motion(unit_directions(body.n_joint, directions, half=False))
+    columns = _Columns(body, friction, shape, _DELTA)
+    motion = columns.motion(unit_directions(body.n_joint, directions, half=False))
     turn = np.pi if friction.reversible else 2 * np.pi
-    value, heading = max((program.solve(motion, h)[0], h) for h in np.arange(headings) * (turn / headings))
+    value, heading = max((best_mixture(motion, h)[0], h) for h in np.arange(headings) * (turn / headings))
     for _ in range(rounds):
-        new_value, weights, multipliers = program.solve(motion, heading)
+        new_value, weights, multipliers = best_mixture(motion, heading)
         if new_value > value:
             value = new_value
-        way = program.turned(motion, weights)[0]
-        more = program.motion(program.climbed(motion, heading, multipliers, np.pi / directions))
+        way = columns.turned(motion, weights)[0]
+        more = columns.motion(columns.climbed(motion, heading, multipliers, np.pi / directions))
         motion = motion.joined(more)
-        trial = program.solve(motion, way)[0]
-        heading = way if trial >= program.solve(motion, heading)[0] else heading
-        if program.solve(motion, heading)[0] < value + _GAIN:
+        trial = best_mixture(motion, way)[0]
+        heading = way if trial >= best_mixture(motion, heading)[0] else heading
+        if best_mixture(motion, heading)[0] < value + _GAIN:
             break
-    value, weights, _ = program.solve(motion, heading)
+    value, weights, _ = best_mixture(motion, heading)
     used = weights > 1e-9 * weights.max()
     return SmallGait(float(value), heading, motion.rates[:, used], weights[used])
 

@@ -2,8 +2,9 @@
 
 A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it meets a gait that an
 earlier start came through, at the same delta, it goes on as that one did, and is dropped. After every sixteen new starts
-come as many hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). What is left is sorted by its
-value; the first few are followed to the final delta, and the best of those is refined, answered and certified.
+come as many hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). A few of the first are small
+loops (`colloc.search.small_starts`), slow and so followed at a smaller delta only. What is left is sorted by its value at that
+one; the first few are followed to the final delta, and the best of those is refined, answered and certified.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
 from colloc.mechanics.chain import Chain
 from colloc.reduced.closure import closed_gait
-from colloc.reduced.program import SearchSpace
+from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_about, space_near
 from colloc.results.equivalence import distance
 from colloc.results.steps import Alternative, SearchStep
@@ -39,6 +40,7 @@ from colloc.search.reduced_search import (
     is_viscous,
     settled_apart,
 )
+from colloc.search.small_starts import small_loops
 from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS = 32
@@ -56,6 +58,8 @@ _TURN, _HOP_SIZES, _HOP_SEED = 16, (0.2, 0.4, 0.8), 1
 """Starts and hops from the best gait known take turns of so many, and how far hops go [rad], in turn. At 0.2 a hop mostly falls
 back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start k is depends on
 what came before alone: more starts go wherever fewer do."""
+_LOOP_EVERY = 3
+"""Of the first starts, how many there are from one small loop to the next."""
 _PATIENCE, _MOST = 8, 3
 """The search goes on until so many in a row have led nowhere better; at most so many times the starts asked for are tried."""
 _SPARE = 8
@@ -72,9 +76,10 @@ Watch = Callable[[SearchStep], object]
 
 @dataclass(eq=False)
 class Candidate:
-    """A gait that one or more starts came through, and where it led."""
+    """A gait that one or more starts came through, where it led, and its objective at a delta that is small for all."""
 
     found: Found
+    dry: float = np.inf
     starts: list[int] = field(default_factory=list)
     then: Candidate | None = None
 
@@ -111,13 +116,18 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
     coarse = problem.with_(intervals=min(problem.intervals, max(problem.gait.coarse_intervals(problem.body.n_joint), _FEWEST)))
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)  # compared where friction is nearly dry
     deltas = [max(delta, problem.delta) for delta in (problem.delta_start, _NEARLY_DRY * usual)]
+    # where friction is as dry for a loop as slow as may be
+    dry = max(deltas[-1] * (1.0 if problem.gait.unit_speed else problem.smallest_shape_speed), problem.delta)
     known: list[list[Candidate]] = [[] for _ in deltas]
-    starts, last, tried, best = starting_gaits(problem), count - 1, 0, 0.0
+    small: list[Candidate] = []
+    starts, loops, last, tried, best = starting_gaits(problem), small_loops(problem), count - 1, 0, 0.0
     while tried == 0 or (tried <= min(last, _MOST * count - 1) and goes_on()):
         start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
-            if start // _TURN % 2 == 0 or not known[-1]:
+            if loops and start % _LOOP_EVERY == 1:
+                _follow(*space_about(coarse, closed_gait(coarse, loops.pop(0), dry)), start, [dry], [small])
+            elif start // _TURN % 2 == 0 or not known[-1]:
                 _follow(*space_about(coarse, closed_gait(coarse, next(starts), deltas[0])), start, deltas, known)
             else:
                 shaken = _shaken(problem, min((c.found for c in known[-1]), key=lambda f: f.objective).gait, start)
@@ -125,8 +135,16 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
         before, best = best, min((c.found.objective for c in known[-1]), default=0.0)
         if start > 0 and best < before - _SAME_EFFICIENCY * abs(before):
             last = max(last, start + _PATIENCE)
-        watch(_step("starts", tried, max(tried, count), [c.found for c in known[-1]]))
-    return sorted(known[-1], key=lambda c: c.found.objective), tried
+        watch(_step("starts", tried, max(tried, count), [c.found for c in (*known[-1], *small)]))
+
+    for candidate in (ends := [*known[-1], *small]):
+        candidate.dry = objective_at(dry, candidate.found)
+    return sorted(ends, key=lambda c: c.dry), tried
+
+
+def objective_at(delta: float, found: Found) -> float:
+    """Minus the value of a gait at another delta, as it is; inf where it has none."""
+    return float(np.nan_to_num(ReducedProgram(found.space, delta).objective(found.v), nan=np.inf))
 
 
 def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
@@ -225,9 +243,9 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     def is_finite(found: Found) -> bool:
         return not on_speed_floor(problem, found.gait)
 
-    least = -known[0].found.objective - (1 - _PROMISING) * abs(known[0].found.objective)
+    least = -known[0].dry - (1 - _PROMISING) * abs(known[0].dry)
     # gaits of finite size may shrink on the way, so they are followed until one has not
-    queue = [c for c in known if -c.found.objective >= least][:_FOLLOWED]
+    queue = [c for c in known if -c.dry >= least][:_FOLLOWED]
     spare = [c for c in known if is_finite(c.found) and c not in queue][:_SPARE]
     for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(levels[-1]) for _, levels in ends)):

@@ -94,13 +94,14 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
             known[-1].append(global_search.Candidate(found))
 
     monkeypatch.setattr(global_search, "_follow", follow)
+    monkeypatch.setattr(global_search, "objective_at", lambda delta, found: found.objective)
     found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, lambda step: None)
     assert number == tried
     assert found[0].found.objective == -max(better.values())
 
 
 def test_more_starts_go_wherever_fewer_do(monkeypatch):
-    """New starts and hops take turns, and what a hop begins from depends on what came before alone."""
+    """New starts, small loops among them, and hops take turns; what a hop begins from depends on what came before alone."""
     begun = {}
 
     def follow(space, v, number, deltas, known):
@@ -109,11 +110,13 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
         known[-1].append(global_search.Candidate(found))
 
     monkeypatch.setattr(global_search, "_follow", follow)
+    monkeypatch.setattr(global_search, "objective_at", lambda delta, found: found.objective)
     problem = Problem("turns", gait=Harmonic(1, "bilateral"))
     candidates(problem, 18, lambda: True, lambda step: None)
     fewer, begun = begun, {}
     candidates(problem, 40, lambda: True, lambda step: None)
-    assert [deltas for _, deltas in begun.values()] == [2] * 16 + [1] * 16 + [2] * 8
+    first = [1 if number in (1, 4, 7, 10) else 2 for number in range(16)]  # small loops are followed at one delta
+    assert [deltas for _, deltas in begun.values()] == first + [1] * 16 + [2] * 8
     assert len(fewer) == 18
     for number, (v, deltas) in fewer.items():
         assert deltas == begun[number][1]

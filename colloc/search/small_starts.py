@@ -1,0 +1,95 @@
+"""Small loops where they travel farthest for their work: starts that samples of a class hardly ever meet.
+
+Dry friction lets a loop of any size move a body, and at a few shapes, such as folded ones, small loops beat most large gaits.
+What the best small loop at a shape is worth, and how it runs, a linear program says (`colloc.bounds.infinitesimal`). It is
+solved at shapes drawn from a coarse lattice over all that joints may reach; the search moves shape and loop from there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.bounds.coulomb_motion import CoulombMotion, unit_directions
+from colloc.bounds.infinitesimal import SmallGait, best_mixture
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.guesses import largest_factor
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.limits import widest
+from colloc.gaits.polygon import Corners
+from colloc.gaits.problem import Problem
+from colloc.gaits.starts import laid_into, seed_class
+from colloc.mechanics.law import rate_independent
+from colloc.system.errors import NotConvergedError
+
+_DRAWN, _LEVELS, _SEED = 60, (-1.0, -0.5, 0.0, 0.5, 1.0), 2
+"""Shapes, and the values of every angle among which they are drawn, of the limit."""
+_DIRECTIONS, _HEADINGS = 60, 3
+"""Of rates, and in half a turn: enough to tell shapes apart; the search finds the sharp ones."""
+_SHAPES = 2
+_SIZE = 1.5
+"""Length of a loop, of the least that a gait may have."""
+_DRY = 1e-2
+"""Delta at unit rates, of the first one of the problem."""
+_ALIKE, _UNUSED = 1e-3, 1e-6
+"""Relative difference of the efficiencies of mirror images, which directions are not, and weights of directions that count."""
+
+
+def small_loops(problem: Problem) -> list[AnyGait]:
+    """Loops about the shapes where small ones travel farthest, each both ways round; none where friction is viscous.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    list
+        Gaits of the class that starts are drawn from, best first.
+    """
+    if not rate_independent(problem.friction):
+        return []
+    own, loops = seed_class(problem), []
+    for small, shape in _best_small_gaits(problem)[:_SHAPES]:
+        size = _SIZE * 2 * np.pi * problem.smallest_shape_speed
+        for back in (False, True):
+            path = Corners(small.path(shape, size, back=back))
+            loops.append(laid_into(own, path, problem.body, problem.joint_limit, problem.smallest_shape_speed))
+    return loops
+
+
+def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
+    """The best small gait at every shape that was drawn, with the shape, best first; of equally good ones one."""
+    body, friction, shapes = problem.body, problem.friction, _drawn_shapes(problem)
+    directions = unit_directions(body.n_joint, _DIRECTIONS, half=False)
+    count, delta = directions.shape[1], _DRY * problem.delta_start
+    angles, rates = np.repeat(shapes, count, axis=1), np.tile(directions, shapes.shape[1])
+    solved = body.solve(friction, angles, rates, delta)
+    now = body.motion(friction, angles, rates, delta, solved)
+    # around a closed loop every point of the body is carried as far
+    motions = CoulombMotion(angles, rates, now.centre, now.z[2], now.power)
+    turn = np.pi if friction.reversible else 2 * np.pi
+    headings = np.arange(round(_HEADINGS * turn / np.pi)) * np.pi / _HEADINGS
+    found: list[tuple[SmallGait, np.ndarray]] = []
+    for k, shape in enumerate(shapes.T):
+        here = motions.take(np.arange(k * count, (k + 1) * count)[solved.converged[k * count : (k + 1) * count]])
+        try:
+            value, heading = max((best_mixture(here, h)[0], h) for h in headings)
+        except NotConvergedError:
+            continue
+        weights = best_mixture(here, heading)[1]
+        used = weights > _UNUSED * weights.max()
+        if not any(abs(value - other.efficiency) < _ALIKE * value for other, _ in found):
+            found.append((SmallGait(value, heading, here.rates[:, used], weights[used]), shape))
+    return sorted(found, key=lambda pair: -pair[0].efficiency)
+
+
+def _drawn_shapes(problem: Problem) -> np.ndarray:
+    """Admissible shapes ``(n_joint, n)`` about which a gait of the class may run, without repetition."""
+    body, own, n_joint = problem.body, seed_class(problem), problem.body.n_joint
+    drawn = np.random.default_rng(_SEED).choice(_LEVELS, (_DRAWN, n_joint)) * widest(problem.joint_limit)
+    none = np.zeros((n_joint, own.harmonics))
+    shapes = []
+    for mean in drawn:
+        shape = own.fourier(own.parameters(Fourier(mean, none, none)), n_joint).mean
+        shapes.append(shape * min(1.0, largest_factor(body, problem.joint_limit, shape[:, None])))
+    return np.unique(np.array(shapes), axis=0).T
