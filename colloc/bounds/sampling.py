@@ -27,6 +27,8 @@ _FRAMES, _STEADY = 4, 2
 """Directions, and their opposites, that a climb tries at a step; and in how many of them the rates stay as they are."""
 _FINER = 3
 """Motions of one joint alone are sampled so many times as densely in every angle: their peaks are those hardest to meet."""
+_LATTICE_JOINTS, _SPECIAL = 3, 0.5
+"""More joints have shapes at random; share of joints that are straight or at their limit in every other of these."""
 _TRIAL_STEPS = 4
 _GROW, _SHRINK = 1.25, 0.5
 
@@ -77,9 +79,12 @@ class Domain:
     def _shapes(self, steps: int, shift: float) -> np.ndarray:
         """Shapes ``(n_joint, n)`` of a lattice, with those where a joint is at its limit, and where on its lines links touch.
 
-        The ratio has peaks in corners between limit and contact, which a potential sees only if they are sampled.
+        The ratio has peaks in corners between limit and contact, which a potential sees only if they are sampled. For more than
+        three joints as many at random as three have.
         """
         n_joint, limit = self.body.n_joint, self.joint_limit
+        if n_joint > _LATTICE_JOINTS:
+            return self._scattered((steps + 1) ** _LATTICE_JOINTS, np.random.default_rng(round(1e9 * shift) + steps))
         axis = np.clip(limit * (2.0 * (np.arange(-1, steps + 1) + shift) / steps - 1.0), -limit, limit)
         grid = np.stack(np.meshgrid(*[np.unique(axis)] * n_joint, indexing="ij"))
         held = self.holds(grid.reshape(n_joint, -1)).reshape(grid.shape[1:])
@@ -90,6 +95,14 @@ class Domain:
             for inside, outside, touches in ((one, other, of_one & ~of_other), (other, one, of_other & ~of_one)):
                 found.append(drawn_in(self.body, outside[:, touches], inside[:, touches], _EDGE))
         return np.concatenate(found, axis=1)
+
+    def _scattered(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """`count` shapes at random, in every other of which some joints are straight or at their limit; instead of one where
+        links would cross, the last on the way to it from the straight body."""
+        angles = rng.uniform(-1.0, 1.0, (self.body.n_joint, count))
+        special = (rng.random(angles.shape) < _SPECIAL) & (np.arange(count) % 2 == 1)
+        angles = self.joint_limit * np.where(special, np.rint(angles), angles)
+        return drawn_in(self.body, angles, np.zeros_like(angles), _EDGE)
 
     def _representatives(self, shapes: int, shift: float) -> np.ndarray:
         """One of each class of mirror images of those."""

@@ -93,7 +93,7 @@ def test_rows_are_the_gain_and_its_derivatives():
     np.testing.assert_allclose(matrix @ free + constant, gain, rtol=1e-10, atol=1e-12)
 
 
-@pytest.mark.parametrize("lengths", [(0.4, 0.2, 0.4), (0.2, 0.3, 0.3, 0.2)], ids=len)
+@pytest.mark.parametrize("lengths", [(0.4, 0.2, 0.4), (0.2, 0.3, 0.3, 0.2), (0.15, 0.2, 0.3, 0.2, 0.15)], ids=len)
 @pytest.mark.parametrize("mu", FRICTIONS)
 def test_mirror_images_and_end_swap_move_alike(mu, lengths):
     """The symmetries that halve the unknowns hold for the solved motions, and so for the ratio of any symmetric potential."""
@@ -245,12 +245,15 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
 
 
-def test_four_links_are_not_too_many(monkeypatch):
-    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda domain, budget: domain.body.n_link)
-    assert efficiency_bound(Chain((0.25,) * 4), Friction()) == 4
+def test_more_joints_have_coarser_potentials_by_default(monkeypatch):
+    """No more unknowns than a solver can hold: with the 12 intervals of three links four would have 1,700."""
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda domain, budget: budget.intervals)
+    intervals = [efficiency_bound(Chain((1 / n,) * n), Friction()) for n in (3, 4, 5)]
+    assert intervals == sorted(intervals, reverse=True)
+    assert all(2 * (m + 3) ** (n - 1) / 4 < 400 for n, m in zip((3, 4, 5), intervals, strict=True))
 
 
-@pytest.mark.parametrize(("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((0.2,) * 5), 2.0, "four links")])
+@pytest.mark.parametrize(("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((1 / 6,) * 6), 2.0, "five links")])
 def test_impossible_requests_are_refused(body, limit, match):
     with pytest.raises(ProblemError, match=match):
         efficiency_bound(body, Friction(), limit)
@@ -285,6 +288,19 @@ def test_lattices_of_four_links_have_other_directions_everywhere_and_creases_whe
     assert 0.3 < (resting == 1).sum() / (resting < 2).sum() < 0.7
     assert np.unique(one.rates[:, resting == 0], axis=1).shape[1] == (resting == 0).sum()
     assert not np.isin(one.rates[:, resting == 0], other.rates).any()
+
+
+def test_lattices_of_five_links_are_no_larger_than_those_of_four():
+    """They hold what a tensor grid would: joints at their limit and straight, and shapes where links just touch."""
+    sizes = [Domain(Chain((1 / n,) * n), Friction(), 3.0).lattice(4, 10, 0.2).size for n in (4, 5)]
+    assert sizes[1] < 2 * sizes[0]
+    domain = Domain(Chain((0.2,) * 5), Friction(), 3.0)
+    shapes = np.unique(domain.lattice(6, 10, 0.2).angles, axis=1)
+    assert domain.holds(shapes).all()
+    free = (np.abs(shapes) < 2.97).all(axis=0)
+    touching = ~domain.holds(1.01 * shapes)[free]
+    for special in (np.isclose(np.abs(shapes), 3.0).any(axis=0), (shapes == 0.0).any(axis=0), touching):
+        assert 0.05 < special.mean() < 0.95
 
 
 def test_climbs_go_along_creases_where_one_joint_rests():
