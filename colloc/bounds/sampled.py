@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
 
-VERSION = 5
+VERSION = 6
 """Part of the cache key: raise it when the computation changes its result."""
 
 
@@ -54,6 +54,8 @@ class Budget:
         `intervals` keep the knots even.
     smoothing : float
         Weight of the roughness of the potential.
+    together : int, optional
+        Only potentials that are sums of functions of so many joint angles each.
     """
 
     intervals: int = 12
@@ -65,14 +67,15 @@ class Budget:
     tolerance: float = 5e-4
     first: int = 6
     smoothing: float = 1e-5
+    together: int | None = None
 
 
 QUICK = Budget()
 THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4)
 FOUR_LINKS = Budget(3, shapes=6, directions=40, rounds=80, starts=400, tolerance=1e-3, first=3, smoothing=1e-4)
 """Within 1 % of the best gait known of four equal links, in two minutes: shapes fill three dimensions."""
-FIVE_LINKS = Budget(1, shapes=6, directions=40, rounds=80, starts=400, tolerance=2e-3, first=1, smoothing=1e-4)
-"""Cubic polynomials: with one interval a joint, four joints have as many unknowns as three with three."""
+FIVE_LINKS = replace(FOUR_LINKS, tolerance=3e-3, together=2)
+"""Functions of two joints at a time: all products of four have eight times as many unknowns."""
 
 
 def usual_budget(body: Chain) -> Budget:
@@ -116,6 +119,8 @@ class Bound:
         Processor time.
     graded : tuple of float
         Inner knots, if they are not evenly spaced.
+    together : int or None
+        Joint angles that the potential's summands depend on, if not on all.
     """
 
     sampled: float
@@ -132,11 +137,12 @@ class Bound:
     samples: int
     seconds: float
     graded: tuple[float, ...] = ()
+    together: int | None = None
 
     def potential_space(self, body: Chain) -> PotentialSpace:
         """The space `coefficients` belong to."""
         spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals, self.graded)
-        return PotentialSpace(spline, self.harmonics, swaps_ends(body))
+        return PotentialSpace(spline, self.harmonics, swaps_ends(body), self.together)
 
     def gap(self, efficiency: float) -> float:
         """How far an efficiency is from the sampled bound."""
@@ -161,7 +167,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     body = domain.body
     harmonics = budget.harmonics or usual_harmonics(body, domain.friction)
     spline = TensorSpline(body.n_joint, domain.joint_limit, min(budget.first, budget.intervals))
-    space = PotentialSpace(spline, harmonics, swaps_ends(body))
+    space = PotentialSpace(spline, harmonics, swaps_ends(body), budget.together)
     found = exchanged_optimum(
         domain,
         space,
@@ -189,6 +195,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         samples=found.samples,
         seconds=time.process_time() - begin,
         graded=found.space.spline.graded,
+        together=budget.together,
     )
 
 

@@ -8,15 +8,19 @@ given parity has fewer free ones: ``full = E @ free`` with the sparse matrix of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import combinations
 
 import numpy as np
 from scipy import sparse
 from scipy.interpolate import BSpline, PPoly
+from scipy.linalg import qr
 
 from colloc.system.errors import ProblemError
 
 DEGREE = 3
+_DEPENDENT = 1e-9
+"""Pivot, relative, below which a function is a sum of others."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +126,9 @@ class TensorSpline:
                 total = total + second.T @ sparse.diags(weights) @ second
         return total.tocsr()
 
-    def symmetric_basis(self, mirror: int, swap: int | None) -> sparse.csr_matrix:
-        """``(size, n_free)``: functions with f(-q) = mirror f(q), and f(-reversed q) = swap f(q) unless swap is None."""
+    def symmetric_basis(self, mirror: int, swap: int | None, together: int | None = None) -> sparse.csr_matrix:
+        """``(size, n_free)``: functions with f(-q) = mirror f(q), and f(-reversed q) = swap f(q) unless swap is None; if
+        `together` is given, sums of functions of so many joints each."""
         index = np.arange(self.size).reshape((self.per_joint,) * self.n_joint)
         flipped = index[(slice(None, None, -1),) * self.n_joint]
         group = [(index.ravel(), 1), (flipped.ravel(), mirror)]
@@ -134,11 +139,26 @@ class TensorSpline:
         everything = np.arange(self.size)
         for image, sign in group:
             average = average + sparse.csr_matrix((np.full(self.size, float(sign)), (everything, image)))
-        # orbits: one free coefficient for each, unless the signs cancel
-        representative = np.min([image for image, _ in group], axis=0)
-        columns = np.flatnonzero((representative == everything) & (abs(average.diagonal()) > 0))
-        basis = average.tocsc()[:, columns]
+        if together is not None and together < self.n_joint:
+            summands = average @ self._of_few_joints(together)
+            _, r, order = qr(summands.toarray(), mode="economic", pivoting=True)
+            rank = np.sum(np.abs(np.diag(r)) > _DEPENDENT * np.abs(r[0, 0]))
+            basis = summands.tocsc()[:, np.sort(order[:rank])]
+        else:
+            # orbits: one free coefficient for each, unless the signs cancel
+            representative = np.min([image for image, _ in group], axis=0)
+            columns = np.flatnonzero((representative == everything) & (abs(average.diagonal()) > 0))
+            basis = average.tocsc()[:, columns]
         return (basis @ sparse.diags(1.0 / abs(basis).max(axis=0).toarray().ravel())).tocsr()
+
+    def _of_few_joints(self, together: int) -> sparse.csc_matrix:
+        """``(size, n)``: the functions of `together` joints each, constant in the others, those of every choice of joints."""
+        one, all_of_them = sparse.csc_matrix(np.ones((self.per_joint, 1))), sparse.eye(self.per_joint, format="csc")
+        each = []
+        for chosen in combinations(range(self.n_joint), together):
+            factors = [all_of_them if joint in chosen else one for joint in range(self.n_joint)]
+            each.append(reduce(sparse.kron, factors))
+        return sparse.hstack(each, format="csc")
 
 
 def _products(values: np.ndarray, more: np.ndarray) -> np.ndarray:
