@@ -166,6 +166,6 @@ def best_small_gait(
                 shape, value = tried[int(np.argmax(reached))], max(reached)
             else:
                 size *= 0.4
-        found.append((value, shape))
-    shape = max(found, key=lambda item: item[0])[1]
-    return small_gait(body, friction, shape), shape
+        found += [shapes[:, start], shape]
+    # what is rough may lead away from a start that is better, as from the straight body
+    return max(((small_gait(body, friction, shape), shape) for shape in found), key=lambda item: item[0].efficiency)
