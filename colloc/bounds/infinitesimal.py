@@ -149,10 +149,16 @@ def best_small_gait(
     shapes = shapes[:, fundamental(body, shapes)]
     shapes = drawn_in(body, shapes, np.zeros_like(shapes), _EDGE)
 
-    def rough(shape: np.ndarray) -> float:
-        return small_gait(body, friction, shape, 180, 4, 0 if body.n_joint < 3 else 2).efficiency
+    def value_at(shape: np.ndarray, directions: int, headings: int, rounds: int) -> float:
+        try:
+            return small_gait(body, friction, shape, directions, headings, rounds).efficiency
+        except NotConvergedError:  # no mixture of a few directions closes: with three joints and directed friction it happens
+            return -np.inf
 
-    values = np.array([small_gait(body, friction, s, 36, 3, 0).efficiency for s in shapes.T])
+    def rough(shape: np.ndarray) -> float:
+        return value_at(shape, 180, 4, 0 if body.n_joint < 3 else 2)
+
+    values = np.array([value_at(s, 36, 3, 0) for s in shapes.T])
     moves = np.concatenate([np.eye(body.n_joint), -np.eye(body.n_joint)])
     found = []
     for start in np.argsort(-values)[:refined]:
