@@ -18,8 +18,8 @@ from colloc.gaits.gait_fields import gait_from
 from colloc.pictures.style import save
 from scripts.class_rows import equal_links, known_small_gait
 from scripts.figures_classes import GaitPanel, gait_figure
-from scripts.frontier import Row, smallest_bound
-from scripts.frontier import read as frontier
+from scripts.frontier_rows import Row, smallest_bound
+from scripts.frontier_rows import read as frontier
 from scripts.link_gaps import LYING, gaps
 
 CURATED = Path("results/curated")

@@ -8,29 +8,28 @@ writes `results/curated/frontier.md` from all there is. `--seconds` begins no ot
 
 - gait: the best relaxed gait that travels through shapes, of either symmetry, and the best certified finite gait near it;
 - few: the best certified polygon with 60 corners near it;
-- small: the best gait of no size at one shape (three and four links);
+- small: the best gait of no size at one shape;
 - loop: the best certified polygon of a short path near that shape;
-- bound: the sampled upper bound (three links; four if asked for); of a kept potential (`scripts.check_potential`) what a check
-  finds, and the seconds are those of the check.
+- bound: the sampled upper bound; of a kept potential (`scripts.check_potential`) what a check finds, and the seconds are
+  those of the check.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from colloc.bounds.infinitesimal import best_small_gait, small_gait
 from colloc.bounds.recheck import largest_ratio
-from colloc.bounds.sampled import FOUR_LINKS, Budget, efficiency_bound
+from colloc.bounds.sampled import Budget, efficiency_bound, usual_budget
 from colloc.gaits.guesses import largest_factor
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
@@ -44,9 +43,9 @@ from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
 from colloc.search.relaxed_search import certified, relaxed_gaits
 from colloc.system.errors import CollocError, NotConvergedError
-from colloc.system.replaced_file import replaced_file
 from scripts.check_potential import potentials
 from scripts.few_corners import polygon_near
+from scripts.frontier_rows import GAITS, Row, best_held, put, read, room, row_of, smallest_bound
 
 COEFFICIENTS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
 """(mu_t, mu_f, mu_b)"""
@@ -59,9 +58,10 @@ SPEED, LOOP_DELTA = 0.02, 2e-5
 """Of small loops: least path over 2 pi [rad], and delta at unit shape speed."""
 SYMMETRIES = ("both", "bilateral")
 """Of relaxed gaits: loops about the straight body have both; those to one side of it (10, 1, 1 and 3, 1, 1) have one."""
-BUDGET, DIRECTED = Budget(starts=150), (0, 1, 2)
-"""Of bounds; where mu_b differs from mu_f these headings, as the second is worth 5 % at (0.5, 1, 5)."""
-STORE, GAITS, TABLE = Path("results/curated/frontier.json"), Path("results/frontier"), Path("results/curated/frontier.md")
+BUDGET, DIRECTED, COARSE = Budget(starts=150), (0, 1, 2), 5e-3
+"""Of bounds for three links; where mu_b differs from mu_f these headings, as the second is worth 5 % at (0.5, 1, 5); there
+bounds for more links, which have half as many unknowns again, do not come within 0.001 of their programs in six minutes."""
+TABLE = Path("results/curated/frontier.md")
 HEAD = """# The best gaits from both sides
 
 `python -m scripts.frontier`, taken up again and again. Joints within the limit; links of the width do not overlap,
@@ -69,38 +69,20 @@ links of none do not cross. *Gait*: the best certified finite gait that travels 
 over at least 0.3 rad), with its corners, its distance a period, the largest joint angle and how far its links stay
 *apart* [body lengths], so how wide they may be; delta = 1e-5 at unit shape speed. What was found for a smaller limit
 counts for a larger one too. *60 corners*: the best certified polygon with at most 60. *Relaxed*: what finite gaits near
-it tend to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0. *Small loop*: the best
-certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one, with the number of its
-unknowns: it holds but for what lies between the samples; in brackets the program's value, if climbs still found more
-than is tolerated above. *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for the row,
-relative. CPU seconds on a loaded machine. A star: the relaxed gait's own certificate fails a check, so its value is not
-sharp. An empty place has not been computed. What was found is a lower end: other starts may find better gaits.
+it tend to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
+there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one,
+with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value, if
+climbs still found more than is tolerated above. *Gap*: from the better of relaxed and small gait to the smallest bound
+that is valid for the row, relative. CPU seconds on a loaded machine. A star: the relaxed gait's own certificate fails a
+check, so its value is not sharp. An empty place has not been computed. What was found is a lower end: other starts may
+find better gaits. What a row of width 0 says of a gait holds for links of the widths 0.01 and 0.03 as well where the gait
+stays farther apart than these, and its bound holds for any width: rows of other widths are those where something changes.
 
 """
 COLUMNS = (
     "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "apart", "60 corners", "relaxed",
-    "small gait", "small loop", "bound", "unknowns", "gap", "CPU s",
+    "small gait", "its apart", "small loop", "bound", "unknowns", "gap", "CPU s",
 )  # fmt: skip
-
-
-class Row(NamedTuple):
-    """What is asked of a row."""
-
-    mu: tuple[float, ...]
-    limit: float
-    links: int
-    width: float
-
-    @property
-    def name(self) -> str:
-        return "-".join(f"{x:g}" for x in (*self.mu, round(self.limit, 4), self.links, self.width))
-
-    @property
-    def body(self) -> Chain:
-        return Chain((1 / self.links,) * self.links, width=self.width)
-
-    def file(self, part: str) -> Path:
-        return GAITS / f"{self.name}-{part}.h5"
 
 
 def relaxation(path: Path) -> Relaxation:
@@ -205,7 +187,9 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
             seconds = time.process_time() - begin
             return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
     friction = Friction(*row.mu)
-    budget = FOUR_LINKS if row.links == 4 else BUDGET if friction.reversible else replace(BUDGET, harmonics=DIRECTED)
+    budget = BUDGET if row.links <= 3 else usual_budget(row.body)
+    if not friction.reversible:
+        budget = replace(budget, harmonics=DIRECTED) if row.links <= 3 else replace(budget, tolerance=COARSE)
     found = efficiency_bound(row.body, friction, row.limit, budget=budget)
     return {
         "sampled": found.sampled, "floor": found.floor, "converged": found.converged, "unknowns": len(found.coefficients),
@@ -222,24 +206,6 @@ COMPUTE: dict[str, Callable[[Row, int], dict[str, Any]]] = {
 }
 
 
-def read() -> dict[str, dict[str, Any]]:
-    """What is known, by row and part."""
-    return json.loads(STORE.read_text()) if STORE.exists() else {}
-
-
-def put(key: str, value: dict[str, Any]) -> None:
-    """Keep a part; what others have kept in the meantime stays."""
-    with replaced_file(STORE) as temporary:
-        Path(temporary).write_text(json.dumps(read() | {key: value}, indent=1, sort_keys=True) + "\n")
-
-
-def row_of(key: str) -> tuple[Row, str]:
-    """The row and the part that a number is kept under."""
-    name, part = key.split()
-    *mu, limit, links, width = (float(x) for x in name.split("-"))
-    return Row(tuple(mu), limit, int(links), width), part
-
-
 def asked(options: argparse.Namespace) -> Iterator[Row]:
     """The rows, those first that are most wanted."""
     laws = [COEFFICIENTS[k - 1] for k in options.laws]
@@ -249,38 +215,8 @@ def asked(options: argparse.Namespace) -> Iterator[Row]:
 
 def wanted(row: Row, part: str, known: dict) -> bool:
     """Whether a part can be computed and is not known."""
-    possible = {
-        "gait": True, "few": row.file("gait").exists(), "small": row.links <= 4, "loop": f"{row.name} small" in known,
-        "bound": row.links <= 4,
-    }  # fmt: skip
-    return f"{row.name} {part}" not in known and possible[part]
-
-
-def largest_angle(of: dict) -> float:
-    """Of a gait that is kept."""
-    return of["angle"] if "angle" in of else float(np.abs(of["shape"]).max())
-
-
-def best_held(row: Row, part: str, known: dict) -> dict:
-    """Of the gaits that hold for a row (law, links, limit and width) the best; a certified one if there is."""
-    holds = [known.get(f"{row.name} {part}", {})]
-    for key, value in known.items():
-        other, kind = row_of(key)
-        same = (kind, other.mu, other.links) == (part, row.mu, row.links)
-        if same and largest_angle(value) <= row.limit + 1e-4 and value.get("apart", 0.0) >= row.width:
-            holds.append(value)
-    return max(holds, key=lambda value: (bool(value), value.get("passed", True), value.get("efficiency", -np.inf)))
-
-
-def smallest_bound(row: Row, known: dict) -> float:
-    """Of the bounds that hold for a row: those for its limit or a larger one, its width or a smaller one."""
-    holds = [np.inf]
-    for key, value in known.items():
-        other, part = row_of(key)
-        of_row = part == "bound" and (other.mu, other.links) == (row.mu, row.links)
-        if of_row and other.limit >= round(row.limit, 4) and other.width <= row.width:
-            holds.append(value["sampled"])
-    return min(holds)
+    possible = {"few": row.file("gait").exists(), "loop": f"{row.name} small" in known}
+    return f"{row.name} {part}" not in known and possible.get(part, True)
 
 
 def line(row: Row, known: dict) -> str:
@@ -303,7 +239,7 @@ def line(row: Row, known: dict) -> str:
         value(travels, "distance", ".3f"), value(travels, "angle", ".3f"), value(travels, "apart", ".3f"),
         value(simple, "efficiency", mark="" if simple.get("passed") else refused),
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
-        value(loops, "efficiency", mark="" if loops.get("passed") else refused),
+        f"{room(row, still)[1]:.3f}" if still else "", value(loops, "efficiency", mark="" if loops.get("passed") else refused),
         value(above, "sampled", mark=program), value(above, "unknowns", "d"), apart,
         f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
     ]  # fmt: skip

@@ -17,7 +17,8 @@ import numpy as np
 from matplotlib.colors import LogNorm
 
 from colloc.pictures.style import SEQUENTIAL, save, styled, subplots
-from scripts.frontier import Row, best_held, compute_missing, read, smallest_bound
+from scripts.frontier import compute_missing
+from scripts.frontier_rows import Row, best_held, read, smallest_bound
 from scripts.panel_marks import letter
 
 MU_T, MU_B = (1.0, 3.0, 10.0), (1.0, 1.7, 3.0)

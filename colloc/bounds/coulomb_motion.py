@@ -26,6 +26,8 @@ DELTA = 1e-9
 
 _MAX_ITERATIONS = 300
 """Steps of an attempt: the few motions that need more are left out, as the samples are many."""
+_CLOSED = 1e-9
+"""Singular value of the relative motion of two links along which they do not move."""
 _BISECTIONS = 30
 """Of the way from an admissible shape to where links touch."""
 
@@ -158,6 +160,36 @@ def one_joint(n_joint: int, half: bool) -> np.ndarray:
     a radian and more) that no lattice of directions sees it.
     """
     return np.eye(n_joint) if half else np.concatenate([np.eye(n_joint), -np.eye(n_joint)], axis=1)
+
+
+def two_resting(body: Chain, angles: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Shapes and rates ``(n_joint, count)`` at which two links with others between them may rest both, at those of some shapes
+    where the links between can move.
+
+    Two links between can if they are parallel: they buckle. Three always can. The joints outside of the two rest, or turn at
+    random. The ratio has peaks with kinks there, as where one joint turns alone; four straight links are best so.
+    """
+    found = [(angles[:, :0], angles[:, :0])]
+    for i in range(body.n_link):
+        for j in range(i + 3, body.n_link):
+            _, size, ways = np.linalg.svd(_relative_motion(body, angles, i, j))
+            size = np.concatenate([size, np.zeros((len(size), j - i - 3))], axis=1)
+            for k in range(2, j - i):
+                moves = size[:, k] < _CLOSED
+                rates = rng.standard_normal((len(angles), moves.sum())) * (rng.random(moves.sum()) < 0.5)
+                rates[i:j] = ways[moves, k].T
+                found.append((angles[:, moves], rates / np.linalg.norm(rates, axis=0)))
+    shapes, rates = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+    return shapes, rates
+
+
+def _relative_motion(body: Chain, angles: np.ndarray, i: int, j: int) -> np.ndarray:
+    """Velocity of where link j begins and its rotation rate, seen from link i, by the rates of the joints between,
+    ``(n, 3, j - i)``."""
+    heading = np.cumsum(angles[i : j - 1], axis=0)
+    across = 1j * np.array(body.lengths[i + 1 : j])[:, None] * np.exp(1j * heading)
+    velocity = np.concatenate([np.cumsum(across[::-1], axis=0)[::-1], np.zeros((1, angles.shape[1]))])
+    return np.stack([velocity.real, velocity.imag, np.ones(velocity.shape)]).transpose(2, 0, 1)
 
 
 def random_directions(n_joint: int, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -8,6 +8,8 @@ inserted where that is largest. (The measure's own weight is no guide: it may cl
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
@@ -35,7 +37,7 @@ def with_knots(space: PotentialSpace, added: np.ndarray) -> PotentialSpace:
     old = space.spline
     inner = np.unique(np.concatenate([old.knots[1:-1], added, -added]).round(12) + 0.0)
     spline = TensorSpline(old.n_joint, old.limit, inner.size + 1, tuple(inner.tolist()))
-    return PotentialSpace(spline, space.harmonics, space.end_swap)
+    return replace(space, spline=spline)
 
 
 def with_more_knots(space: PotentialSpace, measure: Measure, intervals: int) -> PotentialSpace:

@@ -36,17 +36,20 @@ class PotentialSpace:
         Those used; odd ones suffice where mu_b = mu_f.
     end_swap : bool
         Whether the body is the same when turned end for end (see `colloc.bounds.coulomb_motion.swaps_ends`).
+    together : int, optional
+        Only sums of functions of so many joint angles each.
     """
 
     spline: TensorSpline
     harmonics: tuple[int, ...]
     end_swap: bool
+    together: int | None = None
 
     @cached_property
     def bases(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Bases of the real parts (even under the mirror) and of the imaginary parts (odd)."""
         swap = -1 if self.end_swap else None
-        return self.spline.symmetric_basis(1, swap), self.spline.symmetric_basis(-1, swap)
+        return self.spline.symmetric_basis(1, swap, self.together), self.spline.symmetric_basis(-1, swap, self.together)
 
     @cached_property
     def layout(self) -> list[tuple[int, int, slice]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from colloc.numerics.spline import TensorSpline
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
 from colloc.system.row_file import CACHE, hash_of, put_rows, read_rows
 
-VERSION = 5
+VERSION = 6
 """Part of the cache key: raise it when the computation changes its result."""
 
 
@@ -40,7 +40,7 @@ class Budget:
     intervals : int
         Knot intervals of the splines in every joint angle, at most.
     harmonics : tuple of int, optional
-        Harmonics in the heading; by default (1, 3), or (0, 1) where mu_b differs from mu_f.
+        Harmonics in the heading; by default (1, 3), of more than three links (1,), or (0, 1) where mu_b differs from mu_f.
     shapes, directions : int
         The first lattice: steps of every joint angle, and rate directions.
     rounds : int
@@ -54,6 +54,8 @@ class Budget:
         `intervals` keep the knots even.
     smoothing : float
         Weight of the roughness of the potential.
+    together : int, optional
+        Only potentials that are sums of functions of so many joint angles each.
     """
 
     intervals: int = 12
@@ -65,12 +67,26 @@ class Budget:
     tolerance: float = 5e-4
     first: int = 6
     smoothing: float = 1e-5
+    together: int | None = None
 
 
 QUICK = Budget()
 THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4)
-FOUR_LINKS = Budget(3, (1,), shapes=6, directions=40, rounds=80, starts=400, tolerance=1e-3, first=3, smoothing=1e-4)
-"""Within 1 % of the best gait known of four equal links, in two minutes: shapes fill three dimensions."""
+FOUR_LINKS = Budget(5, None, 6, 40, 80, starts=400, tolerance=1e-3, first=5, smoothing=1e-4, together=2)
+"""Functions of two joint angles at a time: 81 unknowns do better than 108 that are products of three."""
+FIVE_LINKS = replace(FOUR_LINKS, intervals=3, first=3, tolerance=3e-3)
+
+
+def usual_budget(body: Chain) -> Budget:
+    """What a bound is worth if nothing else is asked for: coarser splines for more joints."""
+    return {3: FOUR_LINKS, 4: FIVE_LINKS}.get(body.n_joint, QUICK)
+
+
+def usual_harmonics(body: Chain, friction: Friction) -> tuple[int, ...]:
+    """Those in the heading that are worth what they cost."""
+    if not friction.reversible:
+        return 0, 1
+    return (1, 3) if body.n_joint <= 2 else (1,)
 
 
 @dataclass(frozen=True)
@@ -102,6 +118,8 @@ class Bound:
         Processor time.
     graded : tuple of float
         Inner knots, if they are not evenly spaced.
+    together : int or None
+        Joint angles that the potential's summands depend on, if not on all.
     """
 
     sampled: float
@@ -118,11 +136,12 @@ class Bound:
     samples: int
     seconds: float
     graded: tuple[float, ...] = ()
+    together: int | None = None
 
     def potential_space(self, body: Chain) -> PotentialSpace:
         """The space `coefficients` belong to."""
         spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals, self.graded)
-        return PotentialSpace(spline, self.harmonics, swaps_ends(body))
+        return PotentialSpace(spline, self.harmonics, swaps_ends(body), self.together)
 
     def gap(self, efficiency: float) -> float:
         """How far an efficiency is from the sampled bound."""
@@ -145,9 +164,9 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
     """The sampled bound, computed anew (see `efficiency_bound`)."""
     begin = time.process_time()
     body = domain.body
-    harmonics = budget.harmonics or ((1, 3) if domain.friction.reversible else (0, 1))
+    harmonics = budget.harmonics or usual_harmonics(body, domain.friction)
     spline = TensorSpline(body.n_joint, domain.joint_limit, min(budget.first, budget.intervals))
-    space = PotentialSpace(spline, harmonics, swaps_ends(body))
+    space = PotentialSpace(spline, harmonics, swaps_ends(body), budget.together)
     found = exchanged_optimum(
         domain,
         space,
@@ -175,6 +194,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
         samples=found.samples,
         seconds=time.process_time() - begin,
         graded=found.space.spline.graded,
+        together=budget.together,
     )
 
 
@@ -189,11 +209,12 @@ def known_bound(
     friction: Friction,
     joint_limit: float = float(np.pi),
     *,
-    budget: Budget = QUICK,
+    budget: Budget | None = None,
     cache: str | os.PathLike,
 ) -> Bound | None:
     """The bound that an earlier run left in the cache, or None; arguments as for `efficiency_bound`."""
-    entry = read_rows(Path(cache), CACHE).values.get(bound_key(Domain(body, friction, float(joint_limit)), budget))
+    key = bound_key(Domain(body, friction, float(joint_limit)), budget or usual_budget(body))
+    entry = read_rows(Path(cache), CACHE).values.get(key)
     if entry is None:
         return None
     try:
@@ -208,7 +229,7 @@ def efficiency_bound(
     friction: Friction,
     joint_limit: float = float(np.pi),
     *,
-    budget: Budget = QUICK,
+    budget: Budget | None = None,
     cache: str | os.PathLike | None = None,
 ) -> Bound:
     """An upper bound on d/W over all gaits with |joint angles| <= joint_limit and links i, i + 2 not crossing.
@@ -216,28 +237,30 @@ def efficiency_bound(
     Parameters
     ----------
     body : Chain
-        Two or three links, or four with a coarse budget (`FOUR_LINKS`).
+        Two to five links.
     friction : Friction
         Coulomb friction or the elliptic law, delta -> 0 (docs/bound.md states what finite delta changes).
     joint_limit : float
         At most pi.
-    budget : Budget
+    budget : Budget, optional
+        By default `usual_budget`: coarse for four links and more.
     cache : path, optional
         An SQLite file where bounds are kept by the hash of all inputs.
 
     Raises
     ------
     ProblemError
-        For a joint limit outside (0, pi], more than four links, or even harmonics with mu_b = mu_f.
+        For a joint limit outside (0, pi], more than five links, or even harmonics with mu_b = mu_f.
     StoreError
         If the cache cannot be read. One that cannot be written costs a `ChangedFileWarning`.
     """
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
-    if body.n_joint > 3:
+    if body.n_joint > 4:
         raise ProblemError(
-            f"bounds are computed for at most four links, not {body.n_link}: the samples fill all of shape space."
+            f"bounds are computed for at most five links, not {body.n_link}: the samples fill all of shape space."
         )
+    budget = budget or usual_budget(body)
     known = known_bound(body, friction, joint_limit, budget=budget, cache=cache) if cache is not None else None
     if known is not None:
         return known

@@ -15,6 +15,7 @@ from colloc.bounds.coulomb_motion import (
     fundamental,
     one_joint,
     random_directions,
+    two_resting,
     unit_directions,
 )
 from colloc.mechanics.chain import Chain
@@ -27,6 +28,8 @@ _FRAMES, _STEADY = 4, 2
 """Directions, and their opposites, that a climb tries at a step; and in how many of them the rates stay as they are."""
 _FINER = 3
 """Motions of one joint alone are sampled so many times as densely in every angle: their peaks are those hardest to meet."""
+_SPECIAL = 0.5
+"""Share of joints that are straight or at their limit in every other of the shapes at random."""
 _TRIAL_STEPS = 4
 _GROW, _SHRINK = 1.25, 0.5
 
@@ -58,7 +61,7 @@ class Domain:
 
     def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> CoulombMotion:
         """Motions on a lattice of `shapes` + 1 values of every joint angle and about `directions` rate directions; and of each
-        joint turning alone, on a finer one.
+        joint turning alone, and others where two links rest, on a finer one.
 
         One of each class of mirror images; with directed friction the end swap reverses time, so both senses of every rate
         are sampled. `shift` in [0, 1) moves the lattice by that part of its spacing (then without its last value). More than
@@ -66,20 +69,26 @@ class Domain:
         """
         n_joint, half = self.body.n_joint, self.friction.reversible
         angles = self._representatives(shapes, shift)
+        rng = np.random.default_rng(round(1e9 * shift))
         if n_joint > 2:
-            rng = np.random.default_rng(round(1e9 * shift))
             every = np.repeat(angles, directions, axis=1), random_directions(n_joint, directions * angles.shape[1], rng)
         else:
             every = _pairs(angles, unit_directions(n_joint, directions, half, shift))
-        alone = _pairs(self._representatives(_FINER * shapes, shift), one_joint(n_joint, half))
-        return self.solved(*every)[0].joined(self.solved(*alone)[0])
+        finer = self._representatives(_FINER * shapes, shift)
+        motion = self.solved(*every)[0].joined(self.solved(*_pairs(finer, one_joint(n_joint, half)))[0])
+        resting, rates = two_resting(self.body, finer, rng)
+        motion = motion.joined(self.solved(resting, rates)[0])
+        return motion if half else motion.joined(self.solved(resting, -rates)[0])
 
     def _shapes(self, steps: int, shift: float) -> np.ndarray:
         """Shapes ``(n_joint, n)`` of a lattice, with those where a joint is at its limit, and where on its lines links touch.
 
-        The ratio has peaks in corners between limit and contact, which a potential sees only if they are sampled.
+        The ratio has peaks in corners between limit and contact, which a potential sees only if they are sampled. More than two
+        joints have as many at random as a lattice of three.
         """
         n_joint, limit = self.body.n_joint, self.joint_limit
+        if n_joint > 2:
+            return self._scattered((steps + 1) ** 3, np.random.default_rng(round(1e9 * shift) + steps))
         axis = np.clip(limit * (2.0 * (np.arange(-1, steps + 1) + shift) / steps - 1.0), -limit, limit)
         grid = np.stack(np.meshgrid(*[np.unique(axis)] * n_joint, indexing="ij"))
         held = self.holds(grid.reshape(n_joint, -1)).reshape(grid.shape[1:])
@@ -90,6 +99,14 @@ class Domain:
             for inside, outside, touches in ((one, other, of_one & ~of_other), (other, one, of_other & ~of_one)):
                 found.append(drawn_in(self.body, outside[:, touches], inside[:, touches], _EDGE))
         return np.concatenate(found, axis=1)
+
+    def _scattered(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """`count` shapes at random, in every other of which some joints are straight or at their limit; instead of one where
+        links would cross, the last on the way to it from the straight body."""
+        angles = rng.uniform(-1.0, 1.0, (self.body.n_joint, count))
+        special = (rng.random(angles.shape) < _SPECIAL) & (np.arange(count) % 2 == 1)
+        angles = self.joint_limit * np.where(special, np.rint(angles), angles)
+        return drawn_in(self.body, angles, np.zeros_like(angles), _EDGE)
 
     def _representatives(self, shapes: int, shift: float) -> np.ndarray:
         """One of each class of mirror images of those."""
@@ -125,12 +142,14 @@ class Domain:
             move = rng.standard_normal((2 * n_joint, n, _FRAMES))
             # along a crease that holds for the same rates at many shapes, as where one joint turns and the rest sticks;
             move[n_joint:, :, :_STEADY] = 0.0
+            # or as long as some joints are straight, as where two links buckle;
+            move[:n_joint, :, 0] *= angles != 0.0
             # along one that holds as long as some joints rest
             move[n_joint:, :, _STEADY] *= rates != 0.0
             # a direction of rates means nothing along the rates themselves
             along = (move[n_joint:] * rates[:, :, None]).sum(axis=0)
             move[n_joint:] -= along * rates[:, :, None]
-            move /= np.sqrt((move**2).sum(axis=0))
+            move /= np.maximum(np.sqrt((move**2).sum(axis=0)), _EDGE)
             move = np.concatenate([move, -move], axis=2) * size[:, None]
             new_angles = np.clip(angles[:, :, None] + spacing * move[:n_joint], -self.joint_limit, self.joint_limit)
             new_rates = rates[:, :, None] + turn * move[n_joint:]

@@ -8,15 +8,19 @@ given parity has fewer free ones: ``full = E @ free`` with the sparse matrix of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import combinations
 
 import numpy as np
 from scipy import sparse
 from scipy.interpolate import BSpline, PPoly
+from scipy.linalg import qr
 
 from colloc.system.errors import ProblemError
 
 DEGREE = 3
+_DEPENDENT = 1e-9
+"""Pivot, relative, below which a function is a sum of others."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +72,14 @@ class TensorSpline:
     def size(self) -> int:
         return self.per_joint**self.n_joint
 
-    def _pieces(self, angle: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
-        """First index ``(n,)`` and the four values ``(4, n)`` of the functions of one joint, or of a derivative of them."""
+    def _pieces(self, angle: np.ndarray, order: int) -> np.ndarray:
+        """Values ``(n, 4)`` of the functions of one joint that live where it is, or of a derivative of them."""
         cell = self.cell(angle)
         x = angle - self.knots[cell]
         powers = np.zeros((DEGREE + 1, angle.size))
         for k in range(order, DEGREE + 1):
             powers[k] = np.prod(np.arange(k - order + 1, k + 1)) * x ** (k - order)
-        return cell, np.einsum("nfp,pn->fn", self._cubics[cell], powers)
+        return np.einsum("nfp,pn->nf", self._cubics[cell], powers)
 
     def cell(self, angle: np.ndarray) -> np.ndarray:
         """The knot interval that holds each angle."""
@@ -84,23 +88,28 @@ class TensorSpline:
     def matrix(self, angles: np.ndarray, orders: tuple[int, ...] | None = None) -> sparse.csr_matrix:
         """Values of all functions at angles ``(n_joint, n)``, or of their partial derivatives of the given orders in every
         joint angle, ``(n, size)``."""
-        n = angles.shape[1]
-        column = np.zeros((1, n), dtype=int)
-        value = np.ones((1, n))
+        value = np.ones((angles.shape[1], 1))
         for joint, order in enumerate(orders or (0,) * self.n_joint):
-            first, pieces = self._pieces(angles[joint], order)
-            local = first + np.arange(4)[:, None]
-            column = (column[:, None] * self.per_joint + local).reshape(-1, n)
-            value = (value[:, None] * pieces).reshape(-1, n)
-        width = column.shape[0]
-        return sparse.csr_matrix((value.T.ravel(), column.T.ravel(), np.arange(n + 1) * width), shape=(n, self.size))
+            value = _products(value, self._pieces(angles[joint], order))
+        return self._by_function(angles, value)
 
     def slope(self, angles: np.ndarray, rates: np.ndarray) -> sparse.csr_matrix:
         """Rates of change of all functions for joint rates ``(n_joint, n)``, ``(n, size)``."""
-        total = sparse.csr_matrix((angles.shape[1], self.size))
+        value, rate = np.ones((angles.shape[1], 1)), np.zeros((angles.shape[1], 1))
         for joint in range(self.n_joint):
-            total = total + sparse.diags(rates[joint]) @ self.matrix(angles, _unit(joint, self.n_joint))
-        return total.tocsr()
+            pieces, steepness = (self._pieces(angles[joint], order) for order in (0, 1))
+            rate = _products(rate, pieces) + _products(value, rates[joint][:, None] * steepness)
+            value = _products(value, pieces)
+        return self._by_function(angles, rate)
+
+    def _by_function(self, angles: np.ndarray, value: np.ndarray) -> sparse.csr_matrix:
+        """Values ``(n, 4^n_joint)`` of the functions that live where the angles are, in the columns of these, ``(n, size)``."""
+        n, width = value.shape
+        column = np.zeros((n, 1), dtype=np.int32)
+        for angle in angles:
+            local = self.cell(angle)[:, None] + np.arange(DEGREE + 1)
+            column = (column[:, :, None] * self.per_joint + local[:, None]).reshape(n, -1)
+        return sparse.csr_matrix((value.ravel(), column.ravel(), np.arange(n + 1) * width), shape=(n, self.size))
 
     @cached_property
     def roughness(self) -> sparse.csr_matrix:
@@ -117,8 +126,9 @@ class TensorSpline:
                 total = total + second.T @ sparse.diags(weights) @ second
         return total.tocsr()
 
-    def symmetric_basis(self, mirror: int, swap: int | None) -> sparse.csr_matrix:
-        """``(size, n_free)``: functions with f(-q) = mirror f(q), and f(-reversed q) = swap f(q) unless swap is None."""
+    def symmetric_basis(self, mirror: int, swap: int | None, together: int | None = None) -> sparse.csr_matrix:
+        """``(size, n_free)``: functions with f(-q) = mirror f(q), and f(-reversed q) = swap f(q) unless swap is None; if
+        `together` is given, sums of functions of so many joints each."""
         index = np.arange(self.size).reshape((self.per_joint,) * self.n_joint)
         flipped = index[(slice(None, None, -1),) * self.n_joint]
         group = [(index.ravel(), 1), (flipped.ravel(), mirror)]
@@ -129,11 +139,31 @@ class TensorSpline:
         everything = np.arange(self.size)
         for image, sign in group:
             average = average + sparse.csr_matrix((np.full(self.size, float(sign)), (everything, image)))
-        # orbits: one free coefficient for each, unless the signs cancel
-        representative = np.min([image for image, _ in group], axis=0)
-        columns = np.flatnonzero((representative == everything) & (abs(average.diagonal()) > 0))
-        basis = average.tocsc()[:, columns]
+        if together is not None and together < self.n_joint:
+            summands = average @ self._of_few_joints(together)
+            _, r, order = qr(summands.toarray(), mode="economic", pivoting=True)
+            rank = np.sum(np.abs(np.diag(r)) > _DEPENDENT * np.abs(r[0, 0]))
+            basis = summands.tocsc()[:, np.sort(order[:rank])]
+        else:
+            # orbits: one free coefficient for each, unless the signs cancel
+            representative = np.min([image for image, _ in group], axis=0)
+            columns = np.flatnonzero((representative == everything) & (abs(average.diagonal()) > 0))
+            basis = average.tocsc()[:, columns]
         return (basis @ sparse.diags(1.0 / abs(basis).max(axis=0).toarray().ravel())).tocsr()
+
+    def _of_few_joints(self, together: int) -> sparse.csc_matrix:
+        """``(size, n)``: the functions of `together` joints each, constant in the others, those of every choice of joints."""
+        one, all_of_them = sparse.csc_matrix(np.ones((self.per_joint, 1))), sparse.eye(self.per_joint, format="csc")
+        each = []
+        for chosen in combinations(range(self.n_joint), together):
+            factors = [all_of_them if joint in chosen else one for joint in range(self.n_joint)]
+            each.append(reduce(sparse.kron, factors))
+        return sparse.hstack(each, format="csc")
+
+
+def _products(values: np.ndarray, more: np.ndarray) -> np.ndarray:
+    """Of each of the values ``(n, m)`` with each of more ``(n, k)``, ``(n, m k)``."""
+    return (values[:, :, None] * more[:, None]).reshape(len(values), -1)
 
 
 def _unit(joint: int, n_joint: int) -> tuple[int, ...]:

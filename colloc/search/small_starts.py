@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import CoulombMotion, unit_directions
+from colloc.bounds.coulomb_motion import CoulombMotion, one_joint, unit_directions
 from colloc.bounds.infinitesimal import SmallGait, best_mixture
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import largest_factor
@@ -60,7 +60,7 @@ def small_loops(problem: Problem) -> list[AnyGait]:
 def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
     """The best small gait at every shape that was drawn, with the shape, best first; of equally good ones one."""
     body, friction, shapes = problem.body, problem.friction, _drawn_shapes(problem)
-    directions = unit_directions(body.n_joint, _DIRECTIONS, half=False)
+    directions = np.hstack([one_joint(body.n_joint, half=False), unit_directions(body.n_joint, _DIRECTIONS, half=False)])
     count, delta = directions.shape[1], _DRY * problem.delta_start
     angles, rates = np.repeat(shapes, count, axis=1), np.tile(directions, shapes.shape[1])
     solved = body.solve(friction, angles, rates, delta)

@@ -6,12 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from colloc.bounds import infinitesimal
 from colloc.bounds.coulomb_motion import CoulombMotion, admissible, balanced_motion
-from colloc.bounds.infinitesimal import small_gait
+from colloc.bounds.infinitesimal import SmallGait, best_small_gait, small_gait
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.system.errors import NotConvergedError
 
 ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
 DIRECTED = dataclasses.replace(ODD, harmonics=(0, 1))
@@ -151,11 +153,42 @@ def test_small_gaits_stay_below_the_bound(isotropic):
         assert small_gait(Chain(), Friction(), np.array(shape), 90, 8).efficiency < isotropic.sampled
 
 
+def test_shapes_at_which_few_directions_do_not_close_are_passed_over(monkeypatch):
+    """So it is at four links with friction (0.5, 1, 5) and the 36 directions of the first look: that ended the search."""
+
+    def failing(body, friction, shape, *settings):
+        if settings and shape[0] > 0:
+            raise NotConvergedError("infeasible")
+        return small_gait(body, friction, shape, 60, 4, 0)
+
+    monkeypatch.setattr(infinitesimal, "small_gait", failing)
+    best, shape = best_small_gait(Chain(), Friction(), 2.5, steps=4, refined=1)
+    assert shape[0] <= 0
+    assert best.efficiency > 0
+
+
+def test_the_start_of_a_search_counts_where_it_is_better_than_its_end(monkeypatch):
+    """As at four straight links, which do 0.7319: values from a few directions led away from them, to 0.7311."""
+
+    def misleading(body, friction, shape, *settings):
+        size = float(np.abs(shape).max())
+        return SmallGait(size if settings and settings[0] == 180 else -size, 0.0, np.empty((2, 0)), np.empty(0))
+
+    monkeypatch.setattr(infinitesimal, "small_gait", misleading)
+    best, shape = best_small_gait(Chain(), Friction(), 2.0, steps=4, refined=1)
+    assert (best.efficiency, *shape) == (0.0, 0.0, 0.0)
+
+
 def test_four_straight_links_crawl_sideways_by_bends_of_no_size():
-    """Within 0.5 % of the sampled bound for joints within 2.5, 0.7350. Climbs of directions along the axes ended at 0.7254 to
+    """Within 0.1 % of the sampled bound for joints within 2.5, 0.7322. Climbs of directions along the axes ended at 0.7254 to
     0.7304, by how many directions they began with; across the axes they agree."""
     found = [small_gait(Chain((0.25,) * 4), Friction(), np.zeros(3), count) for count in (180, 400)]
-    assert all(0.7314 < one.efficiency < 0.735 for one in found)
+    assert all(0.7314 < one.efficiency < 0.7322 for one in found)
     assert all(abs(np.cos(one.heading)) < 1e-6 for one in found)
     for one in found:
         np.testing.assert_allclose(one.rates @ one.weights, 0.0, atol=1e-8)
+
+
+def test_small_gaits_of_many_joints_begin_with_directions_where_joints_and_links_rest():
+    """Five straight links: from directions at random alone, the column generation ended at 0.8624."""
+    assert small_gait(Chain((0.2,) * 5), Friction(), np.zeros(4)).efficiency == pytest.approx(0.8640, abs=2e-4)

@@ -222,13 +222,13 @@ def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(quick, tmp_path, c
 
 def test_a_bound_that_cannot_be_computed_costs_no_summary(quick, tmp_path, capsys):
     text = QUICK.replace(
-        "ellipse(0.0, 1.4, 0.8)", "Fourier([0] * 4, [[0.6], [0.3], [-0.3], [-0.6]], [[0.6], [0.3], [0.3], [0.6]])"
+        "ellipse(0.0, 1.4, 0.8)", "Fourier([0] * 5, [[0.6], [0.3], [0], [-0.3], [-0.6]], [[0.6], [0.3], [0.2], [0.3], [0.6]])"
     )
-    (tmp_path / "p.py").write_text(text.replace('"quick",', '"quick", body=Chain((0.2,) * 5), guess='))
+    (tmp_path / "p.py").write_text(text.replace('"quick",', '"quick", body=Chain((1 / 6,) * 6), guess='))
     assert colloc(["solve", str(tmp_path / "p.py"), "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
     printed = capsys.readouterr()
     assert "quick:" in printed.out
-    assert "no bound: bounds are computed for at most four links" in printed.err
+    assert "no bound: bounds are computed for at most five links" in printed.err
 
 
 def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys):
