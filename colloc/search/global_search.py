@@ -2,9 +2,9 @@
 
 A start is first followed on a coarse mesh down to a delta at which friction is nearly dry. Where it meets a gait that an
 earlier start came through, at the same delta, it goes on as that one did, and is dropped. After every sixteen new starts
-come as many hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). A few of the first are small
+come as many hops: the best gait so far, shaken (Wales and Doye, J. Phys. Chem. A 101, 1997). Beside them are a few small
 loops (`colloc.search.small_starts`), slow and so followed at a smaller delta only. What is left is sorted by its value at that
-one; the first few are followed to the final delta, and the best of those is refined, answered and certified.
+one; the first few of both are followed to the final delta, and the best of those is refined, answered and certified.
 """
 
 from __future__ import annotations
@@ -51,15 +51,15 @@ _NEARLY_DRY = 0.2
 _SAME_EFFICIENCY, _SAME_GAIT = 1e-3, 0.05
 _BROKEN = 1e-2
 """Violation of a row beyond which a gait is not compared with others."""
-_FOLLOWED, _PROMISING, _CLOSE = 3, 0.8, 0.01
-"""How many gaits are followed to the final delta, the share of the best value that they need at the coarse one, and how
-far they may be from the best at the final one to be optimised on the whole mesh."""
+_FOLLOWED, _FOLLOWED_LOOPS, _PROMISING, _CLOSE = 3, 2, 0.8, 0.01
+"""How many gaits are followed to the final delta, and of those from small loops; the share of the best value that they need at
+the coarse one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
 _TURN, _HOP_SIZES, _HOP_SEED = 16, (0.2, 0.4, 0.8), 1
 """Starts and hops from the best gait known take turns of so many, and how far hops go [rad], in turn. At 0.2 a hop mostly falls
 back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start k is depends on
 what came before alone: more starts go wherever fewer do."""
-_LOOP_EVERY = 3
-"""Of the first starts, how many there are from one small loop to the next."""
+_LOOP = -1
+"""In place of the number of a start."""
 _PATIENCE, _MOST = 8, 3
 """The search goes on until so many in a row have led nowhere better; at most so many times the starts asked for are tried."""
 _SPARE = 8
@@ -76,10 +76,12 @@ Watch = Callable[[SearchStep], object]
 
 @dataclass(eq=False)
 class Candidate:
-    """A gait that one or more starts came through, where it led, and its objective at a delta that is small for all."""
+    """A gait that one or more starts came through, where it led, its objective at a delta that is small for all, and whether it
+    came from small loops."""
 
     found: Found
     dry: float = np.inf
+    small: bool = False
     starts: list[int] = field(default_factory=list)
     then: Candidate | None = None
 
@@ -120,14 +122,15 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
     dry = max(deltas[-1] * (1.0 if problem.gait.unit_speed else problem.smallest_shape_speed), problem.delta)
     known: list[list[Candidate]] = [[] for _ in deltas]
     small: list[Candidate] = []
-    starts, loops, last, tried, best = starting_gaits(problem), small_loops(problem), count - 1, 0, 0.0
+    for loop in small_loops(problem):
+        with suppress(CollocError):
+            _follow(*space_about(coarse, closed_gait(coarse, loop, dry)), _LOOP, [dry], [small])
+    starts, last, tried, best = starting_gaits(problem), count - 1, 0, 0.0
     while tried == 0 or (tried <= min(last, _MOST * count - 1) and goes_on()):
         start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
-            if loops and start % _LOOP_EVERY == 1:
-                _follow(*space_about(coarse, closed_gait(coarse, loops.pop(0), dry)), start, [dry], [small])
-            elif start // _TURN % 2 == 0 or not known[-1]:
+            if start // _TURN % 2 == 0 or not known[-1]:
                 _follow(*space_about(coarse, closed_gait(coarse, next(starts), deltas[0])), start, deltas, known)
             else:
                 shaken = _shaken(problem, min((c.found for c in known[-1]), key=lambda f: f.objective).gait, start)
@@ -138,7 +141,7 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool], watch:
         watch(_step("starts", tried, max(tried, count), [c.found for c in (*known[-1], *small)]))
 
     for candidate in (ends := [*known[-1], *small]):
-        candidate.dry = objective_at(dry, candidate.found)
+        candidate.dry, candidate.small = objective_at(dry, candidate.found), candidate in small
     return sorted(ends, key=lambda c: c.dry), tried
 
 
@@ -245,7 +248,8 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
 
     least = -known[0].dry - (1 - _PROMISING) * abs(known[0].dry)
     # gaits of finite size may shrink on the way, so they are followed until one has not
-    queue = [c for c in known if -c.dry >= least][:_FOLLOWED]
+    promising = [c for c in known if -c.dry >= least]
+    queue = [c for c in promising if not c.small][:_FOLLOWED] + [c for c in promising if c.small][:_FOLLOWED_LOOPS]
     spare = [c for c in known if is_finite(c.found) and c not in queue][:_SPARE]
     for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(levels[-1]) for _, levels in ends)):

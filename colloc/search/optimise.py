@@ -204,7 +204,7 @@ def best_gait(
     ----------
     problem : Problem
     starts : int, optional
-        The guess, known gaits and seeded samples (`colloc.search.global_search.starting_gaits`). With 1 the guess alone, as
+        The guess, known gaits and seeded samples (`colloc.search.global_search`), and small loops. With 1 the guess alone, as
         `maximise_efficiency`. By default 32, of relaxed gaits 8.
     on_level : callable, optional
         Called with every `colloc.results.solution.Level` of the best gait.
