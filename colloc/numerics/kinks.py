@@ -58,9 +58,15 @@ def stationarity_around(
     rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
     drawn = v + radius * np.random.default_rng(seed).uniform(-1.0, 1.0, (points * v.size, v.size))
     places = np.clip(np.vstack([v, drawn]), program.lower, program.upper)
-    # rows have kinks too: what is not linear in them counts with the multipliers that are known
-    gradients = np.array([program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes) for u in places]).T
-    heights = np.array([program.objective(u) + at.on_rows @ (program.rows(u) - rows - slopes @ (u - v)) for u in places])
+
+    def on_sides(u: np.ndarray) -> tuple[np.ndarray, float]:
+        """Gradient and height of the Lagrangian; rows have kinks too: what is not linear in them counts, with the multipliers
+        that are known."""
+        bent = program.rows(u) - rows - slopes @ (u - v)
+        return program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes), program.objective(u) + at.on_rows @ bent
+
+    found_there = [on_sides(u) for u in places]
+    gradients, heights = np.array([g for g, _ in found_there]).T, np.array([h for _, h in found_there])
     if not (np.isfinite(gradients).all() and np.isfinite(heights).all()):
         return at
     # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
