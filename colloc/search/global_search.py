@@ -205,14 +205,14 @@ class Chosen:
         Tried in all.
     others : tuple of Alternative
         All distinct gaits, the best contender first.
-    finite : list of Found
-        Levels of the best gait of finite size, where the best one is as small as the bound on the shape speed allows.
+    finite : list of list of Found
+        Contenders of finite size, where the best one is as small as the bound on the shape speed allows.
     """
 
     contenders: list[list[Found]]
     starts: int
     others: tuple[Alternative, ...]
-    finite: list[Found]
+    finite: list[list[Found]]
 
 
 def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch = lambda step: None) -> Chosen:
@@ -277,7 +277,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     followed = [_alternative(problem, levels[-1], starts) for levels, starts in distinct]
     dropped = [_alternative(problem, c.found, c.starts) for c in known if not any(c is done for done, _ in ends)]
     contenders = [levels for levels, _ in distinct]
-    finite = [] if is_finite(contenders[0][-1]) else next((levels for levels in contenders if is_finite(levels[-1])), [])
+    finite = [] if is_finite(contenders[0][-1]) else [levels for levels in contenders if is_finite(levels[-1])]
     return Chosen(contenders, tried, (*followed, *dropped), finite)
 
 

@@ -34,6 +34,8 @@ _SADDLES = 3
 """Saddles left one after another."""
 _CONTENDERS, _REFINED = 3, 0.01
 """Gaits that are solved for at most, until a certificate holds; what their values may lose on a refined mesh, as a share."""
+_FINITE = 2
+"""Gaits of finite size that are solved for, until one keeps its size."""
 _DRIER, _SMALL = 2, 2.0
 """Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous: at most so many times
 the bound on the shape speed."""
@@ -243,7 +245,7 @@ def best_gait(
     solution.starts = chosen.starts
     solution.others = tuple(replace(other, value=in_unit(other.value, unit, objective)) for other in chosen.others)
     if chosen.finite and on_speed_floor(problem, solution.gait):
-        _add_finite(solution, [restated(level_found(found), unit, objective) for found in chosen.finite])
+        _add_finite(solution, [[restated(level_found(found), unit, objective) for found in levels] for levels in chosen.finite])
     solution.seconds = time.perf_counter() - begin
     return solution
 
@@ -271,17 +273,22 @@ def _best_certified(
     return solution
 
 
-def _add_finite(solution: Solution, levels: list[Level]) -> None:
-    """Solve for the gait of finite size that these levels lead to, and put it beside the solution."""
-    finite = maximise_efficiency(solution.problem, None, levels)
-    if finite.status == SOLVED and not on_speed_floor(finite.problem, finite.gait):
+def _add_finite(solution: Solution, contenders: list[list[Level]]) -> None:
+    """Solve for the gait of finite size that levels lead to, best first, and put it beside the solution; where it shrinks after
+    all, for the next one."""
+    for levels in contenders[:_FINITE]:
+        finite = maximise_efficiency(solution.problem, None, levels)
+        if on_speed_floor(finite.problem, finite.gait):
+            continue
+        if finite.status != SOLVED:
+            solution.message = f"{solution.message} The best gait of finite size, not certified: {finite.value:.4f}."
+            return
         found = finite.certificate
         finite.starts, finite.others = solution.starts, tuple(o for o in solution.others if not o.on_speed_floor)
         solution.finite = finite
         text = f"The best gait of finite size: {found.value:.6f} +- {found.value_error:.0e}, certified."
-    else:
-        text = f"The best gait of finite size, not certified: {levels[-1].value:.4f}."
-    solution.message = f"{solution.message} {text}"
+        solution.message = f"{solution.message} {text}"
+        return
 
 
 def _certified(solution: Solution) -> None:
