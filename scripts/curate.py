@@ -42,6 +42,7 @@ KEPT = {
     "work_precision_path.md": "python -m benchmarks.work_precision --path",
     "work_precision_path.png": "python -m benchmarks.work_precision --path",
     "robustness.md": "python -m benchmarks.robustness --starts 35",
+    "robustness-3-harmonics.md": "python -m benchmarks.robustness --starts 4 --harmonics 3",
     "grid_confirmation.md": "python -m benchmarks.grid_confirmation",
     "robustness.json": "python -m benchmarks.robustness --starts 35",
     "crawlers.md": "python -m scripts.optimise_crawlers",

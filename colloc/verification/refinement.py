@@ -34,6 +34,8 @@ TURNING = 5e-5
 MOST_POINTS = 12_000
 AIM = 0.4
 """The planned error is this fraction of the request: the gait, and its kinks with it, will still move."""
+_GOOD = 0.9
+"""A mesh is good already at this fraction of the request: the answer on it may still move the gait a little."""
 _MORE_NODES, _MOST_NODES = (0, 2, 4), 9
 _HANDICAP = 1.1
 _SNAP = 0.3
@@ -134,7 +136,7 @@ def planned_mesh(
     """
     fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
     known, error = Known(problem, gait, delta, fine), mesh_error(problem, mesh, gait, delta, tolerance, fine)
-    accurate = error.estimate <= tolerance and error.turning <= TURNING
+    accurate = error.estimate <= _GOOD * tolerance and error.turning <= TURNING
     if accurate and error.violation.max() <= VIOLATION:
         return None
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
