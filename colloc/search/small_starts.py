@@ -23,8 +23,10 @@ from colloc.system.errors import NotConvergedError
 
 _DRAWN, _LEVELS, _SEED = 60, (-1.0, -0.5, 0.0, 0.5, 1.0), 2
 """Shapes, and the values of every angle among which they are drawn, of the limit."""
-_DIRECTIONS, _HEADINGS = 60, 3
+_DIRECTIONS, _HEADINGS = 60, 2
 """Of rates, and in half a turn: enough to tell shapes apart; the search finds the sharp ones."""
+_FIRST = 0.5
+"""First heading [rad]: no axis of symmetry of the usual shapes, along and across which a mixture may go nowhere."""
 _SHAPES = 2
 _SIZE = 1.5
 """Length of a loop, of the least that a gait may have."""
@@ -67,16 +69,19 @@ def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
     now = body.motion(friction, angles, rates, delta, solved)
     # around a closed loop every point of the body is carried as far
     motions = CoulombMotion(angles, rates, now.centre, now.z[2], now.power)
-    turn = np.pi if friction.reversible else 2 * np.pi
-    headings = np.arange(round(_HEADINGS * turn / np.pi)) * np.pi / _HEADINGS
+    turns = 1 if friction.reversible else 2
+    headings = _FIRST + np.arange(_HEADINGS * turns) * np.pi / _HEADINGS
     found: list[tuple[SmallGait, np.ndarray]] = []
     for k, shape in enumerate(shapes.T):
         here = motions.take(np.arange(k * count, (k + 1) * count)[solved.converged[k * count : (k + 1) * count]])
         try:
-            value, heading = max((best_mixture(here, h)[0], h) for h in headings)
+            weights = max((best_mixture(here, h) for h in headings), key=lambda mixture: mixture[0])[1]
+            # along the way that it goes, a mixture is worth more than along any other, and the best one there as much at least
+            way = here.velocity @ weights
+            heading = float(np.arctan2(way[1], way[0]))
+            value, weights, _ = best_mixture(here, heading)
         except NotConvergedError:
             continue
-        weights = best_mixture(here, heading)[1]
         used = weights > _UNUSED * weights.max()
         if not any(abs(value - other.efficiency) < _ALIKE * value for other, _ in found):
             found.append((SmallGait(value, heading, here.rates[:, used], weights[used]), shape))
@@ -88,8 +93,8 @@ def _drawn_shapes(problem: Problem) -> np.ndarray:
     body, own, n_joint = problem.body, seed_class(problem), problem.body.n_joint
     drawn = np.random.default_rng(_SEED).choice(_LEVELS, (_DRAWN, n_joint)) * widest(problem.joint_limit)
     none = np.zeros((n_joint, own.harmonics))
-    shapes = []
-    for mean in drawn:
-        shape = own.fourier(own.parameters(Fourier(mean, none, none)), n_joint).mean
-        shapes.append(shape * min(1.0, largest_factor(body, problem.joint_limit, shape[:, None])))
-    return np.unique(np.array(shapes), axis=0).T
+    means = np.array([own.fourier(own.parameters(Fourier(mean, none, none)), n_joint).mean for mean in drawn])
+    # of a shape and its mirror image, the one whose first bend is to the left
+    first = np.take_along_axis(means, (means != 0).argmax(axis=1)[:, None], axis=1)
+    means = np.unique(np.where(first < 0, -means, means) + 0.0, axis=0)
+    return np.array([mean * min(1.0, largest_factor(body, problem.joint_limit, mean[:, None])) for mean in means]).T
