@@ -73,6 +73,13 @@ def best_mixture(motion: CoulombMotion, heading: float) -> tuple[float, np.ndarr
     return -program.fun, program.x, -program.eqlin.marginals
 
 
+def heading_of(motion: CoulombMotion, weights: np.ndarray) -> float:
+    """The way a mixture travels, in the axes of its velocities [rad]. Along it the mixture is worth more than along any other,
+    and the best mixture there at least as much."""
+    way = motion.velocity @ weights
+    return float(np.arctan2(way[1], way[0]))
+
+
 class _Columns:
     """Motions at one shape that the linear program may use."""
 
@@ -82,11 +89,6 @@ class _Columns:
     def motion(self, rates: np.ndarray) -> CoulombMotion:
         angles = np.repeat(self.shape[:, None], rates.shape[1], axis=1)
         return balanced_motion(self.body, self.friction, angles, rates, self.delta)
-
-    def turned(self, motion: CoulombMotion, weights: np.ndarray) -> tuple[float, np.ndarray]:
-        """Direction of travel and displacement of a mixture."""
-        way = motion.velocity @ weights
-        return float(np.arctan2(way[1], way[0])), way
 
     def climbed(self, motion: CoulombMotion, heading: float, multipliers: np.ndarray, turn: float) -> np.ndarray:
         """Rate directions whose reduced gain is locally largest: what the program would most like to add."""
@@ -151,7 +153,7 @@ def small_gait(
         new_value, weights, multipliers = best_mixture(motion, heading)
         if new_value > value:
             value = new_value
-        way = columns.turned(motion, weights)[0]
+        way = heading_of(motion, weights)
         more = columns.motion(columns.climbed(motion, heading, multipliers, np.pi / directions))
         motion = motion.joined(more)
         trial = best_mixture(motion, way)[0]

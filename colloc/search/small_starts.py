@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.bounds.coulomb_motion import CoulombMotion, one_joint, unit_directions
-from colloc.bounds.infinitesimal import SmallGait, best_mixture
+from colloc.bounds.infinitesimal import SmallGait, best_mixture, heading_of
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import largest_factor
 from colloc.gaits.harmonic import Fourier
@@ -76,9 +76,7 @@ def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
         here = motions.take(np.arange(k * count, (k + 1) * count)[solved.converged[k * count : (k + 1) * count]])
         try:
             weights = max((best_mixture(here, h) for h in headings), key=lambda mixture: mixture[0])[1]
-            # along the way that it goes, a mixture is worth more than along any other, and the best one there as much at least
-            way = here.velocity @ weights
-            heading = float(np.arctan2(way[1], way[0]))
+            heading = heading_of(here, weights)
             value, weights, _ = best_mixture(here, heading)
         except NotConvergedError:
             continue

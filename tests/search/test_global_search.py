@@ -165,3 +165,17 @@ def test_delta_is_lowered_for_gaits_near_the_bound_where_nothing_else_fails(spee
         problem=UNEQUAL, gait=SimpleNamespace(shape_speed=speed), certificate=SimpleNamespace(failures=checks)
     )
     assert optimise._is_small_and_viscous(solution) == small
+
+
+def test_where_a_gait_of_finite_size_shrinks_after_all_the_next_one_stands_beside_the_best(monkeypatch):
+    def solved(gait, value):
+        certificate = SimpleNamespace(value=value, value_error=1e-7)
+        return SimpleNamespace(problem=None, gait=gait, status="solved", value=value, certificate=certificate)
+
+    ends = {"first": solved("small", 0.5), "second": solved("large", 0.4)}
+    monkeypatch.setattr(optimise, "maximise_efficiency", lambda problem, on_level, levels: ends[levels])
+    monkeypatch.setattr(optimise, "on_speed_floor", lambda problem, gait: gait == "small")
+    solution = SimpleNamespace(problem=None, message="", starts=32, others=(), finite=None)
+    optimise._add_finite(solution, ["first", "second"])
+    assert solution.finite is ends["second"]
+    assert "0.400000" in solution.message

@@ -1,6 +1,7 @@
 """The error estimate of a mesh against references that share nothing with it, and meshes planned from it."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -173,6 +174,15 @@ def test_planned_meshes_are_as_accurate_as_they_say(name):
         assert abs(error.total) <= error.estimate <= 1.1 * tolerance
         again = planned_mesh(stated, Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1.1 * tolerance)
         assert again is None
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.85, True), (0.95, False)])
+def test_a_mesh_that_is_just_good_enough_is_refined_as_the_answer_on_it_still_moves(monkeypatch, share, good):
+    stated = problem("gauss-3")
+    mesh = problem_mesh(stated)
+    nearly = SimpleNamespace(estimate=share * 1e-5, turning=0.0, violation=np.zeros(mesh.h.size))
+    monkeypatch.setattr(refinement, "mesh_error", lambda *arguments: nearly)
+    assert (planned_mesh(stated, mesh, GAIT, DELTA, 1e-5) is None) == good
 
 
 def test_a_nested_mesh_has_every_knot_of_the_one_before():
