@@ -19,8 +19,9 @@ from colloc.system.errors import ProblemError
 
 LEGENDRE, FOURIER = "legendre", "fourier"
 
-_PLACES_A_MODE = 4
-"""Where on the body |Theta| is bounded."""
+_PLACES_A_MODE = 16
+"""Where on the body |Theta| is bounded: between Chebyshev points, so many a mode, a polynomial exceeds what it is at them by
+0.5 % at most, a Fourier series by 1.2 %."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class ModalBody(PanelBody):
 
     @property
     def _places(self) -> np.ndarray:
-        return np.linspace(0.0, 1.0, _PLACES_A_MODE * self.modes + 1)
+        return 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _PLACES_A_MODE * self.modes + 1))
 
     @property
     def limit_names(self) -> tuple[str, ...]:

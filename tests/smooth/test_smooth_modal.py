@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from colloc.collocation.transcription import transcribe
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
+from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.results.equivalence import distance, reversed_in_time, swapped
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
@@ -122,6 +124,29 @@ def seen_from_edge(body, q, rates, solved, edge):
     omega = solved.z[2] + (body.modes_at(body.grid.edges[edge]) @ rates)[0]
     anchor = np.full(q.shape[1], edge)
     return BalanceSolution(solved.z, solved.residual, solved.iterations, solved.converged, anchor, np.stack([u, v, omega]))
+
+
+@pytest.mark.parametrize("modes", [2, 4, 6, 12])
+@pytest.mark.parametrize("basis", ["legendre", "fourier"])
+def test_the_tangent_is_bounded_between_the_places_too(basis, modes):
+    body = ModalBody(modes, basis)
+    shapes = np.random.default_rng(modes).normal(size=(modes, 2000))
+    shapes /= np.abs(body.limited @ shapes).max(axis=0)
+    everywhere = np.abs(body.modes_at(np.linspace(0.0, 1.0, 4001)) @ shapes).max(axis=0)
+    half_way = {"legendre": np.pi / 32, "fourier": np.pi**2 / 64}[basis]  # from place to place, as a phase of the highest mode
+    assert 1.0 < everywhere.max() < 1.0 + 0.5 * half_way**2
+
+
+def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_programs_let_them():
+    body, gait = ModalBody(4), Harmonic(1)
+    shapes = np.random.default_rng(1).normal(size=(4, 5000))
+    shapes /= body.largest_angles(shapes)
+    largest = np.abs(shapes).max(axis=1)
+    assert largest.max() > 4 / np.pi
+    assert (largest <= gait.largest_parameters(body, 1.0).max() * np.pi / 4).all()
+    problem = Problem("modes", body=body, gait=gait, joint_limit=1.0)
+    program = transcribe(problem)
+    np.testing.assert_allclose(program.upper[program.layout.parameters[:, 0]], HarmonicSpace(problem).upper)
 
 
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])
