@@ -13,6 +13,8 @@ from colloc.mechanics.contact import gap
 from colloc.system.replaced_file import replaced_file
 
 STORE, GAITS = Path("results/curated/frontier.json"), Path("results/frontier")
+PROVED = Path("results/curated/guaranteed.json")
+"""By `scripts.bound_guaranteed`."""
 
 
 class Row(NamedTuple):
@@ -81,3 +83,13 @@ def smallest_bound(row: Row, known: dict) -> float:
         if of_row and other.limit >= round(row.limit, 4) and other.width <= row.width:
             holds.append(value["sampled"])
     return min(holds)
+
+
+def guaranteed_bound(row: Row) -> float:
+    """Of the bounds that are proved for its law and body, and its limit or a larger one, the smallest; inf if there is none."""
+    parts: dict[tuple[float, int], list[float]] = {}
+    for proof in json.loads(PROVED.read_text()):
+        of_row = proof["law"] == "Friction" and tuple(proof["mu"]) == row.mu and np.allclose(proof["lengths"], 1 / row.links)
+        if of_row and len(proof["lengths"]) == row.links and proof["joint_limit"] >= round(row.limit, 4) and not proof["open_cells"]:
+            parts.setdefault((proof["joint_limit"], proof["part"][1]), []).append(proof["guaranteed"])
+    return min((max(found) for (_, count), found in parts.items() if len(found) == count), default=np.inf)

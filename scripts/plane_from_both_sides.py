@@ -21,7 +21,7 @@ from scripts.frontier import compute_missing
 from scripts.frontier_rows import Row, best_held, read, smallest_bound
 from scripts.panel_marks import letter
 
-MU_T, MU_B = (1.0, 3.0, 10.0), (1.0, 1.7, 3.0)
+MU_T, MU_B = (0.3, 1.0, 3.0, 10.0), (1.0, 1.7, 3.0)
 """Over mu_f; exchanging head and tail exchanges mu_f and mu_b, so mu_b >= mu_f is all there is."""
 LIMIT = 2.5
 OUT = Path("results/curated")
