@@ -66,17 +66,20 @@ HEAD = """# The best gaits from both sides
 
 `python -m scripts.frontier`, taken up again and again. Joints within the limit; links of the width do not overlap,
 links of none do not cross. *Gait*: the best certified finite gait that travels through shapes (its mean angles range
-over at least 0.3 rad), with its corners, its distance a period, the largest joint angle and how far its links stay
-*apart* [body lengths], so how wide they may be; delta = 1e-5 at unit shape speed. What was found for a smaller limit
-counts for a larger one too. *60 corners*: the best certified polygon with at most 60. *Relaxed*: what finite gaits near
-it tend to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
-there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one,
-with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value, if
-climbs still found more than is tolerated above. *Proved*: a bound without samples, for delta -> 0 ([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound
-that is valid for the row, relative. CPU seconds on a loaded machine. A star: the relaxed gait's own certificate fails a
-check, so its value is not sharp. An empty place has not been computed. What was found is a lower end: other starts may
-find better gaits. What a row of width 0 says of a gait holds for links of the widths 0.01 and 0.03 as well where the gait
-stays farther apart than these, and its bound holds for any width: rows of other widths are those where something changes.
+over at least 0.3 rad; by distance they could not be told apart, as a small gait run through often enough travels as
+far), with its corners, its distance a period, the largest joint angle and how far its links stay *apart* [body
+lengths], so how wide they may be; delta = 1e-5 at unit shape speed. What was found for a smaller limit counts for a
+larger one too. *60 corners*: the best certified polygon with at most 60. *Relaxed*: what finite gaits near it tend
+to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
+there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled
+one, with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value,
+if climbs still found more than is tolerated above. *Proved*: a bound without samples, for delta -> 0
+([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for
+the row, relative; 1 over the smallest coefficient is one for every body. CPU seconds of rows made at different times,
+on different machines. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty
+place has not been computed. What was found is a lower end: other starts may find better gaits. What a row of width 0
+says of a gait holds for links of the widths 0.01 and 0.03 as well where the gait stays farther apart than these, and
+its bound holds for any width: rows of other widths are those where something changes.
 
 """
 COLUMNS = (
@@ -231,7 +234,7 @@ def line(row: Row, known: dict) -> str:
     refused = " (not certified)"
     ends = [travels.get("relaxed", -np.inf), still.get("efficiency", -np.inf)]
     least, proved = smallest_bound(row, known), guaranteed_bound(row)
-    apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) and np.isfinite(least) else ""
+    apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) else ""
     program = "" if above.get("converged", True) else f" ({above['floor']:.4f})"
     cells = [
         ", ".join(f"{m:g}" for m in row.mu), f"{row.limit:.4g}", str(row.links), f"{row.width:g}",
@@ -240,7 +243,8 @@ def line(row: Row, known: dict) -> str:
         value(simple, "efficiency", mark="" if simple.get("passed") else refused),
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
         f"{room(row, still)[1]:.3f}" if still else "", value(loops, "efficiency", mark="" if loops.get("passed") else refused),
-        value(above, "sampled", mark=program), value(above, "unknowns", "d"), f"{proved:g}" if np.isfinite(proved) else "", apart,
+        value(above, "sampled", mark=program), value(above, "unknowns", "d"),
+        f"{proved:g}" if np.isfinite(proved) else "", apart,
         f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
     ]  # fmt: skip
     return f"| {' | '.join(cells)} |"
