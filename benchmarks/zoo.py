@@ -2,12 +2,14 @@
 
     python -m benchmarks.zoo --problems 100
     python -m benchmarks.zoo --laws --problems 20
+    python -m benchmarks.zoo --modes --problems 20
 
 Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1 to 4 harmonics, free paths
 and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. With --laws another family: elliptic, viscous, power
-and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power, slopes. For each: whether
-it is solved, its value over the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates),
-and the processor time. Failures are printed with the reason.
+and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power, slopes. With --modes a
+third: smooth bodies of 2 to 6 bending modes, under the friction of the first. For each: whether it is solved, its value over
+the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates), and the processor time.
+Failures are printed with the reason.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc import Chain, Elliptic, FreePath, Friction, Harmonic, OwnLaw, Polygon, PowerLaw, Problem, Viscous
+from colloc import Chain, Elliptic, FreePath, Friction, Harmonic, ModalBody, OwnLaw, Polygon, PowerLaw, Problem, Viscous
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.results.solution import SOLVED
@@ -90,6 +92,16 @@ def law_problem(number: int) -> Problem:
     return Problem(f"zoo-laws-{number}", body=body, friction=law, gait=gait, objective=objective, **limited)  # type: ignore[arg-type]
 
 
+def modal_problem(number: int) -> Problem:
+    """Problem `number` of the family of smooth bodies with a few bending modes; it depends on that number alone."""
+    rng = np.random.default_rng([SEED + 2, number])
+    gait = Harmonic(int(rng.integers(1, 3)), str(rng.choice(["none", "antipodal"])))
+    mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))), float(rng.choice([1.0, rng.uniform(1.0, 5.0)]))
+    return Problem(
+        f"zoo-modes-{number}", body=ModalBody(int(rng.integers(2, 7))), friction=Friction(mu_t, 1.0, mu_b), gait=gait
+    )
+
+
 def described(problem: Problem) -> str:
     """In one line."""
     law, best = problem.friction.label, "" if problem.objective == EFFICIENCY else f"best {problem.objective.name}, "
@@ -109,12 +121,17 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=100, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
     parser.add_argument("--starts", type=int, default=STARTS, metavar="N", help="more look for better answers")
-    parser.add_argument("--laws", action="store_true", help="the family of other laws, objectives and limits")
+    family = parser.add_mutually_exclusive_group()
+    family.add_argument("--laws", dest="of", action="store_const", const=law_problem, help="other laws, objectives and limits")
+    family.add_argument(
+        "--modes", dest="of", action="store_const", const=modal_problem, help="smooth bodies of a few bending modes"
+    )
+    parser.set_defaults(of=zoo_problem)
     options = parser.parse_args()
     best = known_bests()
     solved, quality, seconds = [], [], []
     for number in range(options.first, options.first + options.problems):
-        problem = law_problem(number) if options.laws else zoo_problem(number)
+        problem = options.of(number)
         begin = time.process_time()
         try:
             solution = best_gait(problem, options.starts)

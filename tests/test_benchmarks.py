@@ -16,7 +16,7 @@ from benchmarks.scaling import problem_of
 from benchmarks.smooth_panels import MOTION, loads
 from benchmarks.tables import interleaved_seconds, markdown_table
 from benchmarks.time_schemes import GAIT, adaptive_efficiency
-from benchmarks.zoo import described, law_problem, zoo_problem
+from benchmarks.zoo import described, law_problem, modal_problem, zoo_problem
 from colloc import Chain, Friction, ellipse, replay, solve_balance
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.smooth.balance import solve_smooth
@@ -130,7 +130,7 @@ def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():
     np.testing.assert_allclose(np.linalg.eigvalsh(R), np.linalg.eigvalsh(turned), atol=1e-15)
 
 
-def test_the_numbers_of_the_zoo_keep_their_problems_and_both_families_are_stated():
+def test_the_numbers_of_the_zoo_keep_their_problems_and_all_families_are_stated():
     lengths = "0.1712, 0.1186, 0.2235, 0.1596, 0.3273"
     paths = "paths of curvature <= 2 per rad, symmetry none, within 3.14"
     known = f"links of lengths {lengths} from the tail [body lengths], friction (5.95461, 1, 1) {paths}"
@@ -138,3 +138,5 @@ def test_the_numbers_of_the_zoo_keep_their_problems_and_both_families_are_stated
     kinds = {type(law_problem(k).friction).__name__ for k in range(10)}
     assert kinds == {"Elliptic", "Viscous", "PowerLaw", "OwnLaw", "Friction"}
     assert law_problem(7).hash == law_problem(7).hash != law_problem(2).hash
+    assert described(modal_problem(0)).startswith("smooth, 2 legendre modes")
+    assert {modal_problem(k).body.modes for k in range(20)} == {2, 3, 4, 5, 6}

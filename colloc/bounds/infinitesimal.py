@@ -166,15 +166,16 @@ def small_gait(
 
 
 def best_small_gait(
-    body: Chain, friction: Friction, joint_limit: float = np.pi, steps: int | None = None, refined: int = 3
+    body: Chain, friction: Friction, joint_limit: float = np.pi, steps: int | None = None, refined: int | None = None
 ) -> tuple[SmallGait, np.ndarray]:
     """The best small gait found over all admissible shapes, and its shape ``(n_joint,)``.
 
     A lattice of `steps` + 1 values of every joint angle (by default 11, of three joints 7, of four 5), then pattern searches
-    from the `refined` best of it. Values of two joints on the lattice are rough ones; of more those of a few fixed directions
-    say nothing, 0.37 where 0.86 is best.
+    from the `refined` best of it (3; of two joints, where a search takes a third of a second, 12). Values of two joints on the
+    lattice are rough ones; of more those of a few fixed directions say nothing, 0.37 where 0.86 is best.
     """
     steps = steps or {3: 6, 4: 4}.get(body.n_joint, 10)
+    refined = refined or (12 if body.n_joint < 3 else 3)
     axis = np.linspace(-joint_limit, joint_limit, steps + 1)
     shapes = np.stack([a.ravel() for a in np.meshgrid(*[axis] * body.n_joint, indexing="ij")])
     shapes = shapes[:, fundamental(body, shapes)]
@@ -190,11 +191,13 @@ def best_small_gait(
         return value_at(shape, 180, 4, 0 if body.n_joint < 3 else 2)
 
     values = np.array([value_at(s, 36, 3, 0) if body.n_joint < 3 else rough(s) for s in shapes.T])
-    moves = np.concatenate([np.eye(body.n_joint), -np.eye(body.n_joint)])
-    found = []
+    rng, found = np.random.default_rng(steps), []
     for start in np.argsort(-values)[:refined]:
         shape, value, size = shapes[:, start], rough(shapes[:, start]), joint_limit / steps
         while size > _FINE:
+            # ridges run at any angle to the axes: along contacts, and where links lie alike
+            turned = np.linalg.qr(rng.standard_normal((body.n_joint, body.n_joint)))[0]
+            moves = np.concatenate([np.eye(body.n_joint), -np.eye(body.n_joint), turned, -turned])
             tried = np.clip(shape + size * moves, -joint_limit, joint_limit)
             tried = tried[admissible(body, tried.T, _EDGE)]
             tried = tried[np.abs(tried - shape).max(axis=1) > 1e-9]

@@ -10,9 +10,12 @@ import casadi as ca
 import numpy as np
 
 from colloc.gaits.limits import Limit
-from colloc.mechanics.bodies import Body, Pairs
+from colloc.mechanics.bodies import Body, Pairs, Stretch
 from colloc.mechanics.contact import Contact, tangent_of_minimum
 from colloc.numerics.constraint_rows import Group, block_group
+
+_PLACES, _FLAT = 9, 1e-12
+"""On a stretch of a smooth body; a bend of its angle below which it has no peak."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,9 +23,10 @@ class ShapeCheck:
     """A scalar function of the shape that admissibility bounds from above (angles also from below).
 
     along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, the weight of the first of two functions of
-    which this is the minimum, or -1. cut: of the shape and a share, the tangent plane of that weight, or the function itself
-    where it is negative. slope: its derivative with respect to the shape. row: the angle that it is, per shape coordinate; None
-    if it is none. place: which of the body's angles it is.
+    which this is the minimum, or -1; of the largest angle on a stretch of a smooth body, where on the body it is. cut: of the
+    shape and a share, the tangent plane of that weight, the function itself where it is negative, or the angle at that place.
+    slope: its derivative with respect to the shape. place: which of the body's angles it is, -1 if it is none. row: that
+    angle per shape coordinate, if it is one of them always.
     """
 
     name: str
@@ -30,13 +34,21 @@ class ShapeCheck:
     share: Callable[[np.ndarray], np.ndarray]
     cut: ca.Function
     slope: ca.Function
+    place: int = -1
     row: np.ndarray | None = None
-    place: int = 0
+
+    @property
+    def is_angle(self) -> bool:
+        return self.place >= 0
 
     def bounds(self, limit: Limit) -> tuple[float, float]:
         """The least and the largest value allowed, for a limit on the body's angles, or one on each."""
         own = limit[self.place] if isinstance(limit, tuple) else limit
-        return (-np.inf, 0.0) if self.row is None else (-own, own)
+        return (-own, own) if self.is_angle else (-np.inf, 0.0)
+
+    def itself(self, shapes: np.ndarray) -> np.ndarray:
+        """The shares at which the cuts are the function itself at shapes ``(n_joint, n_time)``."""
+        return self.share(shapes) if self.is_angle else np.full(shapes.shape[1], -1.0)
 
     def group(self, limit: Limit, n_cell: int, n: int) -> Group:
         """The rows that keep it within its bounds in every mesh cell, by the block of its name, for n variables in all."""
@@ -62,8 +74,11 @@ def shape_checks(body: Body, far: Pairs = ()) -> list[ShapeCheck]:
     and for the pairs `far` of parts farther apart.
     """
     angles = ca.SX.sym("q", body.n_joint)
-    names = enumerate(body.limit_names)
-    checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
+    names, stretches = enumerate(body.limit_names), body.stretches
+    if stretches:
+        checks = [_stretch_check(name, angles, stretch, k) for (k, name), stretch in zip(names, stretches, strict=True)]
+    else:
+        checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
     return checks + [_minimum_check(contact, angles) for contact in body.contacts(far)]
 
 
@@ -74,9 +89,30 @@ def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> Shape
         lambda shapes: row @ shapes,
         lambda shapes: np.full(shapes.shape[1], -1.0),
         *_cut(angles, share, value),
-        row,
         place,
+        row,
     )
+
+
+def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> ShapeCheck:
+    """The largest angle on a stretch of a smooth body."""
+    share = ca.SX.sym("share")
+    fine = np.linspace(stretch.first, stretch.last, _PLACES)
+    rows = stretch.angles_at(fine)
+
+    def largest(shapes: np.ndarray) -> np.ndarray:
+        """Where on the body it is, ``(n_time,)``: a parabola through the largest of some places and those beside it."""
+        heights = np.abs(rows @ shapes)
+        inner, every = np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2), np.arange(heights.shape[1])
+        low, mid, high = (heights[inner + k, every] for k in (-1, 0, 1))
+        bend = np.minimum(low - 2 * mid + high, 0.0)
+        offset = np.divide(0.5 * (low - high), bend, out=np.sign(high - low), where=bend < -_FLAT)
+        return fine[inner] + np.clip(offset, -1, 1) * (fine[1] - fine[0])
+
+    def along(shapes: np.ndarray) -> np.ndarray:
+        return np.asarray((stretch.angles_at(largest(shapes)).T * shapes).sum(axis=0))
+
+    return ShapeCheck(name, along, largest, *_cut(angles, share, ca.mtimes(stretch.angles_at(share), angles)), place)
 
 
 def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:

@@ -132,7 +132,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
 
 def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
-    upper[layout.parameters[:, 0]] = problem.gait.largest_parameters(problem.body.n_joint, widest(problem.joint_limit))
+    upper[layout.parameters[:, 0]] = problem.gait.largest_parameters(problem.body, widest(problem.joint_limit))
     lower[layout.parameters] = -upper[layout.parameters]
     if layout.forces.size:
         limit = problem.body.largest_forces(problem.friction)

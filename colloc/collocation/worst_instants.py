@@ -55,7 +55,7 @@ def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) ->
 def _magnitudes(check: ShapeCheck, angles: np.ndarray) -> np.ndarray:
     """What a bound from above is laid on, ``(n_time,)``: angles are bounded both ways."""
     values = check.along(angles)
-    return values if check.row is None else np.abs(values)
+    return np.abs(values) if check.is_angle else values
 
 
 def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ def followed(
     def heights(t: np.ndarray) -> np.ndarray:
         return check.cut(gait.angles(np.concatenate([t - step, t, t + step])), held).full().reshape(3, -1)
 
-    sign = 1.0 if check.row is None else np.sign(heights(times)[1])  # angles are bounded both ways
+    sign = np.sign(heights(times)[1]) if check.is_angle else 1.0  # angles are bounded both ways
     for _ in range(_STEPS):
         before, here, after = sign * heights(times)
         bend = before - 2 * here + after
@@ -112,7 +112,10 @@ def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray
 
 
 def held_shares(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
-    """The share of the first sum to hold in the cut at each of the instants, or -1 for the check itself, ``(n_time,)``."""
-    shares = check.share(gait.angles(times))
+    """The share of the first sum to hold in the cut at each of the instants, or that of the check itself, ``(n_time,)``."""
+    shapes = gait.angles(times)
+    shares = check.share(shapes)
+    if check.is_angle:
+        return shares
     both = (shares > _HELD_SHARE) & (shares < 1 - _HELD_SHARE)
-    return np.where(both & (check_values(check, gait, times) > -_HELD_NEAR), shares, -1.0)
+    return np.where(both & (check.along(shapes) > -_HELD_NEAR), shares, check.itself(shapes))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
+from colloc.mechanics.bodies import Body
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -226,10 +227,12 @@ class Harmonic(ClassOfGaits):
         table[:, 0], table[:, 1::2], table[:, 2::2] = gait.mean, gait.cos, gait.sin
         return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
 
-    def largest_parameters(self, n_joint: int, limit: float) -> np.ndarray:
+    def largest_parameters(self, body: Body, limit: float) -> np.ndarray:
         """Bounds on the parameters ``(n_parameter,)`` of gaits whose angles keep a limit: a function bounded by L has Fourier
         coefficients of at most 4 L / pi."""
-        return np.full(self.size(n_joint), 4 * limit / np.pi)
+        # coordinates, such as amplitudes of modes, may be larger than what is bounded
+        largest = max(1.0, np.abs(np.linalg.pinv(body.limited)).sum(axis=1).max())
+        return np.full(self.size(body.n_joint), largest * 4 * limit / np.pi)
 
     def angle_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
         """``(n_time, n_joint, n_parameter)``: joint angles at phases t per parameter."""

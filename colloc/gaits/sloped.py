@@ -112,8 +112,8 @@ class SlopeHarmonic(Harmonic):
         basis = super()._basis(n_joint)
         return np.column_stack([basis, np.zeros(len(basis))])
 
-    def largest_parameters(self, n_joint: int, limit: float) -> np.ndarray:
-        return np.append(super().largest_parameters(n_joint, limit)[:-1], _ANY_ANGLE)
+    def largest_parameters(self, body: Body, limit: float) -> np.ndarray:
+        return np.append(super().largest_parameters(body, limit)[:-1], _ANY_ANGLE)
 
     def fourier(self, parameters: np.ndarray, n_joint: int) -> Fourier:
         """The gait of a parameter vector, which points nowhere yet if that does not."""

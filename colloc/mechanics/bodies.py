@@ -8,7 +8,7 @@ that lies above `mechanics` and `smooth` is written for a `Body`; `colloc.mechan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -45,6 +45,15 @@ class Usual(NamedTuple):
     delta_influence: float
     instants: int = 1600
     instants_a_point: int = 10
+
+
+class Stretch(NamedTuple):
+    """A stretch of a smooth body: places where it begins and ends, and the angles at places on it per shape coordinate,
+    ``(n, n_joint)``; for CasADi at one place."""
+
+    first: float
+    last: float
+    angles_at: Callable[[Array], Array]
 
 
 @runtime_checkable
@@ -158,6 +167,10 @@ class Body(Protocol):
 
     @property
     def limit_names(self) -> tuple[str, ...]: ...
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Of a smooth body those for whose largest angle each of `limited` stands; none if these are all there are."""
 
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
         """The largest angle of the kind that is bounded, at any place of the body, ``(n_time,)``."""

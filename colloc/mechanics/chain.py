@@ -10,7 +10,7 @@ import numpy as np
 
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Branches, Lifted, Sliding
-from colloc.mechanics.bodies import ARROWS, FULL, IMPLICIT, Pairs, Usual
+from colloc.mechanics.bodies import ARROWS, FULL, IMPLICIT, Pairs, Stretch, Usual
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
@@ -58,6 +58,7 @@ class Chain(Links):
     formulations = (FULL, IMPLICIT)
     coordinate, quantity = "joint", "joint angle"
     schedule: tuple[float, ...] = ()
+    stretches: tuple[Stretch, ...] = ()
     panels = 0
     looks_for_all_velocities = True
     usual = Usual(

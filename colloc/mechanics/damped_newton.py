@@ -33,7 +33,7 @@ _DIRECT_ITERATIONS = 40
 _LADDER_ITERATIONS = 240
 _DRY, _VISCOUS = 1e-100, 1e8
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
-METHODS = ("auto", "newton", "fixed_point")
+METHODS = ("auto", "newton", "fixed_point", "direct")
 
 
 Evaluated = tuple[np.ndarray, np.ndarray, np.ndarray | None]
@@ -110,11 +110,11 @@ def solve(
 
     "auto" first damps Newton from where the state is; then, for instants that fail, from rest; then it follows the
     regularisation down from 1 to `delta` ``(1, n_time)``, and at last takes fixed-point steps only. The second attempt begins
-    with the first anchor, since the failed one may have moved it to a link from which nothing converges. The other methods
-    are for comparison.
+    with the first anchor, since the failed one may have moved it to a link from which nothing converges. "direct" is the first
+    attempt alone; the other methods are for comparison.
     """
     everything, first_anchor = np.arange(state.residual.size), state.anchor.copy()
-    direct = budget if method != "auto" else min(budget, _DIRECT_ITERATIONS)
+    direct = min(budget, _DIRECT_ITERATIONS) if method in ("auto", "direct") else budget
     at_rest = ~state.velocity.any(axis=0)
     _advance(state, make_batch, n_reference, everything, delta, tolerance, direct, method)
     if method != "auto":

@@ -9,6 +9,7 @@ The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.n
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -34,6 +35,10 @@ from colloc.system.errors import ProblemError
 
 _SMOOTHER = 2.0
 """Times delta, at which a balance is solved first that cannot be solved at delta itself."""
+
+
+Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3, n_time)``."""
 
 
 class _Batch:
@@ -118,10 +123,10 @@ def solve_balance(
     tolerance : float
         Largest `BalanceSolution.residual` at which an instant counts as converged.
     max_iterations : int
-        Steps allowed to an instant in each of at most four attempts; with each link at rest as many again, and from the
-        balance of a larger delta.
-    method : {"auto", "newton", "fixed_point"}
-        "auto" damps Newton and falls back on the paper's fixed point; the others are for comparison.
+        Steps allowed to an instant in each attempt.
+    method : {"auto", "newton", "fixed_point", "direct"}
+        "auto" damps Newton and falls back on the paper's fixed point: from the start, with each link at rest, from the balance
+        of a larger delta, and at last from afar. "direct" is the first of these attempts, and the others are for comparison.
 
     Returns
     -------
@@ -171,26 +176,39 @@ def solve_balance(
 
     solved = _numpy_balance if library is None else partial(compiled_balance, library)
     moving = Moving(body, friction, angles, rates, float(delta), load)
-    found = solved(moving, start, *settings)
-    for link in (*range(body.n_link), None) if method == "auto" else ():
-        failed = np.flatnonzero(~(found[1] <= tolerance))
-        if not failed.size:
-            break
-        there = moving.at(failed)
-        if link is not None:
-            # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
-            begun = there.with_link_at_rest(link)
-        elif load is None and delta < np.abs(there.rates).max():
-            # several rest nearly, each where the others let it: followed from where friction is smoother
-            begun = solve_balance(*there[:4], _SMOOTHER * delta, tolerance=tolerance, max_iterations=max_iterations).z
-        else:
-            break
-        again = solved(there, begun, *settings)
-        better = again[1] <= tolerance
-        for old, new in zip(found, again, strict=True):
-            old[..., failed[better]] = new[..., better]
+    found = _balanced(solved, moving, start, *settings) if method == "auto" else solved(moving, start, *settings)
     z, residual, iterations, anchor, velocity = found
     return BalanceSolution(z, residual, iterations, residual <= tolerance, anchor, velocity)
+
+
+def _balanced(
+    solved: Callable[..., Found], moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
+) -> Found:
+    """What `solved` finds directly, with each link at rest, from where friction is smoother, and last by the method given."""
+    found, middle = solved(moving, start, tolerance, max_iterations, "direct"), moving.body.n_link // 2
+
+    def again(begun: Callable[[Moving], np.ndarray | None], how: str = "direct") -> None:
+        """Try anew where nothing was found yet."""
+        failed = np.flatnonzero(~(found[1] <= tolerance))
+        if failed.size:
+            there = moving.at(failed)
+            new = solved(there, begun(there), tolerance, max_iterations, how)
+            better = new[1] < found[1][failed]
+            for old, some in zip(found, new, strict=True):
+                old[..., failed[better]] = some[..., better]
+
+    def smoother(there: Moving) -> np.ndarray:
+        return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
+
+    # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
+    for link in (middle, *(link for link in range(moving.body.n_link) if link != middle)):
+        again(partial(Moving.with_link_at_rest, link=link))
+    if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
+        # several rest nearly, each where the others let it
+        again(smoother)
+    if method != "direct":
+        again(lambda there: None, method)
+    return found
 
 
 def _numpy_balance(

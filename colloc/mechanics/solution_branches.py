@@ -22,7 +22,6 @@ DISTINCT = 1e-5
 """Velocities that differ by less, in units of the largest rate, are one."""
 _TOLERANCE, _ACCEPTED = 1e-12, 1e-11
 """What the solver is asked for, and what will do where rounding stops it: its own tolerance."""
-_ITERATIONS = 300
 _BESIDE = tuple(side * size for size in (0.8, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005) for side in (-1, 1))
 """Where more solutions are looked for along the softest direction of one, in units of the largest rate."""
 _BETWEEN = (0.5, 0.2, 0.8, 0.05, 0.95, 0.02, 0.98, 0.005, 0.995)
@@ -63,7 +62,7 @@ def all_balanced_velocities(
     """
     moving = Moving(body, friction, angles, rates, delta, load)
     if friction.associated:
-        return Branches(*_solved(moving, np.zeros((1, 3, angles.shape[1]))))
+        return Branches(*_solved(moving, np.zeros((1, 3, angles.shape[1])), "auto"))
     middle = body.n_link // 2
     order = (middle, *(link for link in range(body.n_link) if link != middle))
     z, sign = _solved(moving, np.stack([moving.with_link_at_rest(link) for link in order]))
@@ -83,12 +82,12 @@ def _speed(rates: np.ndarray) -> np.ndarray:
     return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
 
 
-def _solved(moving: Moving, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solved(moving: Moving, starts: np.ndarray, method: str = "direct") -> tuple[np.ndarray, np.ndarray]:
     """Where starts ``(n_start, 3, n_time)`` lead, and signs ``(n_start, n_time)``: 0 where that is no solution."""
     count, n_time = starts.shape[0], starts.shape[2]
     body, friction, angles, rates, delta, load = tiled = moving.at(np.tile(np.arange(n_time), count))
     at, start = (body, friction, angles, rates, delta), np.concatenate(list(starts), axis=1)
-    solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
+    solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, method=method)
     sign = np.where(solved.residual <= _ACCEPTED, np.sign(_determinant(tiled, solved)), 0.0)
     return np.stack(np.split(solved.z, count, axis=1)), sign.reshape(count, -1)
 

@@ -31,6 +31,7 @@ def _numpy_namespace() -> SimpleNamespace:
         matmul=operator.matmul,
         sum_rows=lambda a: np.sum(a, axis=0, keepdims=True),
         stack=lambda rows: np.concatenate(rows, axis=0),
+        columns=lambda entries: np.stack(entries, axis=-1),
     )
 
 
@@ -44,6 +45,7 @@ def _casadi_namespace(casadi: ModuleType) -> SimpleNamespace:
         matmul=lambda a, b: casadi.mtimes(casadi.DM(a), b),
         sum_rows=casadi.sum1,
         stack=lambda rows: casadi.vertcat(*rows),
+        columns=lambda entries: casadi.horzcat(*entries),
     )
 
 

@@ -41,9 +41,7 @@ class HarmonicSpace:
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
-        # coordinates may be larger than what is bounded
-        largest = max(1.0, np.abs(np.linalg.pinv(problem.body.limited)).sum(axis=1).max())
-        self.upper = largest * gait.largest_parameters(n_joint, widest(limit))
+        self.upper = gait.largest_parameters(problem.body, widest(limit))
         self.lower = -self.upper
         self.own = np.arange(self.n)
         self.move_checks(np.zeros(self.n))

@@ -213,8 +213,8 @@ class MixtureSpace:
         weights = [closing]
         for check, at in zip(self._checks, self._placed, strict=True):
             if at.size:
-                share = np.full((1, at.size), -1.0)
-                slope = check.slope(shapes @ self._watch[at].T, share).full()
+                there = shapes @ self._watch[at].T
+                slope = check.slope(there, check.itself(there)[None]).full()
                 weights.append(np.einsum("jw,wn->wnj", slope, self._watch[at]))
         length = np.zeros((1, self.n))
         length[0, self.time] = 1.0

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
+from colloc.mechanics.bodies import Stretch
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.curve import PanelGrid
 from colloc.smooth.panel_body import PanelBody
@@ -20,7 +22,8 @@ from colloc.system.errors import ProblemError
 LEGENDRE, FOURIER = "legendre", "fourier"
 
 _PLACES_A_MODE = 4
-"""Where on the body |Theta| is bounded."""
+"""Where on the body |Theta| is bounded, with all that lies nearer to each place than to others; they lie denser towards the
+ends, where polynomials change fast."""
 
 
 @dataclass(frozen=True)
@@ -67,14 +70,17 @@ class ModalBody(PanelBody):
     def grid(self) -> PanelGrid:
         return PanelGrid(np.linspace(0.0, 1.0, self.panels + 1)[:, None], self.order)
 
-    def modes_at(self, s: np.ndarray) -> np.ndarray:
-        """Modes at arc lengths s, ``(*s.shape, modes)``."""
-        s = np.asarray(s, dtype=float)
+    def modes_at(self, s: Array) -> Array:
+        """Modes at arc lengths s, ``(*s.shape, modes)``; for CasADi at one, ``(1, modes)``."""
+        xp = namespace(s)
         if self.basis == LEGENDRE:
-            return np.polynomial.legendre.legvander(2 * s - 1, self.modes)[..., 1:]
-        k = 2 * np.pi * np.arange(1, self.modes // 2 + 1)
-        waves = k * s[..., None]
-        return np.stack([np.sin(waves), np.cos(waves)], axis=-1).reshape(*s.shape, self.modes)
+            x = 2 * s - 1
+            modes = [1.0, x]
+            for k in range(1, self.modes):
+                modes.append(((2 * k + 1) * x * modes[k] - k * modes[k - 1]) / (k + 1))
+            return xp.columns(modes[1:])
+        waves = [2 * np.pi * k * s for k in range(1, self.modes // 2 + 1)]
+        return xp.columns([wave(x) for x in waves for wave in (xp.sin, xp.cos)])
 
     @property
     def parities(self) -> np.ndarray:
@@ -115,7 +121,16 @@ class ModalBody(PanelBody):
 
     @property
     def _places(self) -> np.ndarray:
-        return np.linspace(0.0, 1.0, _PLACES_A_MODE * self.modes + 1)
+        return self._chebyshev(np.arange(_PLACES_A_MODE * self.modes + 1.0))
+
+    def _chebyshev(self, k: np.ndarray) -> np.ndarray:
+        """Places on the body, by their number; a half lies in the middle."""
+        return 0.5 - 0.5 * np.cos(np.clip(k * np.pi / (_PLACES_A_MODE * self.modes), 0.0, np.pi))
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        ends = self._chebyshev(np.arange(_PLACES_A_MODE * self.modes + 2) - 0.5)
+        return tuple(Stretch(*each, self.modes_at) for each in pairwise(ends.tolist()))
 
     @property
     def limit_names(self) -> tuple[str, ...]:

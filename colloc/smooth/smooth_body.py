@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from colloc.mechanics.balance_results import BalancedMotion, Lifted
-from colloc.mechanics.bodies import ARROWS, IMPLICIT, Pairs
+from colloc.mechanics.bodies import ARROWS, IMPLICIT, Pairs, Stretch
 from colloc.mechanics.contact import Contact
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array
@@ -39,6 +39,11 @@ class SmoothBody:
     first_panels = 16
     panels: int = 0
     """Where nothing is searched for, panels adapt."""
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """None unless a body says so."""
+        return ()
 
     def on_panels(self, panels: int) -> Self:
         return self

@@ -192,3 +192,10 @@ def test_four_straight_links_crawl_sideways_by_bends_of_no_size():
 def test_small_gaits_of_many_joints_begin_with_directions_where_joints_and_links_rest():
     """Five straight links: from directions at random alone, the column generation ended at 0.8624."""
     assert small_gait(Chain((0.2,) * 5), Friction(), np.zeros(4)).efficiency == pytest.approx(0.8640, abs=2e-4)
+
+
+def test_the_best_small_gait_is_found_along_a_ridge_that_no_axis_follows():
+    """At (3, 1, 1) it lies on the line where both ends are bent alike; a search along the axes ends at 0.188 beside it."""
+    best, shape = best_small_gait(Chain(), Friction(3.0, 1.0, 1.0), 2.5)
+    assert best.efficiency > 0.208
+    assert shape[0] == pytest.approx(-shape[1], abs=5e-3)

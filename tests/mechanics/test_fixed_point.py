@@ -228,3 +228,14 @@ def test_beside_a_fold_of_the_balance_the_other_solution_is_found(case):
     assert solution.converged.all()
     now = instant(body, friction, np.array(angles)[:, None], np.array(rates)[:, None], solution.z, delta)
     assert np.abs(net_force(now.posture, now.force)).max() < 1e-9
+
+
+@pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=["five links", "four links", "backward friction"])
+def test_another_start_is_tried_before_a_long_way_from_afar(case):
+    """Where the first attempt ends beside a fold, the way down from a large delta takes thousands of steps: it comes last."""
+    body, friction, delta, angles, rates = case
+    at = body, friction, np.array(angles)[:, None], np.array(rates)[:, None], delta
+    first, found = solve_balance(*at, method="direct"), solve_balance(*at)
+    assert not first.converged.any()
+    assert found.converged.all()
+    assert max(first.iterations.max(), found.iterations.max()) <= 40 * body.n_link  # forty with each link as the anchor

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from colloc.collocation.shape_checks import shape_checks
+from colloc.collocation.transcription import transcribe
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
+from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.results.equivalence import distance, reversed_in_time, swapped
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
@@ -122,6 +125,32 @@ def seen_from_edge(body, q, rates, solved, edge):
     omega = solved.z[2] + (body.modes_at(body.grid.edges[edge]) @ rates)[0]
     anchor = np.full(q.shape[1], edge)
     return BalanceSolution(solved.z, solved.residual, solved.iterations, solved.converged, anchor, np.stack([u, v, omega]))
+
+
+@pytest.mark.parametrize("modes", [2, 4, 6, 12])
+@pytest.mark.parametrize("basis", ["legendre", "fourier"])
+def test_the_tangent_is_bounded_wherever_it_is_largest(basis, modes):
+    body = ModalBody(modes, basis)
+    shapes, checks = np.random.default_rng(modes).normal(size=(modes, 500)), shape_checks(body)
+    everywhere = np.abs(body.modes_at(np.linspace(0.0, 1.0, 20001)) @ shapes).max(axis=0)
+    np.testing.assert_allclose(np.max([np.abs(check.along(shapes)) for check in checks], axis=0), everywhere, rtol=2e-5)
+    for check in checks:
+        there = check.cut(shapes, check.itself(shapes)[None]).full()[0]
+        np.testing.assert_allclose(there, check.along(shapes), atol=1e-10)
+        rows = body.modes_at(check.itself(shapes))
+        np.testing.assert_allclose(check.slope(shapes, check.itself(shapes)[None]).full(), rows.T, atol=1e-10)
+
+
+def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_programs_let_them():
+    body, gait = ModalBody(4), Harmonic(1)
+    shapes = np.random.default_rng(1).normal(size=(4, 5000))
+    shapes /= body.largest_angles(shapes)
+    largest = np.abs(shapes).max(axis=1)
+    assert largest.max() > 4 / np.pi
+    assert (largest <= gait.largest_parameters(body, 1.0).max() * np.pi / 4).all()
+    problem = Problem("modes", body=body, gait=gait, joint_limit=1.0)
+    program = transcribe(problem)
+    np.testing.assert_allclose(program.upper[program.layout.parameters[:, 0]], HarmonicSpace(problem).upper)
 
 
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])

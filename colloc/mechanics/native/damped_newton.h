@@ -8,7 +8,7 @@
 
 #include "chain.h"
 
-enum { AUTO, NEWTON, FIXED_POINT };
+enum { AUTO, NEWTON, FIXED_POINT, DIRECT };
 
 #define ARMIJO 1e-4
 #define ROUNDING 8e-16
@@ -154,12 +154,13 @@ static inline void advance(const int n, State *s, double delta, double tolerance
     }
 }
 
-/* Up to four attempts: from where the state is, from rest, down a ladder of delta, by fixed-point steps only. */
+/* Up to four attempts: from where the state is (DIRECT ends there), from rest, down a ladder of delta, by fixed-point steps only. */
 static inline void solve(const int n, State *s, double delta, double tolerance, long long budget, int method)
 {
     const int first_anchor = s->anchor;
     const bool at_rest = s->velocity[0] == 0 && s->velocity[1] == 0 && s->velocity[2] == 0;
-    const long long direct = method == AUTO && budget > DIRECT_ITERATIONS ? DIRECT_ITERATIONS : budget;
+    const bool briefly = (method == AUTO || method == DIRECT) && budget > DIRECT_ITERATIONS;
+    const long long direct = briefly ? DIRECT_ITERATIONS : budget;
     const long long each = budget > LADDER_ITERATIONS ? LADDER_ITERATIONS : budget;
     advance(n, s, delta, tolerance, direct, method);
     if (method != AUTO || s->residual <= tolerance)
