@@ -61,6 +61,8 @@ SYMMETRIES = ("both", "bilateral")
 BUDGET, DIRECTED, COARSE = Budget(starts=150), (0, 1, 2), 5e-3
 """Of bounds for three links; where mu_b differs from mu_f these headings, as the second is worth 5 % at (0.5, 1, 5); there
 bounds for more links, which have half as many unknowns again, do not come within 0.001 of their programs in six minutes."""
+MORE = (1, 3)
+"""Headings for four links and more where mu_b = mu_f: the third is worth 4 % at (3, 1, 1), and for five links."""
 TABLE = Path("results/curated/frontier.md")
 HEAD = """# The best gaits from both sides
 
@@ -191,6 +193,8 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
             return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
     friction = Friction(*row.mu)
     budget = BUDGET if row.links <= 3 else usual_budget(row.body)
+    if friction.reversible and row.links > 3:
+        budget = replace(budget, harmonics=MORE)
     if not friction.reversible:
         budget = replace(budget, harmonics=DIRECTED) if row.links <= 3 else replace(budget, tolerance=COARSE)
     found = efficiency_bound(row.body, friction, row.limit, budget=budget)

@@ -28,12 +28,12 @@ OUT = Path("results/curated")
 HEAD = """# The friction plane of three equal links from both sides
 
 `python -m scripts.plane_from_both_sides`, joints within 2.5, mu_f = 1. *Gait*: the best certified finite gait that
-travels through shapes, at delta = 1e-5, and its distance a period [body lengths]; *relaxed*: what finite gaits near it
-tend to for delta -> 0 (a star: its own certificate fails a check); *small*: the best gait of no size at one shape;
-*bound*: sampled, with the number of its unknowns (in brackets the program's value where climbs still found more than is
-tolerated); *gap*: from the better of relaxed and small to the bound, relative. Where nothing else is kept: one start (at
-(3, 1.7) four, by `--starts 4`) and two neighbours a gait, and 12 knot intervals a bound (8 where it has 135 unknowns), so
-both sides can still move. An empty place is not computed.
+travels through shapes, at delta = 1e-5, and its distance a period [body lengths]; *relaxed*: what finite gaits near
+it tend to for delta -> 0 (a star: its own certificate fails a check); *small*: the best gait of no size at one shape;
+*bound*: sampled, with the number of its unknowns (in brackets the program's value where climbs still found more than
+is tolerated); *gap*: from the better of relaxed and small to the bound, relative. Where nothing else is kept: one
+start (at mu_t = 0.3 and at (3, 1.7) four, by `--starts 4`) and two neighbours a gait, and 12 knot intervals a bound
+(8 where it has 135 unknowns), so both sides can still move. An empty place is not computed.
 
 | mu_t | mu_b | gait | distance | relaxed | small | bound | unknowns | gap |
 |---|---|---|---|---|---|---|---|---|
