@@ -45,7 +45,7 @@ from colloc.search.relaxed_search import certified, relaxed_gaits
 from colloc.system.errors import CollocError, NotConvergedError
 from scripts.check_potential import potentials
 from scripts.few_corners import polygon_near
-from scripts.frontier_rows import GAITS, Row, best_held, put, read, room, row_of, smallest_bound
+from scripts.frontier_rows import GAITS, Row, best_held, guaranteed_bound, put, read, room, row_of, smallest_bound
 
 COEFFICIENTS = ((1, 1, 1), (1.7, 1, 1.3), (10, 1, 1), (0.5, 1, 5), (1, 1, 3), (3, 1, 1))
 """(mu_t, mu_f, mu_b)"""
@@ -61,27 +61,32 @@ SYMMETRIES = ("both", "bilateral")
 BUDGET, DIRECTED, COARSE = Budget(starts=150), (0, 1, 2), 5e-3
 """Of bounds for three links; where mu_b differs from mu_f these headings, as the second is worth 5 % at (0.5, 1, 5); there
 bounds for more links, which have half as many unknowns again, do not come within 0.001 of their programs in six minutes."""
+MORE = (1, 3)
+"""Headings for four links and more where mu_b = mu_f: the third is worth 4 % at (3, 1, 1), and for five links."""
 TABLE = Path("results/curated/frontier.md")
 HEAD = """# The best gaits from both sides
 
 `python -m scripts.frontier`, taken up again and again. Joints within the limit; links of the width do not overlap,
 links of none do not cross. *Gait*: the best certified finite gait that travels through shapes (its mean angles range
-over at least 0.3 rad), with its corners, its distance a period, the largest joint angle and how far its links stay
-*apart* [body lengths], so how wide they may be; delta = 1e-5 at unit shape speed. What was found for a smaller limit
-counts for a larger one too. *60 corners*: the best certified polygon with at most 60. *Relaxed*: what finite gaits near
-it tend to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
-there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled one,
-with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value, if
-climbs still found more than is tolerated above. *Gap*: from the better of relaxed and small gait to the smallest bound
-that is valid for the row, relative. CPU seconds on a loaded machine. A star: the relaxed gait's own certificate fails a
-check, so its value is not sharp. An empty place has not been computed. What was found is a lower end: other starts may
-find better gaits. What a row of width 0 says of a gait holds for links of the widths 0.01 and 0.03 as well where the gait
-stays farther apart than these, and its bound holds for any width: rows of other widths are those where something changes.
+over at least 0.3 rad; by distance they could not be told apart, as a small gait run through often enough travels as
+far), with its corners, its distance a period, the largest joint angle and how far its links stay *apart* [body
+lengths], so how wide they may be; delta = 1e-5 at unit shape speed. What was found for a smaller limit counts for a
+larger one too. *60 corners*: the best certified polygon with at most 60. *Relaxed*: what finite gaits near it tend
+to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
+there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled
+one, with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value,
+if climbs still found more than is tolerated above. *Proved*: a bound without samples, for delta -> 0
+([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for
+the row, relative; 1 over the smallest coefficient is one for every body. CPU seconds of rows made at different times,
+on different machines. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty
+place has not been computed. What was found is a lower end: other starts may find better gaits. What a row of width 0
+says of a gait holds for links of the widths 0.01 and 0.03 as well where the gait stays farther apart than these, and
+its bound holds for any width: rows of other widths are those where something changes.
 
 """
 COLUMNS = (
     "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "apart", "60 corners", "relaxed",
-    "small gait", "its apart", "small loop", "bound", "unknowns", "gap", "CPU s",
+    "small gait", "its apart", "small loop", "bound", "unknowns", "proved", "gap", "CPU s",
 )  # fmt: skip
 
 
@@ -188,6 +193,8 @@ def bound(row: Row, starts: int) -> dict[str, Any]:
             return {"sampled": top, "floor": program, "converged": True, "unknowns": space.size, "seconds": seconds}
     friction = Friction(*row.mu)
     budget = BUDGET if row.links <= 3 else usual_budget(row.body)
+    if friction.reversible and row.links > 3:
+        budget = replace(budget, harmonics=MORE)
     if not friction.reversible:
         budget = replace(budget, harmonics=DIRECTED) if row.links <= 3 else replace(budget, tolerance=COARSE)
     found = efficiency_bound(row.body, friction, row.limit, budget=budget)
@@ -230,8 +237,8 @@ def line(row: Row, known: dict) -> str:
 
     refused = " (not certified)"
     ends = [travels.get("relaxed", -np.inf), still.get("efficiency", -np.inf)]
-    least = smallest_bound(row, known)
-    apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) and np.isfinite(least) else ""
+    least, proved = smallest_bound(row, known), guaranteed_bound(row)
+    apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) else ""
     program = "" if above.get("converged", True) else f" ({above['floor']:.4f})"
     cells = [
         ", ".join(f"{m:g}" for m in row.mu), f"{row.limit:.4g}", str(row.links), f"{row.width:g}",
@@ -240,7 +247,8 @@ def line(row: Row, known: dict) -> str:
         value(simple, "efficiency", mark="" if simple.get("passed") else refused),
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
         f"{room(row, still)[1]:.3f}" if still else "", value(loops, "efficiency", mark="" if loops.get("passed") else refused),
-        value(above, "sampled", mark=program), value(above, "unknowns", "d"), apart,
+        value(above, "sampled", mark=program), value(above, "unknowns", "d"),
+        f"{proved:g}" if np.isfinite(proved) else "", apart,
         f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
     ]  # fmt: skip
     return f"| {' | '.join(cells)} |"

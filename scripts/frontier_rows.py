@@ -13,6 +13,8 @@ from colloc.mechanics.contact import gap
 from colloc.system.replaced_file import replaced_file
 
 STORE, GAITS = Path("results/curated/frontier.json"), Path("results/frontier")
+PROVED = Path("results/curated/guaranteed.json")
+"""By `scripts.bound_guaranteed`."""
 
 
 class Row(NamedTuple):
@@ -73,11 +75,27 @@ def best_held(row: Row, part: str, known: dict) -> dict:
 
 
 def smallest_bound(row: Row, known: dict) -> float:
-    """Of the bounds that hold for a row: those for its limit or a larger one, its width or a smaller one."""
-    holds = [np.inf]
+    """Of the bounds that hold for a row: those for its limit or a larger one, its width or a smaller one, and for every body 1
+    over the smallest coefficient, which is the least friction on its centre of mass."""
+    holds = [1 / min(row.mu)]
     for key, value in known.items():
         other, part = row_of(key)
         of_row = part == "bound" and (other.mu, other.links) == (row.mu, row.links)
         if of_row and other.limit >= round(row.limit, 4) and other.width <= row.width:
             holds.append(value["sampled"])
     return min(holds)
+
+
+def guaranteed_bound(row: Row) -> float:
+    """Of the bounds that are proved for its law and body, and its limit or a larger one, the smallest; inf if there is none."""
+    parts: dict[tuple[float, int], list[float]] = {}
+    for proof in json.loads(PROVED.read_text()):
+        of_row = proof["law"] == "Friction" and tuple(proof["mu"]) == row.mu and np.allclose(proof["lengths"], 1 / row.links)
+        if (
+            of_row
+            and len(proof["lengths"]) == row.links
+            and round(proof["joint_limit"], 4) >= round(row.limit, 4)
+            and not proof["open_cells"]
+        ):
+            parts.setdefault((proof["joint_limit"], proof["part"][1]), []).append(proof["guaranteed"])
+    return min((max(found) for (_, count), found in parts.items() if len(found) == count), default=np.inf)
