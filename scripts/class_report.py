@@ -109,11 +109,8 @@ def bound_line(friction: Friction) -> str:
     """What no gait can exceed, as far as it is known here, and what the smallest gaits reach."""
     mu = (friction.mu_t, friction.mu_f, friction.mu_b)
     least = smallest_bound(Row(mu, float(np.pi), 3, 0.0), frontier())
-    upper = (
-        f"{least:.4f} (sampled; scripts.frontier)"
-        if least < 1 / friction.smallest
-        else f"{1 / friction.smallest:.4g} = 1/min(mu)"
-    )
+    trivial = 1 / friction.smallest
+    upper = f"{least:.4f} (sampled; scripts.frontier)" if least < trivial else f"{trivial:.4g} = 1/min(mu)"
     places = {"(2.2, -2.2)": (2.2, -2.2), "the fold (pi, 0)": (3.1415, 0.0)}
     at = {name: small_gait(Chain(), friction, np.array(shape)).efficiency for name, shape in places.items()}
     reached = ", ".join(f"{value:.4f} at {name}" for name, value in at.items())

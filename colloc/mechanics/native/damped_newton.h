@@ -154,7 +154,8 @@ static inline void advance(const int n, State *s, double delta, double tolerance
     }
 }
 
-/* Up to four attempts: from where the state is (DIRECT ends there), from rest, down a ladder of delta, by fixed-point steps only. */
+/* Up to four attempts: from where the state is (DIRECT ends there), from rest, down a ladder of delta, by fixed-point steps
+   only. */
 static inline void solve(const int n, State *s, double delta, double tolerance, long long budget, int method)
 {
     const int first_anchor = s->anchor;
