@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 SIZES = (2, 3, 4, 5, 6, 7, 8)
 

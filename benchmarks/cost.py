@@ -14,8 +14,8 @@ from pathlib import Path
 
 from benchmarks.tables import markdown_table
 from colloc.gaits.problem_file import read_problem_file
-from colloc.results.steps import Level
-from colloc.search.reduced_search import Found
+from colloc.results.answer import Level
+from colloc.search.converge import Found
 
 PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")
 MODULES = (
@@ -24,7 +24,7 @@ MODULES = (
     "colloc",
     "colloc.gaits.problem",
     "colloc.mechanics.fixed_point",
-    "colloc.search.optimise",
+    "colloc.search.solve",
     "colloc.pictures.figure",
     "colloc.results.store",
 )
@@ -43,11 +43,11 @@ def anatomy(name: str) -> dict[str, float]:
 
     from colloc.pictures.solution_figure import solution_figure
     from colloc.pictures.style import save as save_figure
-    from colloc.results.certificate import certify
     from colloc.results.solution import Solution
     from colloc.results.store import save
-    from colloc.search.full_program import answer, level_found
-    from colloc.search.reduced_search import searched
+    from colloc.search.certify import certify
+    from colloc.search.confirm import answer, level_found
+    from colloc.search.converge import searched
 
     lap("imports")
     problem = read_problem_file(Path("problems") / f"{name}.py").problem

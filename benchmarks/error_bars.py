@@ -24,7 +24,7 @@ from benchmarks.independent_replay import Crawler, played
 from benchmarks.zoo import zoo_problem
 from colloc import Chain, Friction, Harmonic
 from colloc.results.measured import Measured, measured
-from colloc.search.optimise import optimum
+from colloc.search.solve import optimum
 from colloc.system.errors import NotConvergedError
 from colloc.verification.replay import Path as GaitPath
 from colloc.verification.replay import replay

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
-from colloc.search.optimise import optimum
+from colloc.search.solve import optimum
 from colloc.system.row_file import cached
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay

@@ -9,8 +9,8 @@ import time
 
 from colloc import FreePath, Problem, ellipse
 from colloc.reduced.spaces import transcribed
-from colloc.search.nlp import Solver
-from colloc.search.optimise import optimum
+from colloc.search.ipopt import Solver
+from colloc.search.solve import optimum
 
 
 def main() -> None:

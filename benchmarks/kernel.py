@@ -26,7 +26,7 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from scripts.models.ellipses import admissible
 from scripts.models.sweep import Route, performance
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks.tables import markdown_table
 from colloc import Harmonic, Problem, certify, ellipse
 from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, save, styled, subplots
-from colloc.search.optimise import optimum
+from colloc.search.solve import optimum
 
 SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
 COLOURS = dict(zip(SCHEMES, ("#999999", SKY, GREEN, BLUE, PURPLE, ORANGE), strict=True))

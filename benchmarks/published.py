@@ -22,7 +22,7 @@ from benchmarks.tables import markdown_table
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, Solution, Viscous, ellipse, replay
 from colloc.gaits.gait_fields import AnyGait as Gait
 from colloc.mechanics.law import Law
-from colloc.search.optimise import best_gait
+from colloc.search.solve import best_gait
 from colloc.smooth.motion import Motion, sine_wave, tanh_wave
 from scripts.models.period import period
 

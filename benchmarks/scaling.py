@@ -44,7 +44,7 @@ def measured(intervals: int, links: int, harmonics: int) -> dict[str, float]:
     """Build and solve one problem (run in a fresh process)."""
     from colloc.collocation.transcription import transcribe
     from colloc.collocation.warm_start import feasible_point
-    from colloc.search.nlp import Solver
+    from colloc.search.ipopt import Solver
 
     before = peak_megabytes()
     problem = problem_of(intervals, links, harmonics)

@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.figures_precision import save_work_precision
 from colloc import FreePath, Harmonic, Problem, certify, ellipse
-from colloc.search.optimise import optimum
+from colloc.search.solve import optimum
 from colloc.system.row_file import cached
 
 SECOND_ORDER = "trapezoid"

@@ -25,8 +25,8 @@ from colloc import Chain, Elliptic, FreePath, Friction, Harmonic, ModalBody, Own
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.results.solution import SOLVED
-from colloc.search.global_search import STARTS
-from colloc.search.optimise import best_gait
+from colloc.search.explore import STARTS
+from colloc.search.solve import best_gait
 
 BEST = Path(__file__).with_name("zoo_best.json")
 GOOD = 0.99

@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     from colloc.mechanics.chain import Chain
     from colloc.mechanics.fixed_point import solve_balance
     from colloc.mechanics.friction import Friction
-    from colloc.results.certificate import certify
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
-    from colloc.search.optimise import maximise_efficiency
+    from colloc.search.certify import certify
     from colloc.search.slope_search import climbing_gait
+    from colloc.search.solve import maximise_efficiency
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.crawler_body import CrawlerBody
     from colloc.smooth.modal_body import ModalBody
@@ -77,14 +77,14 @@ _HOME = {
     "gaits.free_path": ("FreePath", "ArcPath"),
     "gaits.polygon": ("Polygon", "Corners"),
     "gaits.relaxed": ("Relaxed",),
-    "search.optimise": ("maximise_efficiency",),
+    "search.solve": ("maximise_efficiency",),
     "search.slope_search": ("climbing_gait",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
     "studies.pareto": ("pareto_front",),
     "results.solution": ("Solution",),
     "results.store": ("load", "save"),
-    "results.certificate": ("certify",),
+    "search.certify": ("certify",),
     "verification.replay": ("replay",),
     "verification.slope": ("slope_motion",),
     "verification.heading_map": ("heading_map",),

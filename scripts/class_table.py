@@ -21,7 +21,7 @@ from colloc.gaits.gait_fields import AnyGait, fields, gait_from
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.starts import delta_in, laid_into, over_links, prolonged
 from colloc.results.solution import Solution
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
 from scripts.class_report import DELTA, best, load, store, write

@@ -7,10 +7,10 @@ import numpy as np
 
 from colloc import Harmonic, Problem, ellipse
 from colloc.pictures.publication import mesh_errors
+from colloc.results.answer import Level
 from colloc.results.measured import Limit
 from colloc.results.solution import Solution
-from colloc.results.steps import Level
-from colloc.search.optimise import optimum
+from colloc.search.solve import optimum
 
 RESOLVED = 1e-4
 """Largest relative error of the objective, of the mesh, at which delta counts as resolved: the certificate's replay gap."""

@@ -20,8 +20,8 @@ from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
-from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, Found, settled_apart
-from colloc.search.relaxed_search import certified
+from colloc.search.converge import NEXT_RADIUS, ROUGH, Found, settled_apart
+from colloc.search.relaxed import certified
 
 _IDLE = 1e-9
 _AT_ONCE = 0.12

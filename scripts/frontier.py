@@ -40,8 +40,8 @@ from colloc.mechanics.friction import Friction
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save
-from colloc.search.optimise import maximise_efficiency
-from colloc.search.relaxed_search import certified, relaxed_gaits
+from colloc.search.relaxed import certified, relaxed_gaits
+from colloc.search.solve import maximise_efficiency
 from colloc.system.errors import CollocError, NotConvergedError
 from scripts.check_potential import potentials
 from scripts.few_corners import polygon_near

@@ -23,8 +23,8 @@ from colloc.gaits.relaxed import Relaxed
 from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
 from colloc.pictures.style import styled
 from colloc.results.solution import Solution, versions
-from colloc.search.global_search import STARTS
-from colloc.search.optimise import best_gait
+from colloc.search.explore import STARTS
+from colloc.search.solve import best_gait
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"

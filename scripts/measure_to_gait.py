@@ -20,7 +20,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.numerics.spline import TensorSpline
 from colloc.pictures.style import save
-from colloc.search.relaxed_search import best_relaxed_gait
+from colloc.search.relaxed import best_relaxed_gait
 from scripts.check_potential import Kept, add_domain, domain_of, keep
 from scripts.figures_measure import measure_figure
 

@@ -14,7 +14,7 @@ import numpy as np
 from colloc.gaits.polygon import Corners
 from colloc.mechanics.friction import Friction
 from colloc.reduced.spaces import space_near
-from colloc.search.reduced_search import FIRST_RADIUS, ROUGH, settled
+from colloc.search.converge import FIRST_RADIUS, ROUGH, settled
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.verification.replay import Replay, replay

@@ -19,7 +19,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.results.solution import Solution
-from colloc.search.optimise import best_gait
+from colloc.search.solve import best_gait
 from colloc.system.errors import NotConvergedError
 from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.slope import slope_motion

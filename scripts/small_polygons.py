@@ -16,7 +16,7 @@ from colloc import Chain, Corners, Friction, Polygon, Problem
 from colloc.bounds.infinitesimal import small_gait
 from colloc.gaits.path_samples import path_length
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from scripts.link_gaps import LYING, gaps
 
 SPEEDS = (0.1, 0.04, 0.02)

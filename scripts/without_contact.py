@@ -23,7 +23,7 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait, fields, gait_from
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.starts import delta_in, laid_into, prolonged
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
 from scripts.class_rows import equal_links, named_gait

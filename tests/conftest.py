@@ -50,8 +50,8 @@ def solved(once):
 
     def result(name):
         from colloc.gaits.problem_file import read_problem_file
-        from colloc.search.global_search import STARTS
-        from colloc.search.optimise import best_gait
+        from colloc.search.explore import STARTS
+        from colloc.search.solve import best_gait
 
         stated = read_problem_file(ROOT / "problems" / f"{name}.py")
 
@@ -79,8 +79,8 @@ def unsolved():
 def guess_in_balance(problem):
     from colloc.collocation.transcription import transcribe
     from colloc.collocation.warm_start import feasible_point
+    from colloc.results.answer import Level
     from colloc.results.solution import Solution
-    from colloc.results.steps import Level
     from colloc.verification.replay import replay
 
     transcription = transcribe(problem)

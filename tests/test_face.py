@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.results.steps import SearchStep
+from colloc.results.answer import SearchStep
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")

@@ -77,7 +77,7 @@ def test_heavy_libraries_are_named_in_few_packages():
 
 
 def test_only_one_module_names_ipopt():
-    assert [name for name, path in modules().items() if '"ipopt"' in path.read_text(encoding="utf-8")] == ["search.nlp"]
+    assert [name for name, path in modules().items() if '"ipopt"' in path.read_text(encoding="utf-8")] == ["search.ipopt"]
 
 
 def test_packages_and_modules_are_small():

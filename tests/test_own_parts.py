@@ -14,7 +14,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.results.store import load, save
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 

@@ -12,7 +12,7 @@ from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import INTERVALS
 from colloc import Harmonic, Problem, ellipse
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import maximise_efficiency, optimum
+from colloc.search.solve import maximise_efficiency, optimum
 
 
 def solve(refined: bool, start: np.ndarray) -> dict:

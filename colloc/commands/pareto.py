@@ -61,7 +61,7 @@ def _pareto(options: argparse.Namespace) -> int:
     aims = (first, second)
     table = output_path(options.output, Path("results") / f"{problem.name}.front.csv")
     from colloc.results.store import save
-    from colloc.search.global_search import STARTS
+    from colloc.search.explore import STARTS
     from colloc.studies.pareto import pareto_front
 
     quiet = options.quiet or options.json

@@ -15,8 +15,8 @@ from colloc.commands.options import add_bound, add_printing, add_problem, change
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
+from colloc.results.answer import Level, SearchStep
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
-from colloc.results.steps import Level, SearchStep
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
 
@@ -145,7 +145,7 @@ def _partial(path: Path) -> Path:
 def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse.Namespace, quiet: bool) -> Solution:
     """The solution, from the levels that an interrupted run left if there are any; each level is kept as it ends."""
     from colloc.results.store import load, save
-    from colloc.search.optimise import best_gait, maximise_efficiency
+    from colloc.search.solve import best_gait, maximise_efficiency
 
     # a gait that is given on the command line is to be improved, not left for another
     starts = options.starts or (1 if options.start else stated.starts)

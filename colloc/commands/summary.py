@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
+from colloc.results.answer import PRESCRIBED, REALISED, REDUCED
 from colloc.results.solution import Solution
-from colloc.results.steps import PRESCRIBED, REALISED, REDUCED
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound

@@ -13,11 +13,11 @@ from dataclasses import replace
 
 from colloc.commands.ending import FAILED, OK, run
 from colloc.commands.options import add_printing, add_result, new_parser
-from colloc.results.certificate import certify
 from colloc.results.checks import Certificate
-from colloc.results.realisation import recertified
 from colloc.results.solution import Solution
 from colloc.results.store import load
+from colloc.search.certify import certify
+from colloc.search.realise import recertified
 from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 

@@ -19,11 +19,11 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.results.answer import REALISED, Alternative, Level
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
-from colloc.results.steps import REALISED, Alternative, Level
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 

@@ -27,12 +27,12 @@ from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
+from colloc.results.answer import Alternative, Level
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.former_format import converted, is_former
 from colloc.results.motion import SAMPLES, motion_columns
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
-from colloc.results.steps import Alternative, Level
 from colloc.system.errors import ChangedFileWarning, StoreError
 from colloc.system.store_file import (
     BETWEEN_DIMS,

@@ -8,7 +8,7 @@ from scipy import sparse
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.numerics.multiplier_estimate import quasi_definite_factors
-from colloc.search.nlp import NlpResult, Solver
+from colloc.search.ipopt import NlpResult, Solver
 
 _SATISFIED = 1e-8
 SMALLEST_DELTA = 1e-9

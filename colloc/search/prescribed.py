@@ -14,7 +14,7 @@ from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.steps import PRESCRIBED, REALISED, Level
+from colloc.results.answer import PRESCRIBED, REALISED, Level
 from colloc.verification.refinement import planned_mesh
 
 _MESHES = 4

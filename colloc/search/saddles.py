@@ -13,7 +13,7 @@ import numpy as np
 
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import Lagrangian, curvature
-from colloc.search.reduced_search import NEXT_RADIUS, ROUGH, Found, settled_apart
+from colloc.search.converge import NEXT_RADIUS, ROUGH, Found, settled_apart
 
 STEPS = (0.1, 0.03, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""

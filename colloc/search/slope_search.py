@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
-from colloc.search.optimise import best_gait
+from colloc.search.solve import best_gait
 
 
 def climbing_gait(problem: Problem, grade: float, *, towards: float | None = None, starts: int | None = None) -> Solution:

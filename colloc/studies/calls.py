@@ -14,12 +14,12 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.starts import LATIN_HYPERCUBE
+from colloc.results.answer import Level, SearchStep
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED, Solution
-from colloc.results.steps import Level, SearchStep
-from colloc.search.optimise import best_gait, maximise_efficiency
+from colloc.search.solve import best_gait, maximise_efficiency
 from colloc.studies.campaign import run_starts
 from colloc.studies.run import Progress, StudyRun
 from colloc.studies.study import Study, read_study_file
@@ -52,8 +52,8 @@ def solve(
     verbose : bool
         Print a line for every start and every level of delta as it ends.
     progress : callable, optional
-        Called with a `colloc.results.steps.SearchStep` after every start and every gait that is followed, then with every
-        `colloc.results.steps.Level` of the best one; of relaxed gaits with what is under way, in words.
+        Called with a `colloc.results.answer.SearchStep` after every start and every gait that is followed, then with every
+        `colloc.results.answer.Level` of the best one; of relaxed gaits with what is under way, in words.
 
     Returns
     -------

@@ -10,11 +10,11 @@ from dataclasses import replace
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
+from colloc.results.answer import Level
 from colloc.results.checks import Certificate
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
-from colloc.results.steps import Level
-from colloc.search.optimise import is_trivial, maximise_efficiency
+from colloc.search.solve import is_trivial, maximise_efficiency
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
 
@@ -38,7 +38,7 @@ def run_guess(
 ) -> Outcome:
     """Solve and certify a problem from the gait that `start_from` makes, as start number `start`; raises nothing.
 
-    With `literal`, IPOPT searches on the full program (`colloc.search.literal_search`).
+    With `literal`, IPOPT searches on the full program (`colloc.search.literal`).
     """
     begin, cpu = time.perf_counter(), time.process_time()
     guess = problem.guess

@@ -16,8 +16,8 @@ import numpy as np
 from colloc.gaits.objective import EFFICIENCY, SPEED, Objective, objective_from
 from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
-from colloc.search.global_search import STARTS
-from colloc.search.optimise import best_gait, maximise_efficiency
+from colloc.search.explore import STARTS
+from colloc.search.solve import best_gait, maximise_efficiency
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.verification.slope_replay import replayer

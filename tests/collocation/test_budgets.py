@@ -12,7 +12,7 @@ from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
 from colloc.numerics.blocks import oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers, quasi_definite_factors
-from colloc.search.nlp import Solver
+from colloc.search.ipopt import Solver
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.motion import sine_wave
 
@@ -103,7 +103,7 @@ def test_effort_of_a_solve(solved, name, iterations, levels):
 def test_balance_solves_an_iteration_asks_for():
     """Value, Jacobian and Hessian at one point share one solve of the balance."""
     from colloc.collocation.warm_start import feasible_point
-    from colloc.search.nlp import Solver
+    from colloc.search.ipopt import Solver
 
     problem = Problem("p", ellipse(0.3, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=12)
     solver = Solver(transcribe(problem))

@@ -9,7 +9,7 @@ from colloc.gaits.starts import laid_into, over_links, prolonged
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
 from colloc.reduced.spaces import nearest_parameters, transcribed
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from colloc.system.errors import ProblemError
 from scripts.class_rows import FEWER, equal_links, named_gait, rows
 

@@ -6,7 +6,7 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, replay
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")

@@ -17,7 +17,7 @@ from colloc.laws.viscous import Viscous
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from colloc.system.errors import ProblemError
 
 COULOMB = OwnLaw("-where(vs > 0, 1, 1.5)*vs/speed", "-2*vn/speed")

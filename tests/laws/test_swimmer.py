@@ -19,7 +19,7 @@ from colloc.laws.viscous import Viscous
 from colloc.mechanics.chain import Chain
 from colloc.pictures.report_page import report_page
 from colloc.results.store import load, save
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 

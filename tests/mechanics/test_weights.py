@@ -14,7 +14,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5)]

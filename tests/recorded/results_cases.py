@@ -31,14 +31,14 @@ from colloc.mechanics.actuators import UNLIMITED
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
 from colloc.results import certificate
+from colloc.results.answer import Alternative, SearchStep
 from colloc.results.archive import KIND, VERSION, StartName, save_archive
-from colloc.results.certificate import _second_order, certify, gait_certificate
 from colloc.results.checks import UNCERTIFIED, Check
 from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE, SERIES_HARMONICS, basins
-from colloc.results.realisation import STATIONARY, kept_inside, realised_gaits
 from colloc.results.relaxation import Optimality, Relaxation
-from colloc.results.steps import Alternative, SearchStep
 from colloc.results.store import FORMAT, FORMAT_VERSION, load, save
+from colloc.search.certify import _second_order, certify, gait_certificate
+from colloc.search.realise import STATIONARY, kept_inside, realised_gaits
 from colloc.system import row_file, store_file
 from colloc.system.early_interruption import INTERRUPTED
 from colloc.system.sealed_file import SEAL_SIZE

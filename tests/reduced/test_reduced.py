@@ -11,9 +11,9 @@ from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
 from colloc.results.solution import Solution
-from colloc.search.full_program import answer, level_found
-from colloc.search.optimise import optimum
-from colloc.search.reduced_search import FINE, Found, settled
+from colloc.search.confirm import answer, level_found
+from colloc.search.converge import FINE, Found, settled
+from colloc.search.solve import optimum
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}

@@ -8,7 +8,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import space_near
-from colloc.search.optimise import optimum
+from colloc.search.solve import optimum
 
 PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)
 SADDLE = ellipse(0.0, 0.30734, 0.76781)

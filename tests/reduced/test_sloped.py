@@ -7,7 +7,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
-from colloc.search.nlp import Solver
+from colloc.search.ipopt import Solver
 from colloc.verification.slope import slope_motion
 
 LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals=60)

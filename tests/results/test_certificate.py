@@ -15,11 +15,11 @@ from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
 from colloc.results import measured
-from colloc.results.certificate import _one_motion, certify
 from colloc.results.checks import Check
 from colloc.results.measured import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
+from colloc.search.certify import _one_motion, certify
 from colloc.verification.replay import replay
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05

@@ -15,10 +15,10 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
-from colloc.results.certificate import certify
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.certify import certify
+from colloc.search.solve import maximise_efficiency
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 

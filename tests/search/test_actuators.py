@@ -24,7 +24,7 @@ from colloc import (
 from colloc.commands import verify
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power_in_balance, joint_moments
 from colloc.mechanics.balance import instant
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
@@ -133,7 +133,7 @@ def test_weak_motors_cost_efficiency_and_keep_their_limit_between_the_nodes(free
 
 
 def test_a_certificate_fails_a_gait_whose_joints_do_more_than_they_can(weak):
-    from colloc.results.certificate import gait_certificate
+    from colloc.search.certify import gait_certificate
 
     weaker = weak.problem.with_(power_limit=0.55)
     checks = gait_certificate(weaker, weak.gait, 1e-4, np.empty(0)).failures

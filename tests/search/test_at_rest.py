@@ -9,8 +9,8 @@ from colloc import Harmonic, NotConvergedError, Polygon, Problem, ellipse
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.search.full_program import RADIUS, answer
-from colloc.search.reduced_search import FINE, Found, at_rest, kink_or_not, searched
+from colloc.search.confirm import RADIUS, answer
+from colloc.search.converge import FINE, Found, at_rest, kink_or_not, searched
 
 PROBLEM = Problem("plain", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=40, mesh_tolerance=0)
 

@@ -14,7 +14,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, passing_depth
 from colloc.mechanics.friction import Friction
 from colloc.search.far_contact import crossing_pairs, last_free
-from colloc.search.nlp import Solver
+from colloc.search.ipopt import Solver
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 

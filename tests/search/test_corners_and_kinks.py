@@ -5,7 +5,7 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.starts import latin_hypercube_gait
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 
 def from_start(start, friction, symmetry, **fields):

@@ -18,7 +18,7 @@ from colloc.reduced.spaces import transcribed
 from colloc.results.checks import UNCERTIFIED
 from colloc.search import optimise
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
-from colloc.search.nlp import Solver
+from colloc.search.ipopt import Solver
 
 
 def stated(**changes):

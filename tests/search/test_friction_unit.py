@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from colloc.gaits.friction_unit import friction_unit, in_friction_units
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.search.friction_unit import friction_unit, in_friction_units
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 
 def stated(*mu, **changes):

@@ -11,9 +11,9 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load, save
-from colloc.search import global_search, optimise
-from colloc.search.global_search import candidates
-from colloc.search.optimise import best_gait
+from colloc.search import explore, solve
+from colloc.search.explore import candidates
+from colloc.search.solve import best_gait
 
 UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(2, 1, 1.4), gait=Harmonic(2, "none"))
 
@@ -63,13 +63,13 @@ def test_the_answer_does_not_depend_on_what_the_search_is_given(changed, starts)
 @pytest.mark.parametrize(("violation", "kept"), [(1e-3, True), (0.5, False)])
 def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch, violation, kept):
     """What breaks the rows of its class may have any value."""
-    settled = global_search.settled_apart
+    settled = explore.settled_apart
 
     def off(*arguments):
         found = settled(*arguments)
         return replace(found, conditions=replace(found.conditions, violation=violation))
 
-    monkeypatch.setattr(global_search, "settled_apart", off)
+    monkeypatch.setattr(explore, "settled_apart", off)
     problem = Problem("one_start", gait=Harmonic(1, "bilateral"))
     known, tried = candidates(problem, 1, lambda: True, lambda step: None)
     assert tried == 1
@@ -91,10 +91,10 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
     def follow(space, v, number, deltas, known):
         if number in better:
             found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0)
-            known[-1].append(global_search.Candidate(found))
+            known[-1].append(explore.Candidate(found))
 
-    monkeypatch.setattr(global_search, "_follow", follow)
-    monkeypatch.setattr(global_search, "objective_at", lambda delta, found: found.objective)
+    monkeypatch.setattr(explore, "_follow", follow)
+    monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, lambda step: None)
     assert number == tried
     assert found[0].found.objective == -max(better.values())
@@ -107,10 +107,10 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
     def follow(space, v, number, deltas, known):
         begun[number] = (v, len(deltas))
         found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=ellipse(0, 1.0, 0.1 * number), delta=1.0)
-        known[-1].append(global_search.Candidate(found))
+        known[-1].append(explore.Candidate(found))
 
-    monkeypatch.setattr(global_search, "_follow", follow)
-    monkeypatch.setattr(global_search, "objective_at", lambda delta, found: found.objective)
+    monkeypatch.setattr(explore, "_follow", follow)
+    monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     problem = Problem("turns", gait=Harmonic(1, "bilateral"))
     candidates(problem, 18, lambda: True, lambda step: None)
     fewer, begun = begun, {}
@@ -143,9 +143,9 @@ def test_the_answer_is_the_best_gait_whose_certificate_holds(monkeypatch, ends, 
         status, value = ends[len(asked) - 1]
         return SimpleNamespace(status=status, value=value, message="", number=len(asked) - 1)
 
-    monkeypatch.setattr(optimise, "maximise_efficiency", solution)
+    monkeypatch.setattr(solve, "maximise_efficiency", solution)
     contenders = [[SimpleNamespace(value=1.0 - 0.1 * k)] for k in range(len(ends))]
-    found = optimise._best_certified(UNEQUAL, contenders, None, lambda: True)
+    found = solve._best_certified(UNEQUAL, contenders, None, lambda: True)
     assert (found.number, len(asked)) == (answer, solved_for)
     assert bool(found.message) == (answer > 0 and ends[0][0] != "solved")
 
@@ -164,7 +164,7 @@ def test_delta_is_lowered_for_gaits_near_the_bound_where_nothing_else_fails(spee
     solution = SimpleNamespace(
         problem=UNEQUAL, gait=SimpleNamespace(shape_speed=speed), certificate=SimpleNamespace(failures=checks)
     )
-    assert optimise._is_small_and_viscous(solution) == small
+    assert solve._is_small_and_viscous(solution) == small
 
 
 def test_where_a_gait_of_finite_size_shrinks_after_all_the_next_one_stands_beside_the_best(monkeypatch):
@@ -173,9 +173,9 @@ def test_where_a_gait_of_finite_size_shrinks_after_all_the_next_one_stands_besid
         return SimpleNamespace(problem=None, gait=gait, status="solved", value=value, certificate=certificate)
 
     ends = {"first": solved("small", 0.5), "second": solved("large", 0.4)}
-    monkeypatch.setattr(optimise, "maximise_efficiency", lambda problem, on_level, levels: ends[levels])
-    monkeypatch.setattr(optimise, "on_speed_floor", lambda problem, gait: gait == "small")
+    monkeypatch.setattr(solve, "maximise_efficiency", lambda problem, on_level, levels: ends[levels])
+    monkeypatch.setattr(solve, "on_speed_floor", lambda problem, gait: gait == "small")
     solution = SimpleNamespace(problem=None, message="", starts=32, others=(), finite=None)
-    optimise._add_finite(solution, ["first", "second"])
+    solve._add_finite(solution, ["first", "second"])
     assert solution.finite is ends["second"]
     assert "0.400000" in solution.message

@@ -26,7 +26,7 @@ from colloc.mechanics.actuators import actuator_powers, driven_power
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 THRIFT = "sqrt(distance) / (work + 0.1 * length)"
 TURNED = "(distance + rotation**2) / (work + length)"

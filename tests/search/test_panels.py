@@ -9,8 +9,8 @@ from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 from colloc.results.store import load, save
-from colloc.search.optimise import optimum
-from colloc.search.reduced_search import Found, finer_body
+from colloc.search.converge import Found, finer_body
+from colloc.search.solve import optimum
 from colloc.smooth.modal_body import ModalBody
 from colloc.verification.replay import replay
 

@@ -13,7 +13,7 @@ from colloc.mechanics.bodies import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import best_gait, maximise_efficiency
+from colloc.search.solve import best_gait, maximise_efficiency
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {

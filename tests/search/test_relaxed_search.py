@@ -8,10 +8,10 @@ from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency
 from colloc.gaits.relaxed import Mixture
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import realisation
-from colloc.results.realisation import finite_certificate, kept_inside, realised_gaits, relaxed_certificate
 from colloc.results.relaxation import Optimality
-from colloc.search.reduced_search import VERY_ROUGH, Found, settled
-from colloc.search.relaxed_search import prices, readied
+from colloc.search.converge import VERY_ROUGH, Found, settled
+from colloc.search.realise import finite_certificate, kept_inside, realised_gaits, relaxed_certificate
+from colloc.search.relaxed import prices, readied
 from scripts import few_corners
 from scripts.few_corners import polygon_near
 

@@ -7,8 +7,8 @@ from colloc import Harmonic, Problem, ellipse, maximise_efficiency
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import space_near
-from colloc.search.full_program import level_found
-from colloc.search.reduced_search import Found, searched
+from colloc.search.confirm import level_found
+from colloc.search.converge import Found, searched
 from colloc.search.saddles import below_saddle
 
 PROBLEM = Problem("symmetric", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=60)

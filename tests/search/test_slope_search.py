@@ -20,15 +20,15 @@ from colloc import (
     save,
 )
 from colloc.commands import report, solve, verify
+from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.bodies import FULL
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
-from colloc.results.certificate import _one_motion, gait_certificate
-from colloc.search.friction_unit import in_friction_units
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.certify import _one_motion, gait_certificate
 from colloc.search.slope_search import climbing_gait
+from colloc.search.solve import maximise_efficiency
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.slope import slope_motion
 

@@ -5,7 +5,7 @@ import pytest
 from colloc import Friction, Harmonic, Problem
 from colloc.gaits.starts import latin_hypercube_gait, on_speed_floor
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 ASKED = 0.02
 

@@ -6,7 +6,7 @@ from benchmarks.robustness import DELTA, NEXT_DELTA, SMALL_DELTA, Table, case_pr
 from colloc import Chain
 from colloc.gaits.starts import latin_hypercube_gait
 from colloc.results.solution import SOLVED
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 
 TABLE = Table(Chain((0.4, 0.2, 0.4)), 3)
 

@@ -14,9 +14,9 @@ from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.converge import ROUGH, settled
 from colloc.search.prescribed import realised
-from colloc.search.reduced_search import ROUGH, settled
+from colloc.search.solve import maximise_efficiency
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.system.errors import ProblemError

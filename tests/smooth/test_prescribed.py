@@ -16,7 +16,7 @@ from colloc.pictures.report_page import report_page
 from colloc.pictures.solution_figure import solution_figure
 from colloc.results.solution import SOLVED
 from colloc.results.store import load, save
-from colloc.search.optimise import best_gait, measured
+from colloc.search.solve import best_gait, measured
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave

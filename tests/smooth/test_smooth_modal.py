@@ -13,7 +13,7 @@ from colloc.mechanics.friction import Friction
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.results.equivalence import distance, reversed_in_time, swapped
 from colloc.results.store import load, save
-from colloc.search.optimise import maximise_efficiency
+from colloc.search.solve import maximise_efficiency
 from colloc.smooth.balance import solve_smooth
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.motion import Motion, sine_wave

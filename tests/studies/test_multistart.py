@@ -28,7 +28,7 @@ from colloc.results.equivalence import distance, images, phase_distance, reverse
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
-from colloc.search.optimise import is_trivial, maximise_efficiency, optimum
+from colloc.search.solve import is_trivial, maximise_efficiency, optimum
 from colloc.studies import campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay

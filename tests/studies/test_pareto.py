@@ -8,7 +8,7 @@ import pytest
 from colloc import Friction, Harmonic, Problem, ProblemError, load, pareto_front
 from colloc.commands.main import main
 from colloc.pictures.front_figure import front_figure
-from colloc.search.optimise import best_gait
+from colloc.search.solve import best_gait
 
 PROBLEM = Problem("wide", gait=Harmonic(1, "bilateral"), friction=Friction(10, 1, 1), delta=1e-2, mesh_tolerance=1e-4)
 

@@ -17,7 +17,7 @@ from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.results.store import load
-from colloc.search.nlp import Solver
+from colloc.search.ipopt import Solver
 from colloc.system.interruption import interrupted, interruptible
 
 PROBLEM = """

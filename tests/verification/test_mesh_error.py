@@ -16,8 +16,8 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.search import reduced_search
-from colloc.search.optimise import maximise_efficiency, optimum
+from colloc.search import converge
+from colloc.search.solve import maximise_efficiency, optimum
 from colloc.verification import refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
 from colloc.verification.kinks import kink_phases
@@ -201,7 +201,7 @@ def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     assert not plan.reached
     assert plan.estimate > 1e-7
     small = planned_mesh
-    monkeypatch.setattr(reduced_search, "planned_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60}))
+    monkeypatch.setattr(converge, "planned_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60}))
     solution = maximise_efficiency(stated)
     assert solution.status == "certificate failed"
     assert "mesh error" in solution.message

@@ -8,21 +8,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from colloc.gaits.friction_unit import in_friction_units, in_unit, restated
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.gaits.symmetry import NONE
 from colloc.reduced.spaces import space_near
-from colloc.results.certificate import certify
+from colloc.results.answer import Level, SearchStep
 from colloc.results.solution import SOLVED, Solution
-from colloc.results.steps import Level, SearchStep
-from colloc.search.friction_unit import in_friction_units, in_unit, restated
-from colloc.search.full_program import answer, level_found
-from colloc.search.global_search import STARTS, best_of
-from colloc.search.literal_search import literal_optimum
+from colloc.search.certify import certify
+from colloc.search.confirm import answer, level_found
+from colloc.search.converge import FACTOR, NOWHERE, Found, descended, kink_or_not, refined, searched
+from colloc.search.explore import STARTS, best_of
+from colloc.search.literal import literal_optimum
 from colloc.search.prescribed import measured
-from colloc.search.reduced_search import FACTOR, NOWHERE, Found, descended, kink_or_not, refined, searched
-from colloc.search.relaxed_search import RELAXED_STARTS, best_relaxed_gait
+from colloc.search.relaxed import RELAXED_STARTS, best_relaxed_gait
 from colloc.search.saddles import below_saddle
 from colloc.system.errors import NotConvergedError
 
@@ -117,7 +117,7 @@ def maximise_efficiency(
     before : sequence of Level
         Levels of an interrupted run of the same problem; it goes on from the last one.
     literal : bool
-        Whether IPOPT searches on the full program from the guess alone (`colloc.search.literal_search`).
+        Whether IPOPT searches on the full program from the guess alone (`colloc.search.literal`).
 
     Returns
     -------
@@ -206,7 +206,7 @@ def best_gait(
     ----------
     problem : Problem
     starts : int, optional
-        The guess, known gaits and seeded samples (`colloc.search.global_search`), and small loops. With 1 the guess alone, as
+        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops. With 1 the guess alone, as
         `maximise_efficiency`. By default 32, of relaxed gaits 8.
     on_level : callable, optional
         Called with every `colloc.results.solution.Level` of the best gait.
@@ -215,7 +215,7 @@ def best_gait(
     before : sequence of Level
         Levels of an interrupted run; it goes on from the last one.
     watch : callable
-        Called with every `colloc.results.steps.SearchStep` before the first level; of relaxed gaits with what is under
+        Called with every `colloc.results.answer.SearchStep` before the first level; of relaxed gaits with what is under
         way, in words.
 
     Returns

@@ -6,10 +6,10 @@ import numpy as np
 
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
+from colloc.results.answer import REALISED
 from colloc.results.checks import Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.results.solution import Solution
-from colloc.results.steps import REALISED
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import MixedPath, Path, Replay
 

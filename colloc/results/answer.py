@@ -23,7 +23,7 @@ class Level:
         The mesh, in phases of the gait found.
     x, lam_x : (n,)
         Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces are in units of
-        `colloc.search.friction_unit`.
+        `colloc.gaits.friction_unit`.
     lam_g : (m,)
         Multipliers of the constraints.
     efficiency, distance, work : float

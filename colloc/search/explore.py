@@ -28,9 +28,9 @@ from colloc.mechanics.chain import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_about, space_near
+from colloc.results.answer import Alternative, SearchStep
 from colloc.results.equivalence import distance
-from colloc.results.steps import Alternative, SearchStep
-from colloc.search.reduced_search import (
+from colloc.search.converge import (
     FIRST_RADIUS,
     NEXT_RADIUS,
     ROUGH,
@@ -226,7 +226,7 @@ def best_of(problem: Problem, count: int, seconds: float = np.inf, watch: Watch 
     seconds : float
         Wall time after which no other start is begun and no other gait is followed.
     watch : callable
-        Called with a `colloc.results.steps.SearchStep` after every start and every gait that was followed.
+        Called with a `colloc.results.answer.SearchStep` after every start and every gait that was followed.
 
     Raises
     ------

@@ -20,13 +20,13 @@ from colloc.gaits.relaxed import Mixture
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.results.realisation import realised_gaits, relaxed_certificate
+from colloc.results.answer import Alternative
 from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
-from colloc.results.steps import Alternative
-from colloc.search.global_search import starting_gaits
+from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
+from colloc.search.explore import starting_gaits
 from colloc.search.prescribed import realised
-from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
+from colloc.search.realise import realised_gaits, relaxed_certificate
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 
 RELAXED_STARTS = 8
@@ -114,7 +114,7 @@ def relaxed_gaits(
     problem : Problem
         Its class is `colloc.gaits.relaxed.Relaxed`; `intervals` are pieces of the part that is solved.
     starts : int
-        The guess, known gaits and seeded samples (`colloc.search.global_search.starting_gaits`).
+        The guess, known gaits and seeded samples (`colloc.search.explore.starting_gaits`).
     seconds : float
         Wall time after which no other start is begun or followed.
     report : callable, optional

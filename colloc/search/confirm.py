@@ -19,10 +19,10 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import heading, transcribed
-from colloc.results.steps import REDUCED, Level
+from colloc.results.answer import REDUCED, Level
+from colloc.search.converge import Found
 from colloc.search.diagnosis import explanation
-from colloc.search.nlp import NlpResult, Solver
-from colloc.search.reduced_search import Found
+from colloc.search.ipopt import NlpResult, Solver
 
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
 RADIUS = 0.01

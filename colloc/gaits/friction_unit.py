@@ -15,7 +15,7 @@ from colloc.gaits.limits import Limit
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.law import Law
-from colloc.results.steps import Level
+from colloc.results.answer import Level
 
 
 def friction_unit(friction: Law) -> float:

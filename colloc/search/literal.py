@@ -12,15 +12,15 @@ from collections.abc import Callable
 import numpy as np
 
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.friction_unit import in_friction_units, restated
 from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, nearest_parameters, transcribed
+from colloc.results.answer import Level
 from colloc.results.solution import Solution
-from colloc.results.steps import Level
+from colloc.search.confirm import level_of
+from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, deltas
 from colloc.search.diagnosis import explanation, redundant_equations
-from colloc.search.friction_unit import in_friction_units, restated
-from colloc.search.full_program import level_of
-from colloc.search.nlp import NlpResult, Solver
-from colloc.search.reduced_search import FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, deltas
+from colloc.search.ipopt import NlpResult, Solver
 from colloc.verification.refinement import planned_mesh
 
 _MESHES, _ITERATIONS = 8, 1500

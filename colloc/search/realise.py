@@ -12,9 +12,9 @@ from colloc.gaits.limits import under_one_limit
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
-from colloc.results.certificate import VIOLATION, gait_certificate
 from colloc.results.checks import Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation
+from colloc.search.certify import VIOLATION, gait_certificate
 from colloc.system.errors import NotConvergedError
 
 STATIONARY = 1e-3
