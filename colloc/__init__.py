@@ -44,8 +44,6 @@ if TYPE_CHECKING:
     from colloc.results.solution import Solution
     from colloc.results.store import load, save
     from colloc.search.certify import certify
-    from colloc.search.slope_search import climbing_gait
-    from colloc.search.solve import maximise_efficiency
     from colloc.smooth.concertina import Concertina
     from colloc.smooth.crawler_body import CrawlerBody
     from colloc.smooth.modal_body import ModalBody
@@ -77,8 +75,6 @@ _HOME = {
     "gaits.free_path": ("FreePath", "ArcPath"),
     "gaits.polygon": ("Polygon", "Corners"),
     "gaits.relaxed": ("Relaxed",),
-    "search.solve": ("maximise_efficiency",),
-    "search.slope_search": ("climbing_gait",),
     "studies.calls": ("solve", "multistart", "Starts", "sweep"),
     "studies.study": ("Study", "Axis"),
     "studies.pareto": ("pareto_front",),
@@ -124,12 +120,10 @@ __all__ = [
     "Viscous",
     "Wave",
     "certify",
-    "climbing_gait",
     "ellipse",
     "heading_map",
     "load",
     "load_problem",
-    "maximise_efficiency",
     "multistart",
     "pareto_front",
     "replay",

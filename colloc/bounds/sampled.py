@@ -20,7 +20,7 @@ from colloc.bounds.coulomb_motion import swaps_ends
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampling import Domain
-from colloc.gaits.gait_fields import fields, law_fields
+from colloc.gaits.gait_fields import fields
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.numerics.spline import TensorSpline
@@ -200,7 +200,7 @@ def compute_bound(domain: Domain, budget: Budget) -> Bound:
 
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
-    stated = {"body": fields(domain.body), "friction": law_fields(domain.friction), "joint_limit": domain.joint_limit}
+    stated = {"body": fields(domain.body), "friction": fields(domain.friction), "joint_limit": domain.joint_limit}
     return hash_of({"version": VERSION, "domain": stated, "budget": asdict(budget)})
 
 

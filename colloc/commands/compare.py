@@ -71,7 +71,7 @@ def rows(a: Solution, b: Solution) -> list[tuple[str, str, str]]:
 
 
 def _outcome(solution: Solution) -> dict[str, str]:
-    last, certificate, measured = solution.last, solution.certificate, solution.measured
+    answer, certificate, measured = solution.answer, solution.certificate, solution.measured
     error = f" +- {certificate.efficiency_error:.0e}" if certificate.replayed else " (not replayed)"
     return {
         "status": solution.status,
@@ -82,9 +82,9 @@ def _outcome(solution: Solution) -> dict[str, str]:
         "  at delta -> 0": f"{certificate.efficiency_at_zero_delta:.6f}" if certificate.replayed else "-",
         "distance d": f"{measured.distance:.6f}",
         "work W": f"{measured.work:.6f}",
-        "delta": f"{last.delta:.1e}",
-        "intervals": str(last.edges.size - 1),
-        "iterations": str(sum(level.iterations for level in solution.levels)),
+        "delta": f"{answer.delta:.1e}",
+        "intervals": str(answer.edges.size - 1),
+        "iterations": str(sum(step.iterations for step in solution.history)),
         "seconds": f"{solution.seconds:.1f}",
     }
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
-from colloc.gaits.gait_fields import law_fields
+from colloc.gaits.gait_fields import fields
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.system.errors import ProblemError
@@ -61,7 +61,7 @@ def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Seque
         "max_speed_rad_per_s": None if limits is None else list(limits),
         "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
         "body": solution.problem.body.describe(),
-        "friction": law_fields(solution.problem.friction),
+        "friction": fields(solution.problem.friction),
         "efficiency": measured.efficiency,
         "objective": solution.problem.objective.name,
         "value": measured.value,

@@ -6,29 +6,29 @@ import argparse
 import json
 import math
 import sys
-import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from colloc.commands import ending
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
-from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path, tell
 from colloc.commands.summary import summary_dict, summary_lines
-from colloc.gaits.problem import Problem
-from colloc.gaits.problem_file import ProblemFile, read_problem_file
-from colloc.results.answer import Level, SearchStep
-from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
-from colloc.system.errors import CollocError, ProblemError, StoreError
+from colloc.gaits.problem_file import read_problem_file
+from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED
+from colloc.system.errors import CollocError, ProblemError
 from colloc.system.progress import StatusLine, duration
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
 """Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
 SEARCHES = ("reduced", "full")
-EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED}
+EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED, INTERRUPTED: ending.INTERRUPTED}
 _EPILOG = """\
 Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
 
-A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. Levels are kept in NAME.partial.h5 as they
-end; after Ctrl-C or a crash the same command goes on from there.
+A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. What is found on the way is kept in
+NAME.run.sqlite; after Ctrl-C or a crash the same command goes on, and ends as if nothing had happened. Ctrl-C leaves the best
+gait so far in NAME.interrupted.h5.
 
   colloc solve problems/three_link.py
   colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
@@ -48,7 +48,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="starts to find the best gait of, at least (default: 32, of relaxed gaits 8); 1: the guess alone",
     )
-    parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="begin no other start after so long")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=math.inf,
+        metavar="S",
+        help="wall time allowed; then the best gait so far is the result",
+    )
     parser.add_argument(
         "--search",
         choices=SEARCHES,
@@ -61,18 +67,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
     add_printing(parser)
     return parser
-
-
-def level_line(level: Level) -> str:
-    """One line about a level of the continuation."""
-    flag = "" if level.optimal else f"   ({level.status})"
-    return (
-        f"{level.delta:9.1e} {level.edges.size - 1:6d} {level.value:11.6f} {level.distance:9.5f} {level.work:9.5f} "
-        f"{level.iterations:6d} {level.seconds:8.2f}{flag}"
-    )
-
-
-LEVEL_HEADER = "    delta   mesh   objective         d         W   iter  seconds"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -90,22 +84,31 @@ def _solve(options: argparse.Namespace) -> int:
     path = output_path(options.output, Path("results") / f"{problem.name}.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.results.store import save
+    from colloc.studies.saved import solved_and_saved
 
     quiet = options.quiet or options.json
     if not quiet and problem.intervals > _MANY_INTERVALS:
         seconds = duration(_SECONDS_AN_INTERVAL * problem.intervals)
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
-    solution = _solved(problem, stated, path, options, quiet)
-    if solution.status != SOLVED:
-        path = path.with_suffix(".failed.h5")
-    save(solution, path)
-    _partial(path).unlink(missing_ok=True)
-    bound, saved, complaints = None, [str(path)], []
-    if solution.finite is not None:
-        solution.finite.source = solution.source
-        saved.append(f"{save(solution.finite, path.with_suffix('.finite.h5'))} (the gait of finite size)")
+    # a gait that is given on the command line is to be improved, not left for another
+    starts = options.starts or (1 if options.start else stated.starts)
+    with StatusLine(enabled=not quiet) as line:
+        solution, written = solved_and_saved(
+            replace(stated, problem=problem),
+            path,
+            starts=starts,
+            seconds=options.seconds,
+            search=options.search,
+            fresh=options.fresh,
+            progress=lambda news: line.say(f"{problem.name}: {news}", news.left),
+        )
+    path, bound, complaints = written[0], None, list[str]()
+    saved = [str(path), *(f"{each} (the gait that shrank)" for each in written[1:])]
+    if solution.status == INTERRUPTED:
+        tell(options, summary_dict(solution, path, stated.reference, None), [*summary_lines(solution, stated.reference)])
+        print(f"colloc: saved {path}; the same command goes on from there.", file=sys.stderr)
+        return ending.INTERRUPTED
     with StatusLine(enabled=not quiet) as line:
         if options.bound:
             line.say("computing an upper bound on every gait")
@@ -135,68 +138,3 @@ def _solve(options: argparse.Namespace) -> int:
     for complaint in complaints:
         print(f"colloc: {complaint}", file=sys.stderr)
     return BAD_PROBLEM if complaints else EXIT[solution.status]
-
-
-def _partial(path: Path) -> Path:
-    """Where the levels of a run are kept while it is under way."""
-    return path.with_name(f"{path.name.removesuffix('.h5').removesuffix('.failed')}.partial.h5")
-
-
-def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse.Namespace, quiet: bool) -> Solution:
-    """The solution, from the levels that an interrupted run left if there are any; each level is kept as it ends."""
-    from colloc.results.store import load, save
-    from colloc.search.solve import best_gait, maximise_efficiency
-
-    # a gait that is given on the command line is to be improved, not left for another
-    starts = options.starts or (1 if options.start else stated.starts)
-    source = stated.source
-    partial = _partial(path)
-    levels: list[Level] = []
-    if partial.exists() and not options.fresh:
-        try:
-            before = load(partial)
-        except StoreError as error:
-            raise StoreError(f"{error} It was left by an interrupted run; --fresh begins again.") from None
-        if before.problem.hash == problem.hash:
-            levels = list(before.levels)
-    table = not quiet and sys.stdout.isatty()
-    if levels and not quiet:
-        print(f"going on from {partial}: {len(levels)} levels, the last at delta = {levels[-1].delta:.1e}", flush=True)
-    if table:
-        print(LEVEL_HEADER, flush=True)
-    begin = time.monotonic()
-    before_levels = tuple(levels)
-    try:
-        with StatusLine(enabled=not quiet) as line:
-            line.say(f"{problem.name}: " + ("building" if starts == 1 else "trying starts"))
-
-            def ended(level: Level) -> None:
-                levels.append(level)
-                save(Solution(problem, levels, source=source, message="interrupted."), partial)
-                if table:
-                    line.clear()
-                    print(level_line(level), flush=True)
-                left = levels_left(problem, level) * (time.monotonic() - begin) / (len(levels) - len(before_levels))
-                what = "solving" if level.delta > problem.delta else "refining the mesh and checking"
-                line.say(f"{problem.name}: {what}, delta {level.delta:.0e} done", left)
-
-            def tried(step: SearchStep | str) -> None:
-                line.say(f"{problem.name}: {step}")
-
-            if options.search == SEARCHES[0]:
-                solution = best_gait(problem, starts, ended, options.seconds, before_levels, tried)
-            else:
-                solution = maximise_efficiency(problem, ended, literal=True)
-    except KeyboardInterrupt:
-        if not levels:
-            raise
-        raise KeyboardInterrupt(f"{len(levels)} levels are kept in {partial}; the same command goes on from there.") from None
-    solution.source = source
-    return solution
-
-
-def levels_left(problem: Problem, level: Level) -> int:
-    """Levels a solve will probably still take after this one: one a decade of delta, and one on a refined mesh."""
-    if level.delta <= problem.delta:
-        return 1
-    return math.ceil(math.log10(level.delta / problem.delta) - 1e-9) + (problem.mesh_tolerance > 0)

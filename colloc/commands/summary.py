@@ -27,7 +27,7 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
             *_besides(solution),
             f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
-            f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
+            f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.answer.delta:.0e}",
         ]
         lines += [f"  search          {text}" for text in _search_lines(solution)]
         reason = solution.problem.paced_by
@@ -62,15 +62,15 @@ def _besides(solution: Solution) -> list[str]:
 
 def _search_lines(solution: Solution) -> list[str]:
     """What was solved last, and what the gait is the best of."""
-    level = solution.last
-    if level.program == PRESCRIBED:
-        return [f"nothing is free: the motion is prescribed, measured on a mesh of {level.edges.size - 1} intervals"]
-    if level.program == REALISED:
-        intervals = level.edges.size - 1
+    answer = solution.answer
+    if answer.program == PRESCRIBED:
+        return [f"nothing is free: the motion is prescribed, measured on a mesh of {answer.edges.size - 1} intervals"]
+    if answer.program == REALISED:
+        intervals = answer.edges.size - 1
         return [f"a polygon that repeats what a relaxed gait mixes, measured on {intervals} intervals", *solution.standing]
-    rows = f"{level.x.size} variables, {level.lam_g.size} constraints"
-    how = f"{level.iterations} iterations of IPOPT" if level.program != REDUCED else level.status
-    lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {level.kkt_error:.0e}"]
+    rows = f"{answer.x.size} variables, {answer.lam_g.size} constraints"
+    how = f"{answer.iterations} iterations of IPOPT" if answer.program != REDUCED else answer.status
+    lines = [f"{solution.problem.formulation} program: {rows}, {how}, KKT error {answer.kkt_error:.0e}"]
     return [*lines, *solution.standing]
 
 
@@ -84,20 +84,20 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "file": str(path),
         "problem_hash": solution.problem.hash,
         "seconds": solution.seconds,
-        "delta": solution.last.delta,
+        "delta": solution.answer.delta,
         "objective": solution.problem.objective.fields(),
         "value": solution.value,
         "efficiency": solution.efficiency,
         "distance": solution.distance,
         "work": solution.work,
-        "iterations": sum(level.iterations for level in solution.levels),
+        "iterations": sum(step.iterations for step in solution.history),
         "class": solution.problem.gait.describe(),
-        "program": solution.last.program,
-        "variables": int(solution.last.x.size),
-        "constraints": int(solution.last.lam_g.size),
-        "kkt_error": solution.last.kkt_error,
+        "program": solution.answer.program,
+        "variables": int(solution.answer.x.size),
+        "constraints": int(solution.answer.lam_g.size),
+        "kkt_error": solution.answer.kkt_error,
         "starts": solution.starts,
-        "finite": None if solution.finite is None else solution.finite.value,
+        "shrunk": None if solution.shrunk is None else solution.shrunk.value,
         "relaxed": _relaxed_dict(solution),
         "others": [
             {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}

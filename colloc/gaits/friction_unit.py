@@ -7,15 +7,12 @@ An objective that is proportional to no power of the coefficients is left as it 
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from colloc.gaits.limits import Limit
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.mechanics.law import Law
-from colloc.results.answer import Level
 
 
 def friction_unit(friction: Law) -> float:
@@ -38,14 +35,6 @@ def _over(limit: Limit | None, unit: float) -> Limit | None:
     if limit is None:
         return None
     return tuple(each / unit for each in limit) if isinstance(limit, tuple) else limit / unit
-
-
-def restated(level: Level, unit: float, objective: Objective) -> Level:
-    """A level's values for coefficients `unit` times as large; its variables stay in the solver's units."""
-    if unit == 1.0:
-        return level
-    value, efficiency = in_unit(level.objective, unit, objective), level.efficiency / unit
-    return dataclasses.replace(level, efficiency=efficiency, work=level.work * unit, objective=value)
 
 
 def in_unit(value: float, unit: float, objective: Objective) -> float:

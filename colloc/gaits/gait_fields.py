@@ -23,7 +23,7 @@ from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
-from colloc.mechanics.bodies import FULL, IMPLICIT, Body
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
@@ -38,16 +38,13 @@ AnyGait: TypeAlias = Any
 """One of `GAITS`. Each function says which kinds it takes; a problem checks that gait and class are of some kind."""
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
+KIND = "kind"
 GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases, PointedSeries)
 CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 """Laws of friction that files can hold, Coulomb's first; a law of your own making is added to the list."""
-_AIMS = 7
-"""The last fields of a problem say what is asked of a gait, from the objective on; what is usual of them is left out."""
-_EARLIER = {None: IMPLICIT, "condensed": IMPLICIT, "map": IMPLICIT, "lifted": FULL}
-"""What earlier files call the formulations; those of paths name none."""
 
 
 def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None) -> None:
@@ -57,23 +54,20 @@ def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None
 
 
 def fields(value: Any) -> dict[str, Any]:
-    """The fields of a gait, a class of gaits or a body as numbers, strings and lists."""
+    """The kind of a gait, a class of gaits, a body or a law, and its fields as numbers, strings and lists."""
     stated = [f for f in dataclasses.fields(value) if f.metadata != STATED_IF_SET or getattr(value, f.name) != f.default]
     found = {f.name: getattr(value, f.name) for f in stated}
-    return {k: v.tolist() if isinstance(v, (np.ndarray, np.generic)) else v for k, v in found.items()}
-
-
-def _always_stated(kind: type) -> set[str]:
-    return {f.name for f in dataclasses.fields(kind) if f.metadata != STATED_IF_SET}
+    plain = {k: v.tolist() if isinstance(v, (np.ndarray, np.generic)) else v for k, v in found.items()}
+    return {KIND: type(value).__name__, **plain}
 
 
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
-    exact = [kind for kind in kinds if _always_stated(kind) <= set(given) <= {f.name for f in dataclasses.fields(kind)}]
-    for kind in (*exact, *kinds):
-        # fields that are left out have defaults: the first one tells the kind
-        if dataclasses.fields(kind)[0].name in given:
-            return kind(**given)
-    raise KeyError(f"one of {', '.join(dataclasses.fields(kind)[0].name for kind in kinds)}")
+    values = dict(given)
+    name = values.pop(KIND)
+    kind = next((kind for kind in kinds if kind.__name__ == name), None)
+    if kind is None:
+        raise KeyError(f"{name} is none of {', '.join(kind.__name__ for kind in kinds)}")
+    return kind(**values)
 
 
 def gait_from(given: dict[str, Any]) -> AnyGait:
@@ -86,20 +80,9 @@ def class_from(given: dict[str, Any]) -> AnyClass:
     return _from(CLASSES, given)
 
 
-def law_fields(law: Law) -> dict[str, Any]:
-    """The fields of a law of friction, and its name unless it is Coulomb's."""
-    kind = type(law)
-    return fields(law) if kind is LAWS[0] else {"law": kind.__name__, **fields(law)}
-
-
 def law_from(given: dict[str, Any]) -> Law:
-    """The law that `law_fields` described; as `gait_from`."""
-    given = dict(given)
-    name = given.pop("law", LAWS[0].__name__)
-    kind = next((kind for kind in LAWS if kind.__name__ == name), None)
-    if kind is None:
-        raise KeyError(f"no law of friction is called {name}")
-    return kind(**given)
+    """The law that `fields` described; as `gait_from`."""
+    return _from(LAWS, given)
 
 
 def body_from(given: dict[str, Any]) -> Body:
@@ -108,10 +91,10 @@ def body_from(given: dict[str, Any]) -> Body:
 
 
 def problem_fields(problem: Any) -> dict[str, Any]:
-    """All fields of a problem."""
+    """All fields of a problem; what is usual of what it asks for is left out."""
     stated = {f.name: getattr(problem, f.name) for f in dataclasses.fields(problem)}
-    usual = [f.name for f in dataclasses.fields(problem)[-_AIMS:] if stated[f.name] == f.default]
-    stated |= {name: fields(stated[name]) for name in ("guess", "gait", "body")} | {"friction": law_fields(problem.friction)}
+    usual = [f.name for f in dataclasses.fields(problem) if f.metadata == STATED_IF_SET and stated[f.name] == f.default]
+    stated |= {name: fields(stated[name]) for name in ("guess", "gait", "body", "friction")}
     stated |= {"objective": problem.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in problem.at_least]}
     return {name: value for name, value in stated.items() if name not in usual}
 
@@ -119,9 +102,7 @@ def problem_fields(problem: Any) -> dict[str, Any]:
 def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
     """The arguments of the problem that `problem_fields` described; as `gait_from`."""
     kinds = {"guess": gait_from, "body": body_from, "friction": law_from, "gait": class_from}
-    found = dict(stated)
-    found |= {name: kind(found[name]) for name, kind in kinds.items()}
-    return found | {"formulation": _EARLIER.get(found.get("formulation"), found.get("formulation"))}
+    return {**stated, **{name: kind(stated[name]) for name, kind in kinds.items()}}
 
 
 def statement_hash(stated: dict[str, Any]) -> str:

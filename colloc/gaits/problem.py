@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
-from colloc.system.arguments import check_finite, is_number, is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, check_finite, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 SMALLEST_DELTA = 1e-14
@@ -91,6 +91,9 @@ class Problem:
         "work" that of the joints, and where the body points is sought with the gait.
     towards : float, optional
         Direction on a slope whose way counts instead of the climb, with none across it, from straight uphill to the left [rad].
+    shrinking : bool
+        Whether a gait may be the answer that shrank to ``smallest_shape_speed``. By default the best gait of finite size is,
+        if there is one.
 
     Examples
     --------
@@ -120,13 +123,14 @@ class Problem:
     scheme: str = "gauss-3"
     formulation: str = None  # type: ignore[assignment]
     mesh_tolerance: float = 3e-5
-    objective: Objective = EFFICIENCY
-    rotation: float | None = 0.0
-    at_least: tuple[tuple[Objective, float], ...] = ()
-    torque_limit: Limit | None = None
-    power_limit: Limit | None = None
-    grade: float = 0.0
-    towards: float | None = None
+    objective: Objective = field(default=EFFICIENCY, metadata=STATED_IF_SET)
+    rotation: float | None = field(default=0.0, metadata=STATED_IF_SET)
+    at_least: tuple[tuple[Objective, float], ...] = field(default=(), metadata=STATED_IF_SET)
+    torque_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
+    power_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
+    grade: float = field(default=0.0, metadata=STATED_IF_SET)
+    towards: float | None = field(default=None, metadata=STATED_IF_SET)
+    shrinking: bool = field(default=False, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
         check_kind("body", self.body, gait_fields.BODIES, Body)

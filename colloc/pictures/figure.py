@@ -192,7 +192,7 @@ def draw_power(axes: Axes, solution: Solution, t: np.ndarray) -> None:
     axes.plot(t, solution.power(motion), color=BLUE, lw=1.5)
     axes.set(xlim=(0, 1), xlabel="phase t", ylabel="power  [weight·length/period]")
     axes.set_ylim(bottom=0)
-    draw_mesh_ticks(axes, solution.last.edges)
+    draw_mesh_ticks(axes, solution.answer.edges)
 
 
 def draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:

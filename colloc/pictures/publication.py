@@ -47,9 +47,9 @@ class Panel(NamedTuple):
 
 def draw_convergence(axes: Axes, solution: Solution) -> None:
     """The objective at every level of the continuation against its delta; crosses did not converge."""
-    good = [level for level in solution.levels if level.optimal]
-    bad = [level for level in solution.levels if not level.optimal]
-    deltas = np.array([level.delta for level in solution.levels])
+    good = [level for level in solution.history if level.optimal]
+    bad = [level for level in solution.history if not level.optimal]
+    deltas = np.array([level.delta for level in solution.history])
     axes.plot([level.delta for level in good], [level.value for level in good], "o-", color=BLUE, ms=4, lw=1.2)
     if good:
         axes.set_ylim(*axes.get_ylim())
@@ -61,7 +61,7 @@ def draw_convergence(axes: Axes, solution: Solution) -> None:
 
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Estimated error of the objective from every mesh interval, ``(n,)``, magnitudes."""
-    return np.abs(mesh_error(solution.resolved, solution.mesh, solution.gait, solution.delta_per_period).value)
+    return np.abs(mesh_error(solution.answer.problem, solution.mesh, solution.gait, solution.delta_per_period).value)
 
 
 def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:

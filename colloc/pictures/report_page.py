@@ -75,7 +75,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
     """The page as a string, also of a solution that failed: what does not exist is left out. The reference is the value to hold
     the result against, `gap` a sentence about the upper bound."""
     found: dict[str, Any] = {"gait_pictures": [], "convergence_pictures": [], "motion": None, "errors": None}
-    if solution.levels:
+    if solution.history:
         errors = mesh_errors(solution)
         drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
         drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
@@ -130,7 +130,7 @@ def write_report(solution: Solution, path: Path, reference: Reference | None = N
 
 
 def _headline(solution: Solution) -> str:
-    if not solution.levels:
+    if not solution.history:
         return "no gait was found"
     measured = solution.measured
     best = solution.problem.objective

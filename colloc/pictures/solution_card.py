@@ -28,11 +28,11 @@ def solution_card(solution: Solution) -> str:
 
 def _facts(solution: Solution) -> list[tuple[str, str]]:
     """Names and values."""
-    if not solution.levels:
+    if not solution.history:
         return []
     certificate, best = solution.certificate, solution.problem.objective
     if not certificate.replayed:
-        return [(f"{best.name} (not replayed)", f"{solution.value:.5f}"), ("δ", f"{solution.last.delta:.0e}")]
+        return [(f"{best.name} (not replayed)", f"{solution.value:.5f}"), ("δ", f"{solution.answer.delta:.0e}")]
     own = [] if best == EFFICIENCY else [(EFFICIENCY.label, f"{certificate.efficiency:.5f}")]
     return [
         (best.label, f"{certificate.value:.5f} ± {certificate.value_error:.0e}"),
@@ -40,7 +40,7 @@ def _facts(solution: Solution) -> list[tuple[str, str]]:
         *own,
         ("distance d", f"{certificate.distance:.5f}"),
         ("work W", f"{certificate.work:.5f}"),
-        ("δ", f"{solution.last.delta:.0e}"),
+        ("δ", f"{solution.answer.delta:.0e}"),
         ("search", solution.standing[0]),
     ]
 

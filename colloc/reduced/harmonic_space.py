@@ -18,6 +18,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import remembered
+from colloc.reduced.given import Given
 
 
 class HarmonicSpace:
@@ -32,7 +33,7 @@ class HarmonicSpace:
     _follows: Callable[[np.ndarray], list[_Placed]] | None
 
     def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
-        self.problem, self.far = problem, far
+        self.problem, self.far, self.given = problem, far, Given(None, edges, scheme)
         self.mesh = problem_mesh(problem, edges, scheme)
         self.checks = shape_checks(problem.body, far)
         gait, n_joint, limit = problem.gait, problem.body.n_joint, problem.joint_limit

@@ -15,6 +15,7 @@ from colloc.gaits.symmetry import end_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.reduced.given import Given
 
 _NEAR = 0.6
 """A check that is nearer to its bound than this [rad, or body lengths] is among the rows."""
@@ -46,6 +47,7 @@ class MixtureSpace:
 
     def __init__(self, problem: Problem, pieces: int, far: Pairs = (), directions: int = 0) -> None:
         self.problem, self.pieces, self.far = problem, pieces, far
+        self.given = Given(None, np.arange(pieces + 1.0), problem.scheme)
         self.n_joint, self.n_direction = problem.body.n_joint, directions or problem.gait.directions
         self.mesh = Mesh(scheme(problem.scheme), np.arange(pieces * _CELLS + 1.0) / _CELLS)
         piece = np.repeat(np.arange(pieces), _CELLS * self.mesh.scheme.s)

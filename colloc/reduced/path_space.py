@@ -23,6 +23,7 @@ from colloc.numerics.columns import ChosenRows, ColumnFunction
 from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import minimised, remembered
+from colloc.reduced.given import Given
 from colloc.reduced.place_slopes import along_arcs, along_shape
 from colloc.system.errors import NotConvergedError
 
@@ -45,7 +46,7 @@ class PathSpace:
     def __init__(
         self, problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
     ) -> None:
-        self.problem, self.near, self.far = problem, near, far
+        self.problem, self.near, self.far, self.given = problem, near, far, Given(near, edges, scheme)
         stated = problem if scheme in ("", problem.scheme) else problem.with_(scheme=scheme)
         self._fit = fit = transcribe_fit(stated, near, edges, far)
         self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry

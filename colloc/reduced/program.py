@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from colloc.gaits.friction_unit import in_friction_units, in_unit
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
@@ -13,6 +14,7 @@ from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.actuator_rows import ActuatorRows
+from colloc.reduced.given import Given
 from colloc.reduced.motion import ReducedMotion, Shapes
 from colloc.reduced.sloped import SlopedMotion
 
@@ -29,6 +31,7 @@ class SearchSpace(Shapes, Protocol):
     row_upper: np.ndarray
     watched: dict[str, np.ndarray]
     """The rows in order: of each kind, those of the full program's rows of that name that are among them."""
+    given: Given
     knots: np.ndarray | None
     """Phases where the arcs of a free path meet; None for other gaits."""
     own: np.ndarray
@@ -71,6 +74,10 @@ class SearchSpace(Shapes, Protocol):
     def row_slopes(self, v: np.ndarray) -> np.ndarray: ...
 
 
+FORCES = ("work", "driven_work")
+"""Quantities of a period that are proportional to friction."""
+
+
 class ReducedProgram:
     """Maximise a problem's objective over a class of gaits on a mesh, at one delta.
 
@@ -82,13 +89,16 @@ class ReducedProgram:
     lower, upper : (n,)
     delta : float
         In the units of the class; may be changed.
+    unit : float
+        The friction that is 1 inside: objective, work and multipliers are in units of it, so that tolerances mean the same
+        whatever the coefficients are (`colloc.gaits.friction_unit`).
     actuators : ActuatorRows, optional
         Where the problem limits them.
     """
 
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
-        problem = space.problem
+        problem, self.unit = in_friction_units(space.problem)
         besides = [name for name in ("length", "driven_work") if problem.uses(name)]
         at = problem.body, problem.friction, problem.gait.motion_symmetry, space.mesh, space, besides
         self.motion = ReducedMotion(*at) if problem.slope is None else SlopedMotion(*at, problem.slope)
@@ -150,6 +160,15 @@ class ReducedProgram:
     def objective(self, v: np.ndarray) -> float:
         """Minus the value that is maximised."""
         return -float(self._objective(self.motion.values(v, self.delta)))
+
+    def stated(self, objective: float) -> float:
+        """The value that an `objective` stands for, in the units of the problem."""
+        return in_unit(-objective, self.unit, self._objective)
+
+    def period(self, v: np.ndarray) -> dict[str, float]:
+        """What a period comes to, by the names of `colloc.gaits.objective.QUANTITIES`, in the units of the problem."""
+        found = self.motion.values(v, self.delta)
+        return {name: value * self.unit if name in FORCES else value for name, value in found.items()}
 
     def gradient(self, v: np.ndarray) -> np.ndarray:
         """Of the objective, ``(n,)``."""

@@ -17,14 +17,15 @@ from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
+from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sloped import SlopeHarmonic
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
+from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
 from colloc.reduced.sloped import SlopeSpace
-from colloc.system.errors import ProblemError
 
 
 class Searched(NamedTuple):
@@ -32,23 +33,27 @@ class Searched(NamedTuple):
 
     program: Callable[[Problem, AnyGait, np.ndarray | None, Pairs], GaitProgram]
     """Of a problem, a gait near, the edges of a mesh, and pairs of links that must not cross: its nonlinear program."""
-    space: Callable[[Problem, AnyGait, np.ndarray | None, str], SearchSpace]
-    """Of a problem, a gait near, the edges of a mesh, and a scheme: its parameters."""
+    space: Callable[[Problem, AnyGait, np.ndarray | None, str, Pairs], SearchSpace]
+    """Of a problem, a gait near, the edges of a mesh, a scheme, and those pairs: its parameters."""
 
 
 _LINEAR = Searched(
     lambda problem, gait, edges, far: transcribe(problem, edges, far),
-    lambda problem, gait, edges, scheme: HarmonicSpace(problem, edges, scheme),
+    lambda problem, gait, edges, scheme, far: HarmonicSpace(problem, edges, scheme, far),
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
-_ON_SLOPE = Searched(_LINEAR.program, lambda problem, gait, edges, scheme: SlopeSpace(problem, edges, scheme))
-SEARCHED: dict[type, Searched] = {FreePath: _ALONG_PATHS, Polygon: _ALONG_PATHS, SlopeHarmonic: _ON_SLOPE}
+_ON_SLOPE = Searched(_LINEAR.program, lambda problem, gait, edges, scheme, far: SlopeSpace(problem, edges, scheme, far))
+_MIXED = Searched(
+    transcribe_path,
+    lambda problem, gait, edges, scheme, far: MixtureSpace(
+        problem, problem.intervals if edges is None else edges.size - 1, far
+    ),
+)
+SEARCHED: dict[type, Searched] = {FreePath: _ALONG_PATHS, Polygon: _ALONG_PATHS, SlopeHarmonic: _ON_SLOPE, Relaxed: _MIXED}
 """Of classes whose angles are not linear in their parameters, or that have other parameters besides."""
 
 
 def _searched(problem: Problem) -> Searched:
-    if problem.gait.mixes:
-        raise ProblemError("relaxed gaits have a search of their own: colloc solve FILE, or colloc.solve.")
     return next((how for kind, how in SEARCHED.items() if isinstance(problem.gait, kind)), _LINEAR)
 
 
@@ -78,14 +83,22 @@ def space_near(
 ) -> tuple[SearchSpace, np.ndarray]:
     """The class of a problem on its first mesh, or a given one, and the parameters of its member nearest to a gait.
     `NotConvergedError` if no path of the class is found near the gait."""
-    space = _searched(problem).space(problem, gait, edges, scheme)
+    space = space_of(problem, gait, edges, scheme)
     return space, space.parameters(gait)
+
+
+def space_of(
+    problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+) -> SearchSpace:
+    """The class of a problem on its first mesh, or a given one, with the pairs `far` kept apart; `near` says which of several
+    kinds of members are meant."""
+    return _searched(problem).space(problem, near, edges, scheme, far)
 
 
 def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
     """The class of a problem on its first mesh, and parameters about a gait that need not keep every row: ten times as fast for
     free paths."""
-    space = _searched(problem).space(problem, gait, None, "")
+    space = space_of(problem, gait)
     return space, space.laid(gait)
 
 

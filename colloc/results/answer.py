@@ -1,60 +1,133 @@
-"""What a search tells and leaves: how far it has come, the levels of its continuation, and the other gaits that it met."""
+"""The answer of a search: a gait with every variable of its full program; how the search came there, and what else it met."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from colloc.collocation.layout import Layout, problem_layout
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
+from colloc.results.collocated_motion import CollocatedMotion
 
 REDUCED, PRESCRIBED, REALISED = "reduced", "prescribed", "realised"
 
 
-@dataclass(frozen=True, eq=False)
-class Level:
-    """One converged or failed step of the continuation.
+@dataclass(frozen=True)
+class Step:
+    """One step of a search: a gait that was optimised at one delta on one mesh.
 
     Attributes
     ----------
     delta : float
         Regularisation speed, in the units of the problem's class of gaits: per period, or at unit shape speed.
+    intervals : int
+    value, distance, work : float
+        The problem's objective, distance and work of a period, as collocation sees them.
+    kkt_error : float
+        Largest component of the Lagrangian's gradient.
+    optimal : bool
+        Whether the first-order conditions hold, as far as this step needs them.
+    status : str
+        In words.
+    iterations : int
+    seconds : float
+    program : str
+        What was solved: "reduced" by SQP in the gait's parameters, or the problem's formulation by IPOPT.
+    """
+
+    delta: float
+    intervals: int
+    value: float
+    distance: float
+    work: float
+    kkt_error: float
+    optimal: bool
+    status: str
+    iterations: int
+    seconds: float
+    program: str = REDUCED
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """Curvature of the Lagrangian at an answer, in the space of its class (`colloc.reduced.second_order`).
+
+    Attributes
+    ----------
+    smallest, error : float
+        Smallest curvature along a free direction, over the value of the objective [1/rad^2], and its error; infinite if no
+        direction is free, NaN if it was not measured.
+    n_free : int
+        Free directions.
+    why_not : str
+        Why it was not measured; empty if it was.
+    """
+
+    smallest: float
+    error: float
+    n_free: int
+    why_not: str = ""
+
+
+NOT_MEASURED = SecondOrder(np.nan, np.nan, 0, "nothing is free in a prescribed motion")
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A gait as a point of the full direct-collocation program of its problem.
+
+    Attributes
+    ----------
+    problem : Problem
+        As it was solved: the body on its panels, at the final delta.
+    gait : AnyGait
+    delta : float
+        In the units of the problem's class of gaits.
     edges : (n_interval + 1,)
-        The mesh, in phases of the gait found.
+        The mesh, in phases of the gait.
+    scheme : str
+    knots : (n_arc + 1,), optional
+        Phases where the arcs of a free path meet; they are among the edges. By default they are the edges.
     x, lam_x : (n,)
         Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces are in units of
         `colloc.gaits.friction_unit`.
     lam_g : (m,)
         Multipliers of the constraints.
-    efficiency, distance, work : float
-        Over one whole period, as collocation sees them.
+    value, distance, work : float
+        Of the problem's objective, and over one whole period, as collocation sees them.
     kkt_error, violation, complementarity : float
         Measured first-order conditions, in units of the friction, otherwise unscaled.
     status : str
-        The optimiser's own word.
+        In words.
     optimal : bool
         Whether the first-order conditions hold.
     iterations : int
-    seconds, evaluation_seconds : float
-    scheme : str
-        Collocation scheme, which refinement may have raised in order; "" for the problem's.
-    objective : float
-        Value of the problem's objective, where that is not the efficiency.
+    seconds : float
     program : str
-        What was solved: "reduced" by SQP, with every other variable following from the gait, or by IPOPT the problem's
-        formulation; "prescribed" where nothing is free, "realised" where a gait stands for a relaxed one.
-    knots : (n_arc + 1,), optional
-        Phases where the arcs of a free path meet; they are among the edges. By default they are the edges.
-    panels : int
-        Of the body's quadrature, which refinement may have doubled; 0 for the problem's.
+        Where the conditions were measured: "reduced", or the problem's formulation as IPOPT confirms it; "prescribed" where
+        nothing is free, "realised" where a gait stands for a relaxed one.
+    second_order : SecondOrder
+    message : str
+        What does not hold, or holds in a way that should be told; empty otherwise.
+    history : tuple of Step
+        How the search came here; the last step is the answer itself.
     """
 
+    problem: Problem
+    gait: AnyGait
     delta: float
     edges: np.ndarray
+    scheme: str
+    knots: np.ndarray | None
     x: np.ndarray
     lam_x: np.ndarray
     lam_g: np.ndarray
-    efficiency: float
+    value: float
     distance: float
     work: float
     kkt_error: float
@@ -64,49 +137,49 @@ class Level:
     optimal: bool
     iterations: int
     seconds: float
-    evaluation_seconds: float
-    scheme: str = ""
     program: str = REDUCED
-    knots: np.ndarray | None = None
-    objective: float = float("nan")
-    panels: int = 0
-
-    @property
-    def value(self) -> float:
-        """Of the problem's objective."""
-        return self.efficiency if np.isnan(self.objective) else self.objective
+    second_order: SecondOrder = NOT_MEASURED
+    message: str = ""
+    history: tuple[Step, ...] = ()
 
     def __repr__(self) -> str:
         verdict = "" if self.optimal else f", {self.status}"
         size = f"{self.x.size} variables"
-        return f"<Level at delta = {self.delta:.1e}: d/W = {self.efficiency:.6g}, {self.program}, {size}{verdict}>"
+        return f"<Answer at delta = {self.delta:.1e}: {self.value:.6g}, {self.program}, {size}{verdict}>"
 
+    @property
+    def efficiency(self) -> float:
+        """Distance over work, as collocation sees them."""
+        return self.distance / self.work
 
-@dataclass(frozen=True)
-class SearchStep:
-    """How far a search over many starts has come.
+    @property
+    def step(self) -> Step:
+        """The answer as a step of its search."""
+        return Step(
+            self.delta,
+            self.edges.size - 1,
+            *(self.value, self.distance, self.work, self.kkt_error),
+            **{name: getattr(self, name) for name in ("optimal", "status", "iterations", "seconds", "program")},
+        )
 
-    Attributes
-    ----------
-    what : str
-        What is counted: "starts" tried on a coarse mesh, or "gaits" followed to the final delta.
-    done, count : int
-        Gaits may be followed for less than their count: those of finite size only until one is found.
-    efficiency : float
-        Of the best gait so far, as collocation sees it; NaN before there is one.
-    delta : float
-        At which that is; NaN before.
-    """
+    @property
+    def mesh(self) -> Mesh:
+        return Mesh(scheme(self.scheme), self.edges)
 
-    what: str
-    done: int
-    count: int
-    efficiency: float
-    delta: float
+    @property
+    def layout(self) -> Layout:
+        """Where every variable is in `x`."""
+        return problem_layout(self.problem, self.mesh, self.knots)
 
-    def __str__(self) -> str:
-        best = f"; best d/W = {self.efficiency:.4f} at delta = {self.delta:.0e}" if self.delta > 0 else ""
-        return f"{self.done} of {self.count} {self.what}{best}"
+    @property
+    def delta_per_period(self) -> float:
+        """Regularisation speed in body lengths per period, whatever the class measures it in."""
+        return self.delta * self.gait.delta_unit
+
+    @cached_property
+    def motion(self) -> CollocatedMotion:
+        """What the variables say of the motion."""
+        return CollocatedMotion(self.problem, self.mesh, self.layout, self.x, self.gait, self.delta_per_period)
 
 
 @dataclass(frozen=True, eq=False)

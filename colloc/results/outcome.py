@@ -85,8 +85,6 @@ class Outcome:
 
 _GAITS, _TEXTS, _COUNTS = ("guess", "gait"), ("status", "message"), ("start", "iterations")
 _NUMBERS = tuple(f.name for f in dataclasses.fields(Outcome) if f.name not in (*_GAITS, *_TEXTS, *_COUNTS))
-_EARLIER = {"value": float("nan"), "value_error": float("nan")}
-"""What earlier rows do not state: they know of the efficiency only."""
 
 
 def outcome_fields(outcome: Outcome) -> dict[str, Any]:
@@ -97,7 +95,6 @@ def outcome_fields(outcome: Outcome) -> dict[str, Any]:
 
 def outcome_from(entry: dict[str, Any]) -> Outcome:
     """The outcome that `outcome_fields` described. KeyError, TypeError, ValueError or ProblemError if it did not."""
-    entry = _EARLIER | entry
     if entry["status"] not in STATUSES:
         raise ValueError(f"no status: {entry['status']}")
     kinds: list[tuple[Callable, tuple[str, ...]]] = [(int, _COUNTS), (str, _TEXTS), (float, _NUMBERS), (gait_from, _GAITS)]

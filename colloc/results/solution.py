@@ -1,10 +1,9 @@
-"""The result of a solve: levels of the continuation, and the motion at any instant by the scheme's own interpolant."""
+"""The result of a solve: its answer with certificate, and the motion at any instant by the scheme's own interpolant."""
 
 from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -12,26 +11,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from colloc.collocation.layout import Layout, problem_layout
+from colloc.collocation.layout import Layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.schemes import scheme
-from colloc.results.answer import REALISED, Alternative, Level
+from colloc.results.answer import Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
-from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED = "solved", "not converged", "certificate failed"
+SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED, INTERRUPTED = "solved", "not converged", "certificate failed", "interrupted"
 _MOST_OTHERS = 4
 """Of the gaits that a search met besides, so many are told."""
 
@@ -43,8 +40,8 @@ class Solution:
     Attributes
     ----------
     problem : Problem
-    levels : list of Level
-        In the order they were solved; the last one is the result.
+    answer : Answer
+        The gait, as a point of the full program of direct collocation.
     certificate : Certificate
         `UNCERTIFIED` if the solve did not converge.
     seconds : float
@@ -60,10 +57,12 @@ class Solution:
         How many the gait is the best of.
     others : tuple of Alternative
         Distinct gaits they led to, the one of this solution first; empty for a single start.
-    finite : Solution, optional
-        The best gait of finite size, where this one is as small as the bound on the shape speed allows; saved by itself.
+    shrunk : Solution, optional
+        A better gait that is as small as the bound on the shape speed allows, which nobody could build; saved by itself.
     relaxed : Relaxation, optional
         The relaxed gait that the gait of this solution comes near, for a class of relaxed gaits.
+    interrupted : bool
+        Whether the search ended early, by Ctrl-C or because its time was over.
 
     Examples
     --------
@@ -78,7 +77,7 @@ class Solution:
     """
 
     problem: Problem
-    levels: Sequence[Level]
+    answer: Answer
     certificate: Certificate = UNCERTIFIED
     seconds: float = 0.0
     source: str = ""
@@ -87,25 +86,26 @@ class Solution:
     changed: bool = False
     starts: int = 1
     others: tuple[Alternative, ...] = ()
-    finite: Solution | None = None
+    shrunk: Solution | None = None
     relaxed: Relaxation | None = None
+    interrupted: bool = False
 
     def __repr__(self) -> str:
-        facts = [self.problem.name, self.status]
-        if self.levels:
-            replayed = "" if self.certificate.replayed else " (not replayed)"
-            error = f" +- {self.certificate.value_error:.0e}" if self.certificate.replayed else ""
-            what = self.problem.objective.short
-            facts.append(f"{what} = {self.measured.value:.6g}{error}{replayed} at delta = {self.last.delta:.1e}")
-        return f"<Solution {', '.join(facts)}>"
+        replayed = "" if self.certificate.replayed else " (not replayed)"
+        error = f" +- {self.certificate.value_error:.0e}" if self.certificate.replayed else ""
+        number = f"{self.problem.objective.short} = {self.value:.6g}{error}{replayed}"
+        return f"<Solution {self.problem.name}, {self.status}, {number} at delta = {self.answer.delta:.1e}>"
 
     @property
     def status(self) -> str:
-        """One of "solved", "not converged", "certificate failed"."""
-        reached = bool(self.levels) and self.levels[-1].optimal and self.levels[-1].delta <= self.problem.delta * (1 + 1e-9)
+        """One of "solved", "not converged", "certificate failed", "interrupted"."""
+        reached = self.answer.optimal and self.answer.delta <= self.problem.delta * (1 + 1e-9)
+        solved = reached and self.certificate.replayed and self.certificate.passed
+        if self.interrupted and not solved:
+            return INTERRUPTED
         if not reached or not self.certificate.replayed:
             return NOT_CONVERGED
-        return SOLVED if self.certificate.passed else CERTIFICATE_FAILED
+        return SOLVED if solved else CERTIFICATE_FAILED
 
     @property
     def success(self) -> bool:
@@ -113,22 +113,14 @@ class Solution:
         return self.status == SOLVED
 
     @property
-    def last(self) -> Level:
-        """The result.
-
-        Raises
-        ------
-        ProblemError
-            If the solve failed before its first level ended.
-        """
-        if not self.levels:
-            raise ProblemError(f"{self.problem.name} holds no gait: its solve failed before the first level.")
-        return self.levels[-1]
+    def history(self) -> tuple[Step, ...]:
+        """How the search came to the answer; the last step is the answer."""
+        return self.answer.history
 
     @property
-    def measured(self) -> Certificate | Level:
-        """What says the objective, efficiency, distance and work best: the replay if there was one, else the last level."""
-        return self.certificate if self.certificate.replayed else self.last
+    def measured(self) -> Certificate | Answer:
+        """What says the objective, efficiency, distance and work best: the replay if there was one, else the answer."""
+        return self.certificate if self.certificate.replayed else self.answer
 
     @property
     def tends_to(self) -> Certificate:
@@ -137,21 +129,23 @@ class Solution:
 
     @property
     def value(self) -> float:
-        """Of the problem's objective, at the last level; the certificate says whether to believe it."""
-        return self.last.value
+        """The problem's objective, by replay (by collocation, if there was no replay)."""
+        return self.measured.value
 
     @property
     def efficiency(self) -> float:
-        """d/W of the last level; the certificate says whether to believe it."""
-        return self.last.efficiency
+        """Distance over work, by replay (by collocation, if there was no replay)."""
+        return self.measured.efficiency
 
     @property
     def distance(self) -> float:
-        return self.last.distance
+        """Displacement over a period, by replay (by collocation, if there was no replay)."""
+        return self.measured.distance
 
     @property
     def work(self) -> float:
-        return self.last.work
+        """Work against friction over a period, by replay (by collocation, if there was no replay)."""
+        return self.measured.work
 
     @property
     def standing(self) -> list[str]:
@@ -159,47 +153,38 @@ class Solution:
         if self.starts == 1 or not self.others:
             return ["local optimum, from one start"]
         best, *others = self.others
-        lines = [f"local optimum, best of {self.starts} starts; {best.starts} led here"]
+        lines = [f"local optimum, best of {self.starts} starts, {best.starts} of which met it"]
         if others:
             lines.append("also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS])))
         return lines
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh of the last level."""
-        return Mesh(scheme(self.last.scheme or self.problem.scheme), self.last.edges)
-
-    @property
-    def resolved(self) -> Problem:
-        """The problem of the last level: the body on its panels, and of relaxed gaits the class of finite ones."""
-        panels, problem = self.last.panels, self.problem
-        if self.last.program == REALISED:
-            return problem.with_(gait=problem.gait.finite)
-        return problem.with_(body=problem.body.on_panels(panels)) if panels else problem
+        """The mesh of the answer."""
+        return self.answer.mesh
 
     @property
     def layout(self) -> Layout:
-        return problem_layout(self.problem, self.mesh, self.last.knots)
+        """Where every variable of the answer is."""
+        return self.answer.layout
 
     @property
     def gait(self) -> AnyGait:
-        """The gait of the last level."""
-        parameters = self.last.x[self.layout.parameters[:, 0]]
-        knots = self.last.edges if self.last.knots is None else self.last.knots
-        return self.problem.gait.member(parameters, self.problem.body.n_joint, knots)
+        """The gait of the answer."""
+        return self.answer.gait
 
     @property
     def delta_per_period(self) -> float:
-        """Regularisation speed of the last level in body lengths per period, whatever the class measures it in."""
-        return self.last.delta * self.gait.delta_unit
+        """Regularisation speed of the answer in body lengths per period, whatever the class measures it in."""
+        return self.answer.delta_per_period
 
     @property
     def motion(self) -> CollocatedMotion:
-        """What the variables of the last level say of the motion."""
-        return CollocatedMotion(self.resolved, self.mesh, self.layout, self.last.x, self.gait, self.delta_per_period)
+        """What the variables of the answer say of the motion."""
+        return self.answer.motion
 
     def at_points(self) -> tuple[np.ndarray, Sliding]:
-        """Phases of the collocation points and the body there, from the variables of the last level (per period)."""
+        """Phases of the collocation points and the body there, from the variables of the answer (per period)."""
         return self.mesh.times, self.motion.at_points
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:

@@ -6,7 +6,8 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /gait/{mean,cos,sin}                                 /versions   JSON text
          or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
     /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
-    /levels/000/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, efficiency, objective (NaN: the efficiency), ...
+    /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work, kkt_error, panels, ...
+    /history/{delta,intervals,value,distance,work,...}: how the search came there, a row a step
     /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, efficiency, efficiency_error, ...
     /relaxed/{durations,directions,start}, attribute symmetry and those of `results.relaxation.Optimality`, with
         /relaxed/certificate and /relaxed/realised/000/{corners,certificate}, attributes repeats, sense, symmetry
@@ -27,9 +28,8 @@ from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
-from colloc.results.answer import Alternative, Level
+from colloc.results.answer import REALISED, Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
-from colloc.results.former_format import converted, is_former
 from colloc.results.motion import SAMPLES, motion_columns
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
@@ -48,15 +48,16 @@ from colloc.system.store_file import (
     was_changed,
 )
 
-FORMAT, FORMAT_VERSION = "colloc solution", 3
+FORMAT, FORMAT_VERSION = "colloc solution", 4
 _LAYOUT = "see colloc.collocation.layout"
-_LEVEL_ARRAYS = {
+_ANSWER_ARRAYS = {
     "edges": ("period", "edge"),
     "x": (_LAYOUT, "variable"),
     "lam_x": (_LAYOUT, "variable"),
     "lam_g": (_LAYOUT, "constraint"),
 }
-_KNOTS = "knots"
+_APART = ("problem", "gait", "knots", "second_order", "history", *_ANSWER_ARRAYS)
+"""Of an answer; the rest are attributes."""
 
 _GAIT_ARRAYS = {
     "mean": ("rad", "joint"),
@@ -103,7 +104,6 @@ def save(solution: Solution, path: str | os.PathLike[str]) -> Path:
 def load(path: str | os.PathLike[str]) -> Solution:
     """The solution in a file that `save` wrote.
 
-    A file of the former format is converted first (`colloc.results.former_format`).
     A file that another program has opened to write since then is read with a `ChangedFileWarning`, and the solution is marked
     as ``changed``: `colloc verify` decides what it is worth.
 
@@ -119,9 +119,6 @@ def load(path: str | os.PathLike[str]) -> Solution:
     Traceback (most recent call last):
     colloc.system.errors.StoreError: there is no file nothing.h5.
     """
-    if is_former(path):
-        with converted(path, FORMAT, FORMAT_VERSION) as present:
-            return load(present)
     changed = was_changed(Path(path), FORMAT)
     try:
         with sealed_file(path, FORMAT, FORMAT_VERSION, unsealed=changed) as file:
@@ -149,21 +146,50 @@ def _write(file: h5py.File, solution: Solution) -> None:
     put_attribute(file, "starts", solution.starts)
     others = [{**dataclasses.asdict(other), "gait": fields(other.gait)} for other in solution.others]
     put(file, "others", json.dumps(others))
-    for index, level in enumerate(solution.levels):
-        group = file.create_group(f"levels/{index:03d}")
-        for name, (units, dims) in _LEVEL_ARRAYS.items():
-            put(group, name, getattr(level, name), units=units, dims=dims)
-        if level.knots is not None:
-            put(group, _KNOTS, level.knots, units="period", dims="knot")
-        for field in dataclasses.fields(level):
-            if field.name not in (*_LEVEL_ARRAYS, _KNOTS):
-                put_attribute(group, field.name, getattr(level, field.name))
-    if solution.levels:
-        _write_motion(file, solution)
+    put_attribute(file, "interrupted", int(solution.interrupted))
+    _write_answer(file, solution.answer)
+    _write_motion(file, solution)
     if solution.certificate.replayed:
         _write_certificate(file.create_group("certificate"), solution.certificate)
     if solution.relaxed is not None:
         _write_relaxation(file.create_group("relaxed"), solution.relaxed)
+
+
+def _write_answer(file: h5py.File, answer: Answer) -> None:
+    group = file.create_group("answer")
+    for name, (units, dims) in _ANSWER_ARRAYS.items():
+        put(group, name, getattr(answer, name), units=units, dims=dims)
+    if answer.knots is not None:
+        put(group, "knots", answer.knots, units="period", dims="knot")
+    for field in dataclasses.fields(answer):
+        if field.name not in _APART:
+            put_attribute(group, field.name, getattr(answer, field.name))
+    put_attribute(group, "panels", answer.problem.body.panels)
+    for field in dataclasses.fields(SecondOrder):
+        put_attribute(group, f"second_order_{field.name}", getattr(answer.second_order, field.name))
+    steps = file.create_group("history")
+    for field in dataclasses.fields(Step):
+        put(steps, field.name, [getattr(step, field.name) for step in answer.history], dims="step")
+
+
+def _read_answer(file: h5py.File, problem: Problem) -> Answer:
+    group = child(file, "answer")
+    arrays = {name: array(group, name) for name in _ANSWER_ARRAYS}
+    knots = array(group, "knots") if "knots" in group else None
+    plain = {f.name: attribute(group, f.name) for f in dataclasses.fields(Answer) if f.name not in _APART}
+    panels = int(attribute(group, "panels"))
+    if plain["program"] == REALISED:
+        problem = problem.with_(gait=problem.gait.finite)
+    elif panels:
+        problem = problem.with_(body=problem.body.on_panels(panels))
+    if plain["delta"] < problem.delta:  # lowered for a small gait
+        problem = problem.with_(delta=plain["delta"])
+    second = SecondOrder(**{f.name: attribute(group, f"second_order_{f.name}") for f in dataclasses.fields(SecondOrder)})
+    steps = child(file, "history")
+    columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
+    history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
+    gait = _read_gait(child(file, "gait"))
+    return Answer(problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history)
 
 
 def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
@@ -173,6 +199,12 @@ def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
             put(group, name, value, units=units, dims=dims)
         else:
             put_attribute(group, name, value)
+
+
+def _read_gait(group: h5py.Group) -> AnyGait:
+    """The gait that `_write_gait` wrote."""
+    arrays = {name: array(group, name) for name in _GAIT_ARRAYS if name in group}
+    return gait_from(arrays | {name: attribute(group, name) for name in group.attrs})
 
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
@@ -221,8 +253,9 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-    stated = [f.name for f in dataclasses.fields(Certificate) if f.default is dataclasses.MISSING or f.name in group.attrs]
-    return Certificate(checks, **{name: attribute(group, name) for name in stated if name != "checks"})
+    return Certificate(
+        checks, **{f.name: attribute(group, f.name) for f in dataclasses.fields(Certificate) if f.name != "checks"}
+    )
 
 
 def _read(file: h5py.File) -> Solution:
@@ -230,34 +263,24 @@ def _read(file: h5py.File) -> Solution:
     problem = Problem.from_dict(stated)
     if statement_hash(stated) != attribute(file, "problem_hash"):
         raise StoreError(f"{file.filename} is damaged: its problem does not match its hash.")
-    levels = []
-    found = child(file, "levels") if "levels" in file else ()
-    for name in sorted(found):
-        group = child(found, name)
-        arrays = {key: array(group, key) for key in _LEVEL_ARRAYS}
-        there = [f.name for f in dataclasses.fields(Level) if f.default is dataclasses.MISSING or f.name in group.attrs]
-        rest = {name: attribute(group, name) for name in there if name not in _LEVEL_ARRAYS}
-        knots = array(group, _KNOTS) if _KNOTS in group else None
-        levels.append(Level(**arrays, **rest, knots=knots))
+    answer = _read_answer(file, problem)
     certificate = UNCERTIFIED
     if "certificate" in file:
         certificate = _read_certificate(child(file, "certificate"))
     solution = Solution(
         problem,
-        levels,
+        answer,
         certificate,
         float(attribute(file, "seconds")),
         text(file, "source"),
         str(attribute(file, "message")),
         json.loads(text(file, "versions")),
     )
-    if "others" in file:
-        others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(text(file, "others"))]
-        for other in others:  # earlier files know of the efficiency only
-            other.setdefault("value", other.pop("efficiency", np.nan))
-        solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
+    others = [{**other, "gait": gait_from(other["gait"])} for other in json.loads(text(file, "others"))]
+    solution.starts, solution.others = int(attribute(file, "starts")), tuple(Alternative(**other) for other in others)
     if "relaxed" in file:
         solution.relaxed = _read_relaxation(child(file, "relaxed"))
-    if levels and (solution.last.x.shape != (solution.layout.n,) or not np.isfinite(solution.last.x).all()):
+    solution.interrupted = bool(attribute(file, "interrupted"))
+    if answer.x.shape != (solution.layout.n,) or not np.isfinite(answer.x).all():
         raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     return solution

@@ -6,10 +6,9 @@ import numpy as np
 
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
-from colloc.results.answer import REALISED
+from colloc.results.answer import REALISED, Answer
 from colloc.results.checks import Certificate, Check
 from colloc.results.measured import astray, measured
-from colloc.results.solution import Solution
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import MixedPath, Path, Replay
 
@@ -23,28 +22,28 @@ MOTIONS = 1e-2
 ASTRAY, SEVERAL = 1e-3, 1e-3
 """On a slope: angle off the direction that was asked for; part of the period at which the motion is left open."""
 
-SADDLE, FLAT, NEAR = 1e-2, 1e-4, 1e-2
+SADDLE, FLAT = 1e-2, 1e-4
 """Curvatures of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
-5e-5, what the mesh may be wrong by; less than FLAT is called flat. NEAR: largest gradient at which they mean anything."""
-_MOST_PARAMETERS = 150
+5e-5, what the mesh may be wrong by; less than FLAT is called flat."""
 
 _FINE_PHASES = 20000
 
 
-def certify(
-    solution: Solution, *, tolerance: float = 1e-6, instants: int | None = None, second_order: Check | None = None
-) -> Certificate:
-    """Replay the last level's gait on a much finer grid and measure everything a claim of success rests on.
+def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
+    """Replay an answer's gait on a much finer grid and measure everything a claim of success rests on.
 
     Parameters
     ----------
-    solution : Solution
+    answer : Answer
+        As `Solution.answer` has it.
     tolerance : float
         Relative error of the replayed objective; a replay that does not reach it fails its check.
     instants : int, optional
         Instants of the first replay grid; by default many times the collocation points of a period.
-    second_order : Check, optional
-        The check of second order, where it was made before: it is the only one that needs CasADi.
+
+    Returns
+    -------
+    Certificate
 
     Raises
     ------
@@ -55,24 +54,19 @@ def certify(
     --------
     >>> import colloc
     >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    >>> colloc.certify(colloc.solve(problem, starts=1), tolerance=1e-7).passed
+    >>> colloc.certify(colloc.solve(problem, starts=1).answer, tolerance=1e-7).passed
     True
     """
-    problem = solution.resolved
+    problem, gait = answer.problem, answer.gait
     if instants is None:
         usual = problem.body.usual
         each = 0.5 * usual.instants_a_point / problem.gait.fraction
-        instants = max(usual.instants, 2 * int(np.ceil(each * solution.mesh.n_point)))
-    gait = solution.gait
-    at = problem, gait, solution.delta_per_period, gait.corner_phases, instants, tolerance
-    if solution.last.program == REALISED:  # it need not be an optimum, nor is it collocated to be measured by that
+        instants = max(usual.instants, 2 * int(np.ceil(each * answer.mesh.n_point)))
+    at = problem, gait, answer.delta_per_period, gait.corner_phases, instants, tolerance
+    if answer.program == REALISED:  # it need not be an optimum, nor is it collocated to be measured by that
         return gait_certificate(*at)
-    return gait_certificate(
-        *at,
-        claimed=solution.value,
-        before=(*_optimality(solution), second_order or _second_order(solution)),
-        after=(*_class(solution), *_mesh(solution)),
-    )
+    before = (*_first_order(answer), _second_order(answer))
+    return gait_certificate(*at, claimed=answer.value, before=before, after=(*_class(answer), *_mesh(answer)))
 
 
 def gait_certificate(
@@ -142,46 +136,29 @@ def gait_certificate(
     )
 
 
-def _optimality(solution: Solution) -> list[Check]:
-    level = solution.last
-    _, now = solution.at_points()
-    residual = np.abs(now.force).max() / solution.problem.friction.largest
+def _first_order(answer: Answer) -> list[Check]:
+    residual = np.abs(answer.motion.at_points.force).max() / answer.problem.friction.largest
     return [
-        Check("KKT error", max(level.kkt_error, level.complementarity), KKT, "gradient of the Lagrangian, complementarity"),
-        Check("constraint violation", level.violation, VIOLATION, "largest violated equation or bound"),
+        Check("KKT error", max(answer.kkt_error, answer.complementarity), KKT, "gradient of the Lagrangian, complementarity"),
+        Check("constraint violation", answer.violation, VIOLATION, "largest violated equation or bound"),
         Check("balance at nodes", float(residual), RESIDUAL, "net force and torque by the closed-form law"),
     ]
 
 
-def _second_order(solution: Solution) -> Check:
+def _second_order(answer: Answer) -> Check:
     """Whether the gait is a local optimum and no other critical point, in the space of its class."""
-    problem, level = solution.resolved, solution.last
-    if not problem.gait.free:
-        return Check("second order", 0.0, SADDLE, "nothing is free in a prescribed motion")
-    from colloc.reduced.program import ReducedProgram  # these load CasADi
-    from colloc.reduced.second_order import curvature
-    from colloc.reduced.spaces import space_near
-
-    space, v = space_near(problem, solution.gait, level.edges, level.scheme)
-    space = space.with_far(problem.body.far_pairs)
-    program = ReducedProgram(space, level.delta)
-    program.place_rows(v)
-    if v.size > _MOST_PARAMETERS:
-        return Check("second order", 0.0, SADDLE, f"not measured, for {v.size} parameters")
-    found = curvature(program, v)
-    size = abs(level.value)
-    least, error = found.smallest / size, found.error / size
-    value = max(-least - error, 0.0)
-    if not found.kkt_error < NEAR * size:
-        return Check("second order", 0.0, SADDLE, "not measured, where the gradient of the reduced program does not vanish")
+    found = answer.second_order
+    if found.why_not:
+        return Check("second order", 0.0, SADDLE, found.why_not)
+    value = max(-found.smallest - found.error, 0.0)
     if found.n_free == 0:
         verdict = "a vertex: what binds leaves no direction free"
-    elif least > max(error, FLAT):
-        verdict = f"an optimum: smallest curvature {least:.1e} in {found.n_free} free directions"
+    elif found.smallest > max(found.error, FLAT):
+        verdict = f"an optimum: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
     elif value > SADDLE:
-        verdict = f"a saddle: smallest curvature {least:.1e} in {found.n_free} free directions"
+        verdict = f"a saddle: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
     else:
-        verdict = f"flat: smallest curvature {least:.1e} +- {error:.0e} in {found.n_free} free directions"
+        verdict = f"flat: smallest curvature {found.smallest:.1e} +- {found.error:.0e} in {found.n_free} free directions"
     return Check("second order", value, SADDLE, f"{verdict} [1/rad^2]")
 
 
@@ -266,18 +243,18 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
     return Check("one motion", fine.ambiguity, MOTIONS, meaning)
 
 
-def _class(solution: Solution) -> list[Check]:
+def _class(answer: Answer) -> list[Check]:
     """What members of its class have to keep besides."""
-    return [Check(*line) for line in solution.problem.gait.own_checks(solution.gait)]
+    return [Check(*line) for line in answer.problem.gait.own_checks(answer.gait)]
 
 
-def _mesh(solution: Solution) -> list[Check]:
+def _mesh(answer: Answer) -> list[Check]:
     """The error estimate from the scheme's own defect; it has to pass only if the problem requests an accuracy."""
-    problem = solution.resolved
+    problem = answer.problem
     tolerance = problem.mesh_tolerance
     if tolerance == 0:
         return []
-    error = mesh_error(problem, solution.mesh, solution.gait, solution.delta_per_period, tolerance)
+    error = mesh_error(problem, answer.mesh, answer.gait, answer.delta_per_period, tolerance)
     return [
         Check("mesh error", error.estimate, tolerance, f"of the {problem.objective.name}, relative, from defects between nodes")
     ]

@@ -1,13 +1,19 @@
-"""The answer of a search: its gait as a solution of the problem's full nonlinear program, by IPOPT.
+"""A gait as a solution of its problem's full nonlinear program, confirmed by IPOPT.
 
 The full program has joint angles, rates, tail velocities and link forces as variables and the balance of forces as
 constraints. It is solved on the final mesh, from the gait that the search found, with the multipliers of the reduced program
 and, for the equations, those that come closest to stationarity. Both have the same solutions, so a few steps confirm it.
+
+Where IPOPT strays from a gait at which the first-order conditions hold, the gait is kept: at a kink of the collocated objective
+its second derivatives mislead. What holds then, and where, is the answer's verdict.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import time
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -15,121 +21,112 @@ from colloc.collocation.layout import Layout, problem_layout
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
-from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.friction_unit import in_friction_units, in_unit
 from colloc.gaits.problem import Problem
+from colloc.numerics.sqp import Stationarity, stationarity
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import heading, transcribed
-from colloc.results.answer import REDUCED, Level
-from colloc.search.converge import Found
+from colloc.reduced.second_order import curvature
+from colloc.reduced.spaces import heading, space_near, transcribed
+from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
+from colloc.search.converge import NOT_STATIONARY, STATIONARY
 from colloc.search.diagnosis import explanation
 from colloc.search.ipopt import NlpResult, Solver
+from colloc.search.optimum import Optimum
+from colloc.search.run import this_run
 
-STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
 _OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60, "max_cpu_time": 20.0}
 STATIONARY_ROWS = 1e-8
 """Violation of the full program up to which its equations hold at the gait of a search."""
 _ROUNDS, _ADMISSIBLE, _LET_PASS = 4, 1e-8, 1e-6
-"""Times that the shape checks are moved after the answer, what may be beyond them [rad], and what a certificate lets pass where
+"""Times that the shape checks are moved after IPOPT, what may be beyond them [rad], and what a certificate lets pass where
 the worst instant swings between two."""
+_MOST_PARAMETERS = 150
+"""Curvature is measured for so many parameters at most: it takes two gradients for each."""
+_NEAR = 1e-2
+"""Largest gradient, over the value, at which a curvature means anything."""
 
 
-def level_found(found: Found) -> Level:
-    """What is kept of a level of the search: its gait with every other variable in balance."""
-    space, problem = found.space, found.space.problem
-    mesh, layout = space.phase_mesh(found.gait), problem_layout(problem, space.mesh, space.knots)
-    x = balanced_variables(problem, layout, mesh, found.gait, space.full_parameters(found.v), found.delta)
-    conditions = found.conditions
-    return Level(
-        found.delta,
-        mesh.edges,
-        x,
-        np.zeros_like(x),
-        conditions.on_rows,
-        *_of_period(problem, layout, x),
-        conditions.kkt_error,
-        conditions.violation,
-        conditions.complementarity,
-        STATIONARY if found.optimal else NOT_STATIONARY,
-        found.optimal,
-        found.iterations,
-        found.seconds,
-        found.seconds,
-        space.mesh.scheme.name,
-        knots=space.knots,
-        objective=_stated(problem, -found.objective),
-        panels=problem.body.panels,
-    )
+class Verdict(Enum):
+    """What holds at an answer."""
+
+    CONFIRMED = "confirmed"
+    """IPOPT ended there, within reach of the gait found."""
+    STATIONARY_ON_FULL = "first-order conditions hold on the full program"
+    STATIONARY_ON_REDUCED = "first-order conditions hold in the reduced space"
+    ON_KINK = "first-order conditions hold on the sides of a kink"
+    FAILED = "not stationary"
 
 
-def _of_period(problem: Problem, layout: Layout, x: np.ndarray) -> tuple[float, float, float]:
-    """Efficiency, distance and work of a whole period."""
-    distance, work = (float(x[row[0, -1]]) / problem.gait.fraction for row in (layout.distance, layout.work))
-    return distance / work, distance, work
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """What became of a gait on the full program."""
+
+    verdict: Verdict
+    program: GaitProgram
+    result: NlpResult
+    ended: str = ""
+    """How IPOPT ended, where that is not the answer."""
+    on_full: float = np.nan
+    """KKT error of the full program."""
 
 
-def _stated(problem: Problem, value: float) -> float:
-    """`Level.objective` of a value that was found."""
-    return np.nan if problem.objective == EFFICIENCY else value
+def confirm(optimum: Optimum) -> Answer:
+    """The gait as a point of the full program, with measured first- and second-order conditions.
 
+    Parameters
+    ----------
+    optimum : Optimum
+        On its final mesh.
 
-def level_of(program: GaitProgram, result: NlpResult, delta: float, name: str) -> Level:
-    """What is kept of a solved program."""
-    gait = program.member(result.x[program.layout.parameters[:, 0]])
-    return Level(
-        delta,
-        program.phase_mesh(gait).edges,
-        result.x,
-        result.lam_x,
-        result.lam_g,
-        *_of_period(program.problem, program.layout, result.x),
-        result.kkt_error,
-        result.violation,
-        result.complementarity,
-        result.status,
-        result.optimal,
-        result.iterations,
-        result.seconds,
-        result.evaluation_seconds,
-        program.mesh.scheme.name,
-        name,
-        program.knots,
-        _stated(program.problem, -result.objective),
-        program.problem.body.panels,
-    )
-
-
-def answer(found: Found) -> tuple[Level, str]:
-    """The gait of a search as a solution of the full program, and what does not hold, or "".
-
-    Where IPOPT strays from a gait at which the first-order conditions of the full program hold, the gait is kept: at a kink of
-    the collocated objective its second derivatives mislead. So it is where those of the reduced program hold alone. A gait that
-    rests on a kink is not given to IPOPT.
+    Returns
+    -------
+    Answer
+        Optimal if any of the first four verdicts holds; `message` says which, unless IPOPT confirms it.
     """
-    space, delta = found.space, found.delta
-    problem = space.problem.with_(scheme=space.mesh.scheme.name)
-    program = transcribed(problem, found.gait, space.phase_mesh(found.gait).edges, space.far)
-    x = feasible_point(program, space.full_parameters(found.v), delta)
-    reduced = found.program or ReducedProgram(space, delta)
+    begin = time.perf_counter()
+
+    def compute() -> Answer:
+        reduced = optimum.program()
+        conditions = stationarity(reduced, optimum.v)
+        outcome = _outcome(optimum, reduced, conditions)
+        program, result, confirmed = outcome.program, outcome.result, outcome.verdict is Verdict.CONFIRMED
+        answer = answer_of(optimum.problem, program, result, optimum.delta, reduced.unit)
+        answer = replace(
+            answer,
+            program=optimum.problem.formulation if confirmed else REDUCED,
+            seconds=time.perf_counter() - begin,
+            message=" ".join(part for part in (_sentence(optimum, outcome), optimum.lacks) if part),
+        )
+        answer = replace(answer, second_order=second_order(answer))
+        return replace(answer, history=(*optimum.history, answer.step))
+
+    this_run().told("confirm", 0, 1, optimum)
+    return this_run().kept("confirm", (optimum,), compute)
+
+
+def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity) -> _Outcome:
+    space, delta = optimum.space, optimum.delta
+    scaled, _ = in_friction_units(optimum.problem.with_(scheme=space.mesh.scheme.name))
+    program = transcribed(scaled, optimum.gait, space.phase_mesh(optimum.gait).edges, space.far)
+    x = feasible_point(program, space.full_parameters(optimum.v), delta)
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, _OPTIONS)
-    before = solver.measured(x, delta, *_multipliers(found, program))
-    if found.conditions.violation > RADIUS:  # no gait within reach is admissible
-        kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
-        return level_of(program, kept, delta, REDUCED), explanation(program, kept, delta)
-    here = found.conditions
-    in_reduced_space = replace(before, status=STATIONARY, kkt_error=here.kkt_error, complementarity=here.complementarity)
-    if found.on_kink and before.violation < STATIONARY_ROWS:
-        text = f"The optimum is a kink of the objective: gradients on its sides cancel (to {here.kkt_error:.1e})."
-        return level_of(program, in_reduced_space, delta, REDUCED), text
+    before = solver.measured(x, delta, *_multipliers(reduced, conditions, program))
+    here = replace(before, status=STATIONARY, kkt_error=optimum.kkt_error, complementarity=optimum.complementarity)
+    failed = replace(before, status=NOT_STATIONARY, iterations=optimum.iterations)
+    if optimum.violation > RADIUS:  # no gait within reach is admissible
+        return _Outcome(Verdict.FAILED, program, failed)
+    if optimum.on_kink and before.violation < STATIONARY_ROWS:
+        return _Outcome(Verdict.ON_KINK, program, here)
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
     for allowed in (*_ROUNDS * (_ADMISSIBLE,), _LET_PASS):
         if not result.optimal:
             break
         if reduced.place_rows(result.x[own]) <= allowed:
-            return level_of(program, result, delta, problem.formulation), ""
+            return _Outcome(Verdict.CONFIRMED, program, result)
         # the gait has moved so far that other instants are the worst
         solver.transcription = program = _limited(reduced, program)
         result = solver.solve_within(result.x, delta, (result.lam_x, result.lam_g), RADIUS).accumulated(result)
@@ -137,18 +134,102 @@ def answer(found: Found) -> tuple[Level, str]:
     if result.optimal:
         ended = f"IPOPT, begun there, moved the gait beyond its limits {_ROUNDS} times"
     if before.optimal:
-        kept = replace(before, status=STATIONARY)
-        text = f"First-order conditions hold (KKT error {before.kkt_error:.1e} on the {problem.formulation} program); {ended}."
-        return level_of(program, kept, delta, REDUCED), text
-    if found.optimal and before.violation < STATIONARY_ROWS:
+        return _Outcome(Verdict.STATIONARY_ON_FULL, program, replace(before, status=STATIONARY), ended)
+    if optimum.optimal and before.violation < STATIONARY_ROWS:
         # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits than the conditions need
-        text = (
-            f"First-order conditions hold in the reduced space (KKT error {here.kkt_error:.1e}; {before.kkt_error:.1e} on the "
-            f"{problem.formulation} program); {ended}."
-        )
-        return level_of(program, in_reduced_space, delta, REDUCED), text
-    kept = replace(before, status=NOT_STATIONARY, iterations=found.iterations)
-    return level_of(program, kept, delta, REDUCED), f"{explanation(program, kept, delta)} {ended}."
+        return _Outcome(Verdict.STATIONARY_ON_REDUCED, program, here, ended, before.kkt_error)
+    return _Outcome(Verdict.FAILED, program, failed, ended)
+
+
+def _sentence(optimum: Optimum, outcome: _Outcome) -> str:
+    """What holds, where it is not all that should."""
+    kind, kkt_error = optimum.problem.formulation, outcome.result.kkt_error
+    if outcome.verdict is Verdict.CONFIRMED:
+        return ""
+    if outcome.verdict is Verdict.ON_KINK:
+        return f"The optimum is a kink of the objective: gradients on its sides cancel (to {kkt_error:.1e})."
+    if outcome.verdict is Verdict.STATIONARY_ON_FULL:
+        return f"First-order conditions hold (KKT error {kkt_error:.1e} on the {kind} program); {outcome.ended}."
+    if outcome.verdict is Verdict.STATIONARY_ON_REDUCED:
+        where = f"KKT error {kkt_error:.1e}; {outcome.on_full:.1e} on the {kind} program"
+        return f"First-order conditions hold in the reduced space ({where}); {outcome.ended}."
+    text = explanation(outcome.program, outcome.result, optimum.delta)
+    return f"{text} {outcome.ended}." if outcome.ended else text
+
+
+def answer_of(problem: Problem, program: GaitProgram, result: NlpResult, delta: float, unit: float) -> Answer:
+    """A point of a full program in units of friction, as an answer to the stated problem."""
+    gait = program.member(result.x[program.layout.parameters[:, 0]])
+    answer = Answer(
+        problem,
+        gait,
+        delta,
+        edges=program.phase_mesh(gait).edges,
+        scheme=program.mesh.scheme.name,
+        knots=program.knots,
+        x=result.x,
+        lam_x=result.lam_x,
+        lam_g=result.lam_g,
+        value=in_unit(-result.objective, unit, problem.objective),
+        **_of_period(problem, program.layout, result.x, unit),
+        kkt_error=result.kkt_error,
+        violation=result.violation,
+        complementarity=result.complementarity,
+        status=result.status,
+        optimal=result.optimal,
+        iterations=result.iterations,
+        seconds=result.seconds,
+        program=problem.formulation,
+    )
+    return replace(answer, history=(answer.step,))
+
+
+def unconfirmed(optimum: Optimum) -> Answer:
+    """The gait as the search found it, with every other variable following from its balance: where there is no time for more."""
+    space, (scaled, unit) = optimum.space, in_friction_units(optimum.problem)
+    mesh, layout = space.phase_mesh(optimum.gait), problem_layout(scaled, space.mesh, space.knots)
+    x = balanced_variables(scaled, layout, mesh, optimum.gait, space.full_parameters(optimum.v), optimum.delta)
+    return Answer(
+        optimum.problem,
+        optimum.gait,
+        optimum.delta,
+        edges=mesh.edges,
+        scheme=space.mesh.scheme.name,
+        knots=space.knots,
+        x=x,
+        lam_x=np.zeros_like(x),
+        lam_g=np.empty(0),
+        value=optimum.value,
+        **_of_period(optimum.problem, layout, x, unit),
+        kkt_error=optimum.kkt_error,
+        violation=optimum.violation,
+        complementarity=optimum.complementarity,
+        status=optimum.step.status,
+        optimal=optimum.optimal,
+        iterations=optimum.iterations,
+        seconds=optimum.seconds,
+        history=optimum.history,
+    )
+
+
+def _of_period(problem: Problem, layout: Layout, x: np.ndarray, unit: float) -> dict[str, Any]:
+    """Distance and work of a whole period, from variables in units of friction."""
+    distance, work = (float(x[row[0, -1]]) / problem.gait.fraction for row in (layout.distance, layout.work))
+    return {"distance": distance, "work": work * unit}
+
+
+def second_order(answer: Answer) -> SecondOrder:
+    """The curvature of the Lagrangian at an answer, with all pairs of links kept apart."""
+    problem = answer.problem
+    space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
+    if v.size > _MOST_PARAMETERS:
+        return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
+    program = ReducedProgram(space.with_far(problem.body.far_pairs), answer.delta)
+    program.place_rows(v)
+    found, size = curvature(program, v), abs(answer.value / program.stated(-1.0))
+    if not found.kkt_error < _NEAR * size:
+        return replace(NOT_MEASURED, why_not="not measured, where the gradient of the reduced program does not vanish")
+    return SecondOrder(found.smallest / size, found.error / size, found.n_free)
 
 
 def _limited(reduced: ReducedProgram, program: GaitProgram) -> GaitProgram:
@@ -156,13 +237,13 @@ def _limited(reduced: ReducedProgram, program: GaitProgram) -> GaitProgram:
     return program if reduced.actuators is None else reduced.actuators.laid_on(program)
 
 
-def _multipliers(found: Found, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:
+def _multipliers(reduced: ReducedProgram, conditions: Stationarity, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
-    conditions, space, reached = found.conditions, found.space, len(found.space.problem.at_least)
+    space, reached = reduced.space, len(reduced.space.problem.at_least)
     of_period, on_rows = np.split(conditions.on_rows, [conditions.on_rows.size - space.row_lower.size])
-    if found.program is not None and found.program.actuators is not None:
-        limited = found.program.actuators
+    if reduced.actuators is not None:
+        limited = reduced.actuators
         of_period, on_actuators = np.split(of_period, [of_period.size - limited.placed.shape[1]])
         lam_g[program.groups[ACTUATORS]] = limited.multipliers(on_actuators)
     if reached:

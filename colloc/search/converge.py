@@ -1,132 +1,52 @@
-"""The search for an optimum in the reduced space: delta falls, checks move, the mesh is refined, by quasi-Newton SQP.
+"""A gait optimised at one delta on one mesh, in the reduced space, by quasi-Newton SQP: what every stage of a search repeats.
 
-At every delta the gait is optimised within a box round the last one, with the shape checks at their worst instants; they are
-moved, and the gait optimised again, until it rests. At the final delta a smooth body gets as many panels as the gait needs, and
-a mesh is planned for it (`colloc.verification.refinement`); the gait is optimised on those, until it needs no other.
+The gait is optimised within a box round the last one, with the shape checks at their worst instants; they are moved, and the
+gait optimised again, until checks, box and gait rest.
+
+Links more than two apart are kept from crossing only where they turn out to cross. A chain of n links has (n - 2)(n - 3)/2
+such pairs and few of them ever come near each other. So a problem is solved without them, the gait is checked against every
+pair, the pairs that cross are constrained from then on, and the problem is solved again (a cutting-plane method).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import Pairs
 from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
-from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
-from colloc.reduced.spaces import space_near
-from colloc.search.far_contact import crossing_pairs, last_free
+from colloc.results.answer import Step
+from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum, replace_keeping_space
+from colloc.search.run import this_run
 from colloc.system.errors import NotConvergedError
-from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
-FACTOR = 0.2
 FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
 """Boxes round the last gait [rad], at the first level, later ones, and on a refined mesh: far enough for an optimum to move,
 not so far that a step ends in another world. A gait that ends on the edge of its box goes on from there."""
-VERY_ROUGH, ROUGH, FINE = 1e-5, 1e-8, 1e-14
-"""Accuracy of the objective at which SQP stops: to tell gaits apart, on the way, and at the final delta."""
-STATIONARY = {VERY_ROUGH: 1e-1, ROUGH: 1e-3, FINE: 1e-6}
-"""What the first-order conditions have to keep to then; the objective is off by the square of that."""
-KINK_RADIUS, _WIDEST, _MISSED = 1e-6, 1e-5, 1e-8
-"""Of the points whose gradients are taken together [rad]: as far as an optimum without a kink may be missed by; more where the
-slopes at a kink are so small that the objective is not missed by more than the last."""
-_AROUND = (2, 16)
-"""How many those are per parameter; the second where several kinks meet."""
-_GROWTH, _FEW_POINTS = 3, 300
-"""A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
-_DRIER, _LOST = 0.1, 0.5
-_ROUNDS, _AT_REST = {VERY_ROUGH: 2, ROUGH: 12, FINE: 12}, 1e-8
-_ITERATIONS = {VERY_ROUGH: 60, ROUGH: 150, FINE: 150}
-"""Of SQP, each time checks are moved. A start that needs more to be told apart is told apart as it is."""
-_ADMISSIBLE, _ALIKE = 1e-8, 1e-3
-NOWHERE = 1e-4
-"""Value of the objective on a slope up to which a gait goes nowhere."""
+STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
+_ADMISSIBLE, _AT_REST = 1e-8, 1e-8
+"""By how much checks may be exceeded where a gait rests [rad], and by how much it may still move [rad]."""
+_ALIKE = 1e-3
+"""Relative change of the violation below which moving the checks does not help."""
 _SWINGS = 0.1
 """Part of the way of a round that the gait does not come back in the next, where it only goes to and fro."""
-_MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
-_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
-"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
-half, then a quarter of it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """A gait that SQP came to rest at.
-
-    Attributes
-    ----------
-    space : SearchSpace
-        Its class on a mesh, with the checks placed.
-    v : (n,)
-    delta : float
-    objective : float
-        Minus the value of the problem's objective.
-    conditions : Stationarity
-        Of the reduced program.
-    accuracy : float
-        Of it that was asked for.
-    program : ReducedProgram, optional
-        Whose conditions these are; by default the program of that space at that delta.
-    on_kink : bool
-        Whether the conditions hold on the sides of a kink, not at v itself.
-    iterations, evaluations : int
-    seconds : float
-    curvature : (n, n), optional
-        What SQP knows of the Lagrangian's second derivatives.
-    """
-
-    space: SearchSpace
-    v: np.ndarray
-    delta: float
-    objective: float
-    conditions: Stationarity
-    accuracy: float
-    iterations: int
-    evaluations: int
-    seconds: float
-    curvature: np.ndarray | None = None
-    program: ReducedProgram | None = None
-    on_kink: bool = False
-
-    @classmethod
-    def at(cls, space: SearchSpace, v: np.ndarray, delta: float) -> Found:
-        """A gait as it is, to go on from."""
-        program = ReducedProgram(space, delta)
-        program.place_rows(v)
-        return cls(space, v, delta, program.objective(v), stationarity(program, v), ROUGH, 0, 0, 0.0, program=program)
-
-    @property
-    def optimal(self) -> bool:
-        """First-order conditions hold in the reduced space, as far as the accuracy asked for needs."""
-        c = self.conditions
-        return max(c.kkt_error, c.complementarity) < STATIONARY[self.accuracy] and c.violation < STATIONARY[FINE]
-
-    @property
-    def gait(self) -> AnyGait:
-        return self.space.member(self.v)
-
-
-Report = Callable[[Found], None]
-
-
-def kink_or_not(found: Found) -> Found:
-    """The gait as it is; where the conditions do not hold at it but around it, it rests on a kink, and they are those."""
-    if found.optimal:
-        return found
-    program = found.program or ReducedProgram(found.space, found.delta)
-    radius = min(max(KINK_RADIUS, _MISSED / found.conditions.kkt_error), _WIDEST)
-    for points in _AROUND:
-        conditions = stationarity_around(program, found.v, found.conditions, radius, points)
-        around = replace(found, conditions=conditions, on_kink=True)
-        if around.optimal:
-            return around
-    return found
+KINK_RADIUS, _WIDEST, _MISSED = 1e-6, 1e-5, 1e-8
+"""Radius [rad] of the ball in which gradients are sampled at a suspected kink: an optimum without a kink may be missed by as
+much. It is larger, up to the second, where the slopes are so small that the objective is missed by no more than the third."""
+_AROUND = (2, 16)
+"""How many gradients are sampled per parameter; the second where several kinks meet."""
+PHASES = 1000
+"""Phases of the solved part of the period at which all pairs of links are checked; the certificate checks 20000 a period."""
+TOUCHING = 1e-8
+"""Penetration [body lengths] that counts as contact, not as crossing."""
+_FRACTIONS = np.linspace(1.0, 0.0, 21)
 
 
 class Placed(NonlinearProgram, Protocol):
@@ -154,33 +74,32 @@ def at_rest(
     program: Placed,
     v: np.ndarray,
     radius: float,
-    accuracy: float,
+    effort: Effort,
     curvature: np.ndarray | None = None,
-    rounds: int | None = None,
 ) -> Rested:
-    """Optimise from v until rows, box and gait rest, or for so many rounds."""
+    """Optimise from v ``(n,)`` until rows, box and gait rest, or for as many rounds as the effort allows."""
     iterations = evaluations = 0
     program.place_rows(v)
     violation, ends = np.inf, [v]
-    for _ in range(rounds or _ROUNDS[accuracy]):
+    for _ in range(effort.rounds):
         before, worse = v, violation
         fresh = curvature is None
         if len(ends) > 1:
             # with the instants held, every round overshoots where they move far with the gait
             program.space.follow_worst()
-        if fresh and accuracy < VERY_ROUGH:
+        if fresh and effort.accuracy < SKETCH.accuracy:
             curvature = program.space.metric(v)
-        result = minimised(program, v, radius, accuracy, _ITERATIONS[accuracy], curvature)
+        result = minimised(program, v, radius, effort.accuracy, effort.iterations, curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
         admissible = program.place_rows(v) <= _ADMISSIBLE
         conditions = stationarity(program, v)
-        stationary = conditions.kkt_error < STATIONARY[accuracy]
+        stationary = conditions.kkt_error < effort.kkt_error
         # what was learned across kinks may end the search too early: then it begins anew
         curvature = result.curvature if stationary else None
         if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < _AT_REST)):
             break
         violation = conditions.violation
-        if violation > STATIONARY[ROUGH] and abs(violation - worse) < _ALIKE * worse and not result.on_edge:
+        if violation > ROUGH.kkt_error and abs(violation - worse) < _ALIKE * worse and not result.on_edge:
             break  # the rows contradict each other near here
         ends.append(v)
         if len(ends) > 2 and np.abs(v - ends[-3]).max() < _SWINGS * np.abs(v - before).max():
@@ -188,144 +107,167 @@ def at_rest(
     return Rested(v, result.objective, conditions, iterations, evaluations, curvature)
 
 
-def settled(
+def optimum_at(
+    program: ReducedProgram,
+    v: np.ndarray,
+    effort: Effort,
+    conditions: Stationarity,
+    *,
+    iterations: int = 0,
+    seconds: float = 0.0,
+    curvature: np.ndarray | None = None,
+) -> Optimum:
+    """The value of a gait with given first-order conditions, whose rows are placed."""
+    space, gait, objective = program.space, program.space.member(v), program.objective(v)
+    kept = max(conditions.kkt_error, conditions.complementarity) < effort.kkt_error
+    period = program.period(v)
+    step = Step(
+        program.delta,
+        space.mesh.n,
+        *(program.stated(objective), period["distance"], period["work"], conditions.kkt_error),
+        optimal=kept,
+        status=STATIONARY if kept else NOT_STATIONARY,
+        iterations=iterations,
+        seconds=seconds,
+    )
+    found = Optimum(
+        space.problem,
+        space.given,
+        space.far,
+        v,
+        gait,
+        *(program.delta, objective, conditions.kkt_error, conditions.violation, conditions.complementarity),
+        effort=effort,
+        iterations=iterations,
+        seconds=seconds,
+        step=step,
+        curvature=curvature,
+        history=(step,),
+    )
+    found.__dict__["space"] = space
+    return found
+
+
+def as_it_is(space: SearchSpace, v: np.ndarray, delta: float) -> Optimum:
+    """A gait that nothing was optimised at, to go on from."""
+    program = ReducedProgram(space, delta)
+    program.place_rows(v)
+    return optimum_at(program, v, ROUGH, stationarity(program, v))
+
+
+def converged(
     space: SearchSpace,
     v: np.ndarray,
     delta: float,
     radius: float,
-    accuracy: float,
+    effort: Effort,
     curvature: np.ndarray | None = None,
-    rounds: int | None = None,
-) -> Found:
-    """Optimise from v at one delta on one mesh until checks, box and gait rest, or for so many rounds."""
-    begin, program = time.perf_counter(), ReducedProgram(space, delta)
+) -> Optimum:
+    """The gait where SQP comes to rest at one delta on one mesh.
+
+    Parameters
+    ----------
+    space : SearchSpace
+        A class of gaits on a mesh.
+    v : (n,)
+        Where it begins; need not be a member of the class.
+    delta : float
+        In the units of the class.
+    radius : float
+        How far a parameter may go in one round [rad].
+    effort : Effort
+    curvature : (n, n), optional
+        What is known of the Lagrangian's second derivatives.
+
+    Raises
+    ------
+    NotConvergedError
+        If friction does not hold the body on its slope all the way.
+    """
+    given = (space.problem, space.given, space.far, v, delta, radius, effort, curvature)
+
+    def compute() -> Optimum:
+        begin, here = time.perf_counter(), space
+        rested, program = _rested(here, v, delta, radius, effort, curvature)
+        while new := tuple(p for p in crossing_pairs(here, rested.v) if p not in here.far):
+            free = last_free(here, v, rested.v)
+            here = here.with_far(here.far + new)
+            rested, program = _rested(here, free, delta, radius, effort, None)
+        return optimum_at(
+            program,
+            rested.v,
+            effort,
+            rested.conditions,
+            iterations=rested.iterations,
+            seconds=time.perf_counter() - begin,
+            curvature=rested.curvature,
+        )
+
+    return this_run().kept("converged", given, compute)
+
+
+def _rested(
+    space: SearchSpace, v: np.ndarray, delta: float, radius: float, effort: Effort, curvature: np.ndarray | None
+) -> tuple[Rested, ReducedProgram]:
+    program = ReducedProgram(space, delta)
     if space.problem.slope is not None and np.isnan(program.objective(v)):
         raise NotConvergedError(
             "friction does not hold the body on the slope all the way, or its joints brake: take a gentler one."
         )
-    rested = at_rest(program, v, radius, accuracy, curvature, rounds)
-    v, objective, conditions, iterations, evaluations, curvature = rested
-    counts = iterations, evaluations, time.perf_counter() - begin
-    return Found(space, v, delta, objective, conditions, accuracy, *counts, curvature, program)
+    return at_rest(program, v, radius, effort, curvature), program
 
 
-def settled_apart(
-    space: SearchSpace,
-    v: np.ndarray,
-    delta: float,
-    radius: float,
-    accuracy: float,
-    curvature: np.ndarray | None = None,
-    rounds: int | None = None,
-) -> Found:
-    """The same, keeping pairs of links more than two apart from crossing as they turn out to cross."""
-    found = settled(space, v, delta, radius, accuracy, curvature, rounds)
-    while new := tuple(p for p in crossing_pairs(found.space, found.v) if p not in found.space.far):
-        begin = last_free(found.space, v, found.v)
-        space = found.space.with_far(found.space.far + new)
-        found = settled(space, begin, delta, radius, accuracy, rounds=rounds)
-    return found
+def with_kink(optimum: Optimum) -> Optimum:
+    """The same; where the conditions do not hold at the gait but around it, it rests on a kink, and they are those."""
+    if optimum.optimal:
+        return optimum
+    program = optimum.program()
+    conditions = stationarity(program, optimum.v)
+    radius = min(max(KINK_RADIUS, _MISSED / conditions.kkt_error), _WIDEST)
+    for points in _AROUND:
+        around = stationarity_around(program, optimum.v, conditions, radius, points)
+        found = replace_keeping_space(
+            optimum,
+            kkt_error=around.kkt_error,
+            violation=around.violation,
+            complementarity=around.complementarity,
+            on_kink=True,
+        )
+        if found.optimal:
+            step = replace(optimum.step, kkt_error=around.kkt_error, optimal=True, status=STATIONARY)
+            return replace_keeping_space(found, step=step, history=(*optimum.history[:-1], step))
+    return optimum
 
 
-def deltas(problem: Problem, first: float) -> list[float]:
-    """Levels from a first delta down to the problem's."""
-    levels = [first]
-    while levels[-1] > problem.delta:
-        below = FACTOR * levels[-1]
-        levels.append(below if below > 1.2 * problem.delta else problem.delta)
-    return levels
+class Members(Protocol):
+    """A class of gaits by parameters."""
+
+    @property
+    def problem(self) -> Problem: ...
+
+    def member(self, parameters: np.ndarray) -> AnyGait:
+        """The gait of a parameter vector."""
 
 
-def descended(found: Found, problem: Problem, report: Report, rounds: int | None = None) -> Found:
-    """From a gait at some delta down to the problem's, on the same mesh; `rounds` as in `settled`."""
-    for delta in deltas(problem, found.delta)[1:]:
-        found = settled_apart(found.space, found.v, delta, NEXT_RADIUS, ROUGH, found.curvature, rounds)
-        report(found)
-    return found
+def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
+    """Pairs of links more than two apart that cross, or pass through each other, in a gait.
 
-
-def finer_body(found: Found) -> tuple[SearchSpace, np.ndarray] | None:
-    """The class with the body on as many panels as the gait needs, and its parameters; None if its own will do.
-
-    They do where half as many change the efficiency by no more than six times what the mesh may: every doubling was seen to
-    leave a sixth or less, with a point at rest that moves over the panels. The gait will still move, so panels grow slowly.
+    Judged by plain intersection: the smooth `mechanics.contact.clearance` keeps a small distance, and constraining pairs that
+    only touch makes problems harder for nothing (a folded chain of equal links has such contacts).
     """
-    space, v, here, problem = found.space, found.v, found.objective, found.space.problem
-    panels, mesh = problem.body.panels, space.phase_mesh(found.gait)
-    if panels == 0:
-        return None
-
-    def on(count: int) -> tuple[SearchSpace, np.ndarray, float]:
-        body = problem.body.on_panels(count)
-        space, v = space_near(problem.with_(body=body), found.gait, mesh.edges, mesh.scheme.name)
-        return space.with_far(found.space.far), v, ReducedProgram(space, found.delta).objective(v)
-
-    before, most = on(panels // 2)[2], min(_PANELS_GROW * panels, _MOST_PANELS)
-    while abs(here - before) > _LEFT * problem.mesh_tolerance * abs(here) and 2 * panels <= most:
-        panels, before = 2 * panels, here
-        space, v, here = on(panels)
-    return None if space is found.space else (space, v)
+    body, t = space.problem.body, np.linspace(0.0, space.problem.gait.fraction, PHASES)
+    angles = space.member(v).angles(t)
+    return tuple(
+        pair
+        for pair in body.far_pairs
+        if max(body.crossing_depth(angles, [pair]).max(), body.passing_depth(angles, [pair])) > TOUCHING
+    )
 
 
-def refined(found: Found, report: Report) -> tuple[Found, str]:
-    """The gait on planned meshes until it needs no other, and what is missing if that does not happen.
-
-    On the way it need not be optimised to the last digit: the next mesh moves it by more.
-    """
-    refines, kept = found.space.problem.mesh_tolerance > 0, np.empty(0)
-    count = 0
-    if found.space.problem.slope is not None and found.objective > -NOWHERE:
-        return found, ""  # relative to nothing, no mesh is fine enough
-    while True:
-        finer = finer_body(found) if refines else None
-        plan = _plan(found, kept, count) if refines and finer is None else None
-        if finer is None and plan is None and found.accuracy == FINE:
-            return found, ""
-        if count == _MESHES:
-            return found, f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
-        space, v, radius, accuracy = found.space, found.v, NEXT_RADIUS, FINE
-        if finer is not None:
-            (space, v), radius, accuracy = finer, REMESH_RADIUS, ROUGH
-        if plan is not None:
-            count, kept, radius = count + 1, np.concatenate([kept, plan.kept]), REMESH_RADIUS
-            space = space.remeshed(found.gait, plan.edges, plan.scheme)
-            accuracy = FINE if count > _SAME_AIM else ROUGH
-            try:
-                v = space.parameters(found.gait)
-            except NotConvergedError:
-                v = space.laid(found.gait)  # breaks a row a little, as its own mesh lets it
-        known = found.curvature if found.v.size == v.size else None
-        found = settled_apart(space, v, found.delta, radius, accuracy, known)
-        report(found)
-
-
-def _plan(found: Found, kept: np.ndarray, count: int) -> MeshPlan | None:
-    """A mesh on which the gait is accurate enough; None if its own will do."""
-    problem, gait, aim = found.space.problem, found.gait, AIM * 0.5 ** min(max(0, count - _SAME_AIM), _HALVINGS)
-    mesh, delta = found.space.phase_mesh(gait), found.delta * gait.delta_unit
-    points = min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS)
-    nested, tolerance = count >= _SAME_AIM, problem.mesh_tolerance
-    return planned_mesh(problem, mesh, gait, delta, tolerance, kept=kept, nested=nested, aim=aim, most_points=points)
-
-
-def is_viscous(found: Found) -> bool:
-    """Whether the gait owes its value to delta: at a tenth of it half is lost. Slow parts of a retraced gait do that."""
-    dry = ReducedProgram(found.space, _DRIER * found.delta).objective(found.v)
-    return not dry <= found.objective + (1 - _LOST) * abs(found.objective)
-
-
-def begun(space: SearchSpace, v: np.ndarray, levels: list[float], accuracy: float) -> Found:
-    """The gait of the first level; where that is a viscous one, the start is tried at the next delta."""
-    for delta in levels:
-        found = settled_apart(space, v, delta, FIRST_RADIUS, accuracy)
-        if not is_viscous(found):
-            break
-    return found
-
-
-def searched(problem: Problem, start: AnyGait, report: Report) -> tuple[Found, str]:
-    """An optimum of a problem from a start, on a mesh that meets its tolerance; the second is what is missing, or ""."""
-    space, v = space_near(problem, closed_gait(problem, start, problem.delta_start))
-    found = begun(space, v, deltas(problem, problem.delta_start), ROUGH)
-    report(found)
-    return refined(descended(found, problem, report), report)
+def last_free(space: Members, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:
+    """Gait parameters on the way from those of a free gait to those of one with crossing links, as far as links stay apart."""
+    for fraction in _FRACTIONS:
+        between = free + fraction * (crossing - free)
+        if not crossing_pairs(space, between):
+            return between
+    return free

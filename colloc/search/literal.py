@@ -6,66 +6,89 @@ search in the reduced space is measured against.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
-from colloc.gaits.friction_unit import in_friction_units, restated
+from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, nearest_parameters, transcribed
-from colloc.results.answer import Level
-from colloc.results.solution import Solution
-from colloc.search.confirm import level_of
-from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS, deltas
+from colloc.results.answer import Answer, Step
+from colloc.search.confirm import answer_of, second_order
+from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS
+from colloc.search.descend import levels
 from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.ipopt import NlpResult, Solver
+from colloc.search.run import this_run
+from colloc.system.errors import ProblemError
 from colloc.verification.refinement import planned_mesh
 
 _MESHES, _ITERATIONS = 8, 1500
 """Meshes at the final delta, and iterations of IPOPT on each, at most: from a guess it may need five hundred."""
 
 
-def literal_optimum(problem: Problem, on_level: Callable[[Level], None] | None = None) -> Solution:
-    """A local optimum by IPOPT alone, not certified yet; it ends at the first level that fails. `on_level` is called with every
-    `Level` as it ends."""
-    begin, stated, (problem, unit) = time.perf_counter(), problem, in_friction_units(problem)
-    levels: list[Level] = []
-    program = transcribed(problem)
-    parameters, radius, message = nearest_parameters(program, problem.guess), FIRST_RADIUS, ""
+def literal_answer(problem: Problem) -> Answer:
+    """A local optimum by IPOPT alone; it ends at the first level that fails.
 
-    def solved(delta: float) -> NlpResult:
-        nonlocal message
-        x = feasible_point(program, parameters, delta)
-        solver = Solver(heading(program, x), {"max_iter": _ITERATIONS})
-        result = solver.solve(x, delta, None, radius)
-        levels.append(restated(level_of(program, result, delta, problem.formulation), unit, problem.objective))
-        if on_level is not None:
-            on_level(levels[-1])
-        message = "" if result.optimal else _why(solver, x, result, delta)
-        return result
+    Parameters
+    ----------
+    problem : Problem
 
-    for delta in deltas(problem, problem.delta_start):
-        result = solved(delta)
-        if not result.optimal:
-            break
-        parameters, radius = result.x[program.layout.parameters[:, 0]], NEXT_RADIUS
+    Returns
+    -------
+    Answer
+        Its message says what failed.
+
+    Raises
+    ------
+    ProblemError
+        For a class of relaxed gaits, which has no full program.
+    """
+    if problem.gait.mixes:
+        raise ProblemError("relaxed gaits have no full program; leave --search full out.")
+    scaled, unit = in_friction_units(problem)
+    program = transcribed(scaled)
+    parameters, radius, history = nearest_parameters(program, scaled.guess), FIRST_RADIUS, tuple[Step, ...]()
+    below = levels(scaled, scaled.delta_start)
+    for done, delta in enumerate(below):
+        this_run().told("descend", done, len(below))
+        answer = _solved(problem, program, parameters, delta, radius, unit)
+        history = (*history, answer.step)
+        if not answer.optimal:
+            return replace(answer, history=history)
+        parameters, radius = answer.x[program.layout.parameters[:, 0]], NEXT_RADIUS
     kept = np.empty(0)
-    for _ in range(_MESHES if result.optimal and problem.mesh_tolerance > 0 else 0):
+    for done in range(_MESHES if problem.mesh_tolerance > 0 else 0):
+        this_run().told("refine", done, _MESHES)
         gait = program.member(parameters)
         mesh = program.phase_mesh(gait)
         plan = planned_mesh(problem, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
         if plan is None:
             break
         kept = np.concatenate([kept, plan.kept])
-        program = transcribed(problem.with_(scheme=plan.scheme), gait, plan.edges)
-        parameters, radius = nearest_parameters(program, gait), REMESH_RADIUS
-        result = solved(delta)
-        if not result.optimal:
-            break
-        parameters = result.x[program.layout.parameters[:, 0]]
-    return Solution(stated, levels, seconds=time.perf_counter() - begin, message=message)
+        program = transcribed(scaled.with_(scheme=plan.scheme), gait, plan.edges)
+        answer = _solved(problem, program, nearest_parameters(program, gait), delta, REMESH_RADIUS, unit)
+        history = (*history, answer.step)
+        if not answer.optimal:
+            return replace(answer, history=history)
+        parameters = answer.x[program.layout.parameters[:, 0]]
+    return replace(answer, second_order=second_order(answer), history=history)
+
+
+def _solved(problem: Problem, program: GaitProgram, parameters: np.ndarray, delta: float, radius: float, unit: float) -> Answer:
+    """The full program solved from the gait of some parameters."""
+
+    def compute() -> Answer:
+        x = feasible_point(program, parameters, delta)
+        solver = Solver(heading(program, x), {"max_iter": _ITERATIONS})
+        result = solver.solve(x, delta, None, radius)
+        answer = answer_of(problem, program, result, delta, unit)
+        return answer if result.optimal else replace(answer, message=_why(solver, x, result, delta))
+
+    given = (problem, parameters, delta, radius, program.mesh.edges, program.mesh.scheme.name)
+    return this_run().kept("literal", given, compute)
 
 
 def _why(solver: Solver, x: np.ndarray, result: NlpResult, delta: float) -> str:

@@ -9,19 +9,20 @@ import numpy as np
 
 from colloc.collocation.layout import problem_layout
 from colloc.collocation.warm_start import balanced_variables
+from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.answer import PRESCRIBED, REALISED, Level
+from colloc.results.answer import PRESCRIBED, REALISED, Answer, Step
 from colloc.verification.refinement import planned_mesh
 
 _MESHES = 4
 
 
-def measured(problem: Problem) -> tuple[Level, str]:
-    """What a prescribed motion achieves on a mesh that meets the problem's tolerance, and what is missing, or ""."""
+def prescribed_answer(problem: Problem) -> Answer:
+    """What a prescribed motion achieves on a mesh that meets the problem's tolerance; its message says what is missing."""
     begin, gait = time.perf_counter(), problem.gait.member(np.empty(0), problem.body.n_joint)
     mesh, message = Mesh(scheme(problem.scheme), problem.gait.edges(problem.intervals)), ""
     kept = np.array(problem.gait.stages)
@@ -31,22 +32,44 @@ def measured(problem: Problem) -> tuple[Level, str]:
             break
         mesh = Mesh(scheme(plan.scheme), plan.edges)
         message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
-    return replace(_level(problem, mesh, gait, np.empty(0), PRESCRIBED), seconds=time.perf_counter() - begin), message
+    answer = replace(as_it_is(problem, mesh, gait, np.empty(0), PRESCRIBED), message=message)
+    answer = replace(answer, seconds=time.perf_counter() - begin)
+    return replace(answer, history=(answer.step,))
 
 
-def realised(problem: Problem, gait: Corners) -> Level:
+def realised(problem: Problem, gait: Corners, history: tuple[Step, ...]) -> Answer:
     """What a polygon achieves with an interval for every side; the problem's class is that of finite gaits."""
-    level = _level(problem, Mesh(scheme(problem.scheme), gait.phases), gait, gait.vertices.ravel(order="F"), REALISED)
-    return replace(level, knots=gait.phases)
+    mesh = Mesh(scheme(problem.scheme), gait.phases)
+    answer = as_it_is(problem, mesh, gait, gait.vertices.ravel(order="F"), REALISED)
+    return replace(answer, knots=gait.phases, history=(*history, answer.step))
 
 
-def _level(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, word: str) -> Level:
-    """The gait with everything else following from its balance."""
-    begin, layout = time.perf_counter(), problem_layout(problem, mesh)
-    x = balanced_variables(problem, layout, mesh, gait, parameters, problem.delta)
-    periods, seconds = 1.0 / problem.gait.fraction, time.perf_counter() - begin
+def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, word: str) -> Answer:
+    """A gait with everything else following from its balance."""
+    scaled, unit = in_friction_units(problem)
+    layout = problem_layout(scaled, mesh)
+    x = balanced_variables(scaled, layout, mesh, gait, parameters, problem.delta)
+    periods = 1.0 / problem.gait.fraction
     distance, work = (periods * float(x[row[0, -1]]) for row in (layout.distance, layout.work))
-    return Level(
-        problem.delta, mesh.edges, x, np.zeros_like(x), np.empty(0), distance / work, distance, work,
-        0.0, 0.0, 0.0, word, True, 0, seconds, seconds, mesh.scheme.name, word,
-    )  # fmt: skip
+    return Answer(
+        problem,
+        gait,
+        problem.delta,
+        edges=mesh.edges,
+        scheme=mesh.scheme.name,
+        knots=None,
+        x=x,
+        lam_x=np.zeros_like(x),
+        lam_g=np.empty(0),
+        value=distance / (work * unit),
+        distance=distance,
+        work=work * unit,
+        kkt_error=0.0,
+        violation=0.0,
+        complementarity=0.0,
+        status=word,
+        optimal=True,
+        iterations=0,
+        seconds=0.0,
+        program=word,
+    )

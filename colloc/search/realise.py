@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -74,7 +73,6 @@ def realised_gaits(
     gait: Mixture,
     repeats: tuple[int, ...],
     tends_to: float = 0.0,
-    report: Callable[[str], object] = lambda _: None,
 ) -> tuple[Realised, ...]:
     """Finite gaits for several numbers of repeats, of either sense of their loops the better one.
 
@@ -85,7 +83,6 @@ def realised_gaits(
     wanted = list(repeats)
     while wanted:
         m = wanted.pop(0)
-        report(f"certifying {m} repeats")
         both = []
         for sense in (1, -1):
             corners = kept_inside(problem, gait.realised(m, sense))

@@ -6,10 +6,11 @@ where they would help most (`prices`). Both leave the gait as it is, and give th
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +21,16 @@ from colloc.gaits.relaxed import Mixture
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.results.answer import Alternative
+from colloc.results.answer import Alternative, Answer
 from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
-from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, ROUGH, VERY_ROUGH, Found, deltas, settled_apart
-from colloc.search.explore import starting_gaits
+from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, converged
+from colloc.search.descend import levels
+from colloc.search.explore import Exploration, starting_gaits
+from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum
 from colloc.search.prescribed import realised
-from colloc.search.realise import realised_gaits, relaxed_certificate
+from colloc.search.realise import kept_inside, realised_gaits, relaxed_certificate
+from colloc.search.run import this_run
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 
 RELAXED_STARTS = 8
@@ -39,8 +43,8 @@ _DIRECTIONS, _SEED = 72, 1
 _IDLE = 1e-7
 _MESHES, _GAIN = 3, 2e-5
 """At the final delta, and what one must gain to be followed by another."""
-_ROUNDS = 2
-"""Of SQP on a mesh. For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value."""
+_SKETCH, _ROUGH = replace(SKETCH, rounds=2), replace(ROUGH, rounds=2)
+"""For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value: two rounds do."""
 
 
 def directions_tried(n_joint: int) -> np.ndarray:
@@ -52,17 +56,12 @@ def directions_tried(n_joint: int) -> np.ndarray:
     return points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
-def _mixtures(found: Found) -> MixtureSpace:
-    assert isinstance(found.space, MixtureSpace)
-    return found.space
-
-
-def prices(found: Found) -> tuple[np.ndarray, np.ndarray]:
+def prices(found: Optimum) -> tuple[np.ndarray, np.ndarray]:
     """What a unit of time in other directions would cost: slopes of -d/W, net of the rows, ``(n_piece, n_tried)``; and these.
 
     At a local optimum no price is negative, up to what the optimum is accurate to: mixing in another direction does not pay.
     """
-    space = _mixtures(found)
+    space: Any = found.space
     mixture, tried = space.member(found.v), directions_tried(space.n_joint)
     shape = (space.pieces, len(tried))
     more = Mixture(
@@ -73,15 +72,14 @@ def prices(found: Found) -> tuple[np.ndarray, np.ndarray]:
     )
     wide = MixtureSpace(space.problem, space.pieces, space.far, directions=more.durations.shape[1])
     w = wide.parameters(more)
-    space.move_checks(found.v)
     wide.move_checks(w)
-    on_rows = stationarity(ReducedProgram(space, found.delta), found.v).on_rows
+    on_rows = stationarity(found.program(), found.v).on_rows
     program = ReducedProgram(wide, found.delta)
     slopes = program.gradient(w) + on_rows @ program.row_slopes(w)
     return slopes[wide.time].reshape(more.durations.shape)[:, space.n_direction :], tried
 
 
-def readied(found: Found, pieces: int) -> tuple[MixtureSpace, np.ndarray]:
+def with_turned_directions(found: Optimum, pieces: int) -> tuple[MixtureSpace, np.ndarray]:
     """The gait on so many pieces, its idle directions turned to the cheapest one each: a start that is the same gait."""
     price, tried = prices(found)
     mixture = found.gait
@@ -93,18 +91,17 @@ def readied(found: Found, pieces: int) -> tuple[MixtureSpace, np.ndarray]:
             # the next one on another side
             best = best[best @ best[0] < 0.5]
     turned = Mixture(mixture.durations, directions, mixture.start, mixture.symmetry).split(pieces)
-    space = MixtureSpace(found.space.problem, len(turned.durations), found.space.far)
+    space = MixtureSpace(found.problem, len(turned.durations), found.far)
     return space, space.parameters(turned)
 
 
-def relaxed_gaits(
+def explore_relaxed(
     problem: Problem,
-    starts: int,
-    seconds: float = np.inf,
-    report: Callable[[str], object] = lambda _: None,
+    starts: int = RELAXED_STARTS,
+    goes_on: Callable[[], bool] = lambda: True,
     first: tuple = (),
     least_extent: float = 0.0,
-) -> list[tuple[Found, int]]:
+) -> Exploration:
     """Relaxed gaits at the problem's delta, most efficient first, and how many starts led to about each on few pieces.
 
     The first is a local optimum, the others are nearly.
@@ -115,10 +112,8 @@ def relaxed_gaits(
         Its class is `colloc.gaits.relaxed.Relaxed`; `intervals` are pieces of the part that is solved.
     starts : int
         The guess, known gaits and seeded samples (`colloc.search.explore.starting_gaits`).
-    seconds : float
-        Wall time after which no other start is begun or followed.
-    report : callable, optional
-        Told in words what is under way.
+    goes_on : callable
+        Whether there is time for another start, and another gait to be followed.
     first : tuple of gaits
         Tried before the others, beyond their number.
     least_extent : float
@@ -126,57 +121,61 @@ def relaxed_gaits(
 
     Raises
     ------
+    ProblemError
+        If anything but the efficiency is asked for.
     NotConvergedError
         If no start leads anywhere.
     """
-    begin, coarse = time.perf_counter(), max(6, round(_COARSE * problem.intervals))
-    known: list[Found] = []
-    for count, gait in enumerate((*first, *islice(starting_gaits(problem), starts)), 1):
-        if known and time.perf_counter() - begin > seconds:
+    if problem.objective != EFFICIENCY or problem.at_least or problem.rotation != 0:
+        raise ProblemError("relaxed gaits are measured by their efficiency alone; leave objective, rotation and at_least out.")
+    run, coarse, count = this_run(), max(6, round(_COARSE * problem.intervals)), starts + len(first)
+    known: list[Optimum] = []
+    for done, gait in enumerate((*first, *islice(starting_gaits(problem), starts))):
+        if known and not goes_on():
             break
-        report(f"trying start {count} of {starts + len(first)}")
+        run.told("explore", done, count, min(known, key=lambda f: f.objective, default=None))
         with suppress(CollocError):
             known.append(_tried(problem, gait, coarse))
 
-    def rank(found: Found) -> tuple[bool, float]:
+    def rank(found: Optimum) -> tuple[bool, float]:
         return found.gait.extent < least_extent, found.objective
 
     known.sort(key=rank)
-    ends: list[tuple[Found, int]] = []
+    ends: list[tuple[Optimum, int]] = []
     for found in _promising(known):
-        if ends and time.perf_counter() - begin > seconds:
+        if ends and not goes_on():
             break
-        report(f"following {-found.objective:.4f}")
         with suppress(CollocError):
-            ends.append((descended(found), sum(_alike(found, other) for other in known)))
+            ends.append((descend_relaxed(found), sum(_alike(found, other) for other in known)))
     if not ends:
         raise NotConvergedError("no start led to a relaxed gait; give another guess.")
     (best, count), *others = sorted(ends, key=lambda end: rank(end[0]))
-    report(f"refining {-best.objective:.4f}")
-    return [(refined(best), count), *others]
+    met = [(refine_relaxed(best), count), *others]
+    told = tuple(Alternative(f.value, f.delta, count, False, f.gait) for f, count in met)
+    return Exploration(tuple(found for found, _ in met), starts, told)
 
 
-def _alike(one: Found, other: Found) -> bool:
+def _alike(one: Optimum, other: Optimum) -> bool:
     """Whether two gaits on few pieces are the same, as far as their efficiency tells."""
     return abs(one.objective / other.objective - 1) <= _SAME
 
 
-def _tried(problem: Problem, gait: AnyGait, pieces: int) -> Found:
+def _tried(problem: Problem, gait: AnyGait, pieces: int) -> Optimum:
     """Where a start leads on few pieces, at the first two deltas."""
     if isinstance(gait, Mixture):
         gait = gait.split(pieces)
         pieces = len(gait.durations)
     space = MixtureSpace(problem, pieces)
-    levels = deltas(problem, problem.delta_start)
-    found = settled_apart(space, space.parameters(gait), levels[0], FIRST_RADIUS, VERY_ROUGH)
-    for delta in levels[1:2]:
-        found = settled_apart(*readied(found, pieces), delta, NEXT_RADIUS, VERY_ROUGH)
+    first, *others = levels(problem, problem.delta_start)
+    found = converged(space, space.parameters(gait), first, FIRST_RADIUS, _SKETCH)
+    for delta in others[:1]:
+        found = converged(*with_turned_directions(found, pieces), delta, NEXT_RADIUS, _SKETCH).after(*found.history)
     return found
 
 
-def _promising(known: list[Found]) -> list[Found]:
+def _promising(known: list[Optimum]) -> list[Optimum]:
     """The best few that differ in efficiency."""
-    chosen: list[Found] = []
+    chosen: list[Optimum] = []
     for found in known:
         if found.objective > _PROMISING * known[0].objective or len(chosen) == _FOLLOWED:
             break
@@ -185,65 +184,59 @@ def _promising(known: list[Found]) -> list[Found]:
     return chosen
 
 
-def descended(found: Found) -> Found:
+def descend_relaxed(found: Optimum) -> Optimum:
     """From a gait at some delta down to the problem's, on most of its pieces, roughly."""
-    problem = found.space.problem
-    for count, delta in enumerate(deltas(problem, found.delta)[1:]):
+    problem, run = found.problem, this_run()
+    below = levels(problem, found.delta)[1:]
+    for count, delta in enumerate(below):
+        run.told("descend", count, len(below), found)
         # where friction is smoothest the mixture is found, below it follows
-        accuracy = VERY_ROUGH if count else ROUGH
-        ready = readied(found, round(_MOST * problem.intervals))
-        found = settled_apart(*ready, delta, NEXT_RADIUS, accuracy, rounds=_ROUNDS)
+        effort: Effort = _SKETCH if count else _ROUGH
+        ready = with_turned_directions(found, round(_MOST * problem.intervals))
+        found = converged(*ready, delta, NEXT_RADIUS, effort).after(*found.history)
     return found
 
 
-def refined(found: Found) -> Found:
+def refine_relaxed(found: Optimum) -> Optimum:
     """The gait on all pieces, until another mesh of as many gains nothing."""
-    problem = found.space.problem
-    for _ in range(_MESHES):
+    problem, run = found.problem, this_run()
+    for count in range(_MESHES):
+        run.told("refine", count, _MESHES, found)
         before = found.objective
-        found = settled_apart(*readied(found, problem.intervals), found.delta, NEXT_RADIUS, ROUGH, rounds=_ROUNDS)
+        ready = with_turned_directions(found, problem.intervals)
+        found = converged(*ready, found.delta, NEXT_RADIUS, _ROUGH).after(*found.history)
         if found.objective > before - _GAIN:
             break
     return found
 
 
-def best_relaxed_gait(
-    problem: Problem,
-    starts: int,
-    repeats: tuple[int, ...] = (1, 2, 4),
-    seconds: float = np.inf,
-    report: Callable[[str], object] = lambda _: None,
-    first: tuple = (),
-) -> Solution:
-    """The best relaxed gait that so many starts lead to, and finite gaits near it, all certified.
+def realised_solution(optimum: Optimum, repeats: tuple[int, ...] = (1, 2, 4)) -> Solution:
+    """A relaxed gait, and finite gaits near it, with their certificates; the best of these is the answer.
 
     Parameters
     ----------
-    problem, starts, seconds, report, first
-        See `relaxed_gaits`.
+    optimum : Optimum
+        Of a class of relaxed gaits.
     repeats : tuple of int
         Of the directions on every piece, in the finite gaits; more if these lose more than half a percent.
     """
-    if problem.objective != EFFICIENCY or problem.at_least or problem.rotation != 0:
-        raise ProblemError("relaxed gaits are measured by their efficiency alone; leave objective, rotation and at_least out.")
-    begin = time.perf_counter()
-    ends = relaxed_gaits(problem, starts, seconds, report, first)
-    solution = certified(ends[0][0], repeats, report)
-    solution.seconds, solution.starts = time.perf_counter() - begin, starts
-    solution.others = tuple(Alternative(-f.objective, f.delta, count, False, f.gait) for f, count in ends)
-    return solution
-
-
-def certified(best: Found, repeats: tuple[int, ...] = (1,), report: Callable[[str], object] = lambda _: None) -> Solution:
-    """A relaxed gait, and finite gaits near it, with their certificates."""
-    report("certifying the relaxed gait")
-    problem, conditions, gait = best.space.problem, best.conditions, best.gait
+    problem, gait, run = optimum.problem, optimum.gait, this_run()
+    run.told("certify", 0, 1 + len(repeats), optimum)
     # where the class has another direction to give
     free = (gait.durations <= _IDLE).any(axis=1)
-    price = float(prices(best)[0][free].min(initial=0.0))
-    optimality = Optimality(-best.objective, conditions.kkt_error, conditions.violation, price, best.iterations)
-    certificate = relaxed_certificate(problem, gait, optimality)
-    finite = realised_gaits(problem, gait, repeats, certificate.efficiency, report)
-    relaxed = Relaxation(gait, optimality, certificate, finite)
-    level = realised(problem.with_(gait=problem.gait.finite), relaxed.best.gait)
-    return Solution(problem, [level], relaxed.best.certificate, best.seconds, message=relaxed.message, relaxed=relaxed)
+    price = float(prices(optimum)[0][free].min(initial=0.0))
+    optimality = Optimality(optimum.value, optimum.kkt_error, optimum.violation, price, optimum.iterations)
+
+    def certified() -> Relaxation:
+        certificate = relaxed_certificate(problem, gait, optimality)
+        return Relaxation(gait, optimality, certificate, realised_gaits(problem, gait, repeats, certificate.efficiency))
+
+    relaxed = run.kept("realise", (optimum, optimality, repeats), certified)
+    answer = realised(problem.with_(gait=problem.gait.finite), relaxed.best.gait, optimum.history)
+    return Solution(problem, answer, relaxed.best.certificate, message=relaxed.message, relaxed=relaxed)
+
+
+def unrefined(optimum: Optimum) -> Answer:
+    """The finite gait that repeats the directions of a relaxed one once: where there is no time for more."""
+    problem = optimum.problem.with_(gait=optimum.problem.gait.finite)
+    return realised(problem, kept_inside(optimum.problem, optimum.gait.realised(1)), optimum.history)

@@ -1,318 +1,225 @@
-"""From a problem to a certified solution: search in the reduced space, answer by the full program, certificate."""
+"""From a problem to a certified solution: the stages of a search, in order.
+
+    explore -> descend -> refine -> confirm -> certify -> choose
+
+Each is a function of one value that returns the next one, in a module of its name, and can be called by itself. Only here is
+decided what comes after what, how often something is tried again, how long all of it may take, and what an interrupt leaves.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from colloc.gaits.friction_unit import in_friction_units, in_unit, restated
-from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import on_speed_floor
-from colloc.gaits.symmetry import NONE
-from colloc.reduced.spaces import space_near
-from colloc.results.answer import Level, SearchStep
-from colloc.results.solution import SOLVED, Solution
+from colloc.reduced.spaces import space_about
+from colloc.results.answer import Answer
+from colloc.results.solution import Solution
 from colloc.search.certify import certify
-from colloc.search.confirm import answer, level_found
-from colloc.search.converge import FACTOR, NOWHERE, Found, descended, kink_or_not, refined, searched
-from colloc.search.explore import STARTS, best_of
-from colloc.search.literal import literal_optimum
-from colloc.search.prescribed import measured
-from colloc.search.relaxed import RELAXED_STARTS, best_relaxed_gait
-from colloc.search.saddles import below_saddle
-from colloc.system.errors import NotConvergedError
+from colloc.search.choose import Certified, choose, is_trivial, promised, solution_of
+from colloc.search.confirm import confirm, unconfirmed
+from colloc.search.converge import as_it_is
+from colloc.search.descend import FACTOR, below_saddle, descend
+from colloc.search.explore import STARTS, Exploration, begin_at, explore, is_finite
+from colloc.search.literal import literal_answer
+from colloc.search.optimum import Optimum
+from colloc.search.prescribed import prescribed_answer
+from colloc.search.refine import refine
+from colloc.search.relaxed import RELAXED_STARTS, explore_relaxed, realised_solution, unrefined
+from colloc.search.run import Progress, Run, this_run
+from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.system.interruption import heeded
 
-TRIVIAL_EFFICIENCY = 1e-4
-"""Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
-TRIVIAL_ROTATION = 1e-3
-"""Rotation a period [rad] from which a gait that goes nowhere turns."""
+REDUCED, FULL = "reduced", "full"
+SEARCHES = (REDUCED, FULL)
+_CONTENDERS, _REFINED = 3, 0.01
+"""Gaits of a kind that are solved for at most, until a certificate holds; what their values may lose on a refined mesh, as a
+share."""
 _SADDLES = 3
 """Saddles left one after another."""
-_CONTENDERS, _REFINED = 3, 0.01
-"""Gaits that are solved for at most, until a certificate holds; what their values may lose on a refined mesh, as a share."""
-_FINITE = 2
-"""Gaits of finite size that are solved for, until one keeps its size."""
 _DRIER, _SMALL = 2, 2.0
 """Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous: at most so many times
 the bound on the shape speed."""
+_EXPLORING = 0.6
+"""The share of the time allowed that is spent on starts; the rest is for the answer."""
 _ROUGHLY = 1e-3
-"""Relative error to which a gait is replayed that is no optimum."""
-FINER = "a smaller mesh_tolerance"
-ADVICE = {
-    "joint limits": "another guess or a smaller joint_limit",
-    "self-contact": "another guess or a smaller joint_limit",
-    "delta influence": "a smaller delta",
-    "second order": "another guess or more starts",
-}
-"""What helps against a check that failed; anything else is a matter of the mesh."""
-
-Report = Callable[[Level], None]
+"""Relative error to which a gait is replayed that is no optimum: exactly may take minutes."""
+_SADDLE = 1e-2
+"""Curvature from which the certificate calls a gait a saddle (`colloc.search.certify.SADDLE`)."""
 
 
-def is_trivial(solution: Solution) -> bool:
-    """Whether the search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
-    if not solution.levels:
-        return False
-    if solution.problem.slope is not None:
-        _, unit = in_friction_units(solution.problem)
-        return in_unit(solution.value, 1 / unit, solution.problem.objective) < NOWHERE
-    if abs(solution.efficiency) * solution.problem.friction.smallest >= TRIVIAL_EFFICIENCY:
-        return False
-    theta = solution.last.x[solution.layout.theta[0]]
-    return not (solution.problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
-
-
-def optimum(problem: Problem, on_level: Report | None = None, before: Sequence[Level] = ()) -> Solution:
-    """A local optimum of a problem, not certified yet; arguments are those of `maximise_efficiency`.
-
-    Its last level is the answer: the gait found, as IPOPT confirms it for the full program, or as it was found.
-    """
-    begin, levels = time.perf_counter(), list(before)
-    if not problem.gait.free:
-        level, message = measured(problem)
-        if on_level is not None:
-            on_level(level)
-        return Solution(problem, [level], seconds=time.perf_counter() - begin, message=message)
-    scaled, unit = in_friction_units(problem)
-
-    def report(level: Level) -> None:
-        levels.append(restated(level, unit, problem.objective))
-        if on_level is not None:
-            on_level(levels[-1])
-
-    def ended(found: Found) -> None:
-        report(level_found(found))
-
-    if before:
-        found, lacks = refined(descended(_last_found(scaled, Solution(problem, before)), scaled, ended), ended)
-    else:
-        found, lacks = searched(scaled, scaled.guess, ended)
-    level, fails = answer(kink_or_not(found))
-    report(level)
-    message = " ".join(part for part in (fails, lacks) if part)
-    return Solution(problem, levels, seconds=time.perf_counter() - begin, message=message)
-
-
-def _last_found(scaled: Problem, done: Solution) -> Found:
-    """The gait of the last level, for a search to go on from, of the problem in units of its friction."""
-    stated = scaled.with_(body=done.resolved.body)
-    space, v = space_near(stated, done.gait, done.last.edges, done.last.scheme)
-    return Found.at(space, v, done.last.delta)
-
-
-def maximise_efficiency(
-    problem: Problem, on_level: Report | None = None, before: Sequence[Level] = (), *, literal: bool = False
-) -> Solution:
-    """Maximise a problem's objective and certify the result; look at ``solution.status`` before believing it.
-
-    Parameters
-    ----------
-    problem : Problem
-    on_level : callable, optional
-        Called with every `colloc.results.solution.Level` as it ends.
-    before : sequence of Level
-        Levels of an interrupted run of the same problem; it goes on from the last one.
-    literal : bool
-        Whether IPOPT searches on the full program from the guess alone (`colloc.search.literal`).
-
-    Returns
-    -------
-    Solution
-        With status "solved", "not converged" or "certificate failed"; nothing is raised for the last two.
-
-    Examples
-    --------
-    >>> from colloc import Harmonic, Problem, ellipse, maximise_efficiency
-    >>> maximise_efficiency(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral"))).status
-    'solved'
-    """
-    if problem.gait.mixes and not literal:
-        return best_gait(problem, 1, on_level)
-    begin = time.perf_counter()
-    solution = literal_optimum(problem, on_level) if literal and problem.gait.free else optimum(problem, on_level, before)
-    if problem.gait.free and is_trivial(solution):
-        nowhere = (
-            "the search ended in a trivial gait that goes nowhere (every retraced gait is a critical point). Try another "
-            "guess, or an imposed symmetry."
-        )
-        steep = (
-            f"no gait was found that climbs a grade of {problem.grade:g}, or goes the way asked for. Try a gentler slope, more "
-            "starts, or more harmonics."
-        )
-        solution.message = nowhere if problem.slope is None else steep
-    else:
-        _certified(solution)
-        if problem.gait.free and not literal:
-            solution = _off_saddles(solution, on_level)
-            for _ in range(_DRIER):
-                if not _is_small_and_viscous(solution):
-                    break
-                solution = _at_smaller_delta(solution, problem.delta, on_level)
-    solution.seconds = time.perf_counter() - begin
-    return solution
-
-
-def _failed(solution: Solution) -> list[str]:
-    """Names of the checks that do not hold."""
-    return [] if solution.certificate is None else [check.name for check in solution.certificate.failures]
-
-
-def _off_saddles(solution: Solution, on_level: Report | None) -> Solution:
-    """The solution itself, or, as long as its certificate calls it a saddle, the one below it, certified."""
-    problem = solution.problem
-    scaled, unit = in_friction_units(problem)
-    for _ in range(_SADDLES):
-        below = below_saddle(_last_found(scaled, solution)) if "second order" in _failed(solution) else None
-        if below is None:
-            break
-        beside = restated(level_found(below), unit, problem.objective)
-        if on_level is not None:
-            on_level(beside)
-        solution = optimum(problem, on_level, [*solution.levels, beside])
-        _certified(solution)
-    return solution
-
-
-def _is_small_and_viscous(solution: Solution) -> bool:
-    """Whether nothing fails but the influence of delta, at a gait that shrank to the bound on the shape speed, or nearly."""
-    small = solution.gait.shape_speed < _SMALL * solution.problem.smallest_shape_speed
-    return small and _failed(solution) == ["delta influence"]
-
-
-def _at_smaller_delta(solution: Solution, asked: float, on_level: Report | None) -> Solution:
-    """The solution gone on with at a smaller delta, certified: what is slow enough for a large gait is not for a small one."""
-    delta = FACTOR * solution.problem.delta
-    drier = optimum(solution.problem.with_(delta=delta), on_level, solution.levels[:-1])
-    _certified(drier)
-    drier.message = f"{drier.message} The gait is so small that delta had to be lowered from {asked:.1g} to {delta:.1g}."
-    return drier
-
-
-def best_gait(
+def solve(
     problem: Problem,
     starts: int | None = None,
-    on_level: Report | None = None,
+    *,
     seconds: float = np.inf,
-    before: Sequence[Level] = (),
-    watch: Callable[[SearchStep | str], object] = lambda step: None,
+    search: str = REDUCED,
+    keep: Path | None = None,
+    progress: Callable[[Progress], object] = lambda news: None,
 ) -> Solution:
-    """Maximise a problem's objective over the whole class, as far as many starts can tell, and certify the result.
+    """The best gait of a problem's class that so many starts lead to, certified.
 
     Parameters
     ----------
     problem : Problem
     starts : int, optional
-        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops. With 1 the guess alone, as
-        `maximise_efficiency`. By default 32, of relaxed gaits 8.
-    on_level : callable, optional
-        Called with every `colloc.results.solution.Level` of the best gait.
+        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops. With 1 the guess alone. By default
+        32, of relaxed gaits 8.
     seconds : float
-        Wall time after which no other start is begun.
-    before : sequence of Level
-        Levels of an interrupted run; it goes on from the last one.
-    watch : callable
-        Called with every `colloc.results.answer.SearchStep` before the first level; of relaxed gaits with what is under
-        way, in words.
+        Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless its certificate holds.
+    search : {"reduced", "full"}
+        Where gaits are searched: in the space of their parameters, or by IPOPT on the full program, from the guess alone.
+    keep : path, optional
+        File in which everything found is kept until the end; a solve of the same problem goes on from what is there.
+    progress : callable, optional
+        Called with every `colloc.search.run.Progress`.
 
     Returns
     -------
     Solution
-        ``solution.starts`` and ``solution.others`` say what it is the best of; where it shrank to the bound on the shape speed,
-        ``solution.finite`` is the best gait that did not, if there is one. A class of relaxed gaits is answered by the best
-        finite gait near its optimum, which is ``solution.relaxed``.
+        With status "solved", "not converged", "certificate failed" or, after Ctrl-C or when the time is over, "interrupted";
+        nothing is raised for the last three.
+
+    Examples
+    --------
+    >>> from colloc import Harmonic, Problem, ellipse
+    >>> from colloc.search.solve import solve
+    >>> solve(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral")), starts=1).status
+    'solved'
     """
+    if search not in SEARCHES:
+        raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
+    begin, run = time.monotonic(), Run(keep, problem, progress)
+    try:
+        with run.under_way(seconds):
+            solution = _solved(problem, starts, search, begin + _EXPLORING * seconds)
+    except KeyboardInterrupt:
+        heeded()
+        over = time.monotonic() - begin >= seconds
+        solution = _interrupted(problem, run, f"the {seconds:g} s allowed are over" if over else "interrupted")
+    solution.seconds = time.monotonic() - begin
+    return solution
+
+
+def _solved(problem: Problem, starts: int | None, search: str, until: float) -> Solution:
+    """The stages, in order. After the time `until` nothing else is explored."""
+
+    def goes_on() -> bool:
+        return time.monotonic() < until
+
+    if not problem.gait.free:
+        return solution_of(problem, certified(prescribed_answer(problem)))
+    if search == FULL:
+        return solution_of(problem, certified(literal_answer(problem)))
     if problem.gait.mixes:
-        solution = best_relaxed_gait(problem, starts or RELAXED_STARTS, seconds=seconds, report=watch)
-        if on_level is not None:
-            on_level(solution.last)
-        return solution
-    starts = starts or STARTS
-    if starts == 1 or before or not problem.gait.free:
-        return maximise_efficiency(problem, on_level, before)
-    begin = time.perf_counter()
-    scaled, unit = in_friction_units(problem)
-    try:
-        chosen = best_of(scaled, starts, seconds, lambda step: watch(replace(step, efficiency=step.efficiency / unit)))
-    except NotConvergedError:  # what fails with the guess alone is said in detail
-        return maximise_efficiency(problem, on_level)
-    objective = problem.objective
-    contenders = [[restated(level_found(found), unit, objective) for found in levels] for levels in chosen.contenders]
-    solution = _best_certified(problem, contenders, on_level, lambda: time.perf_counter() - begin < seconds)
-    solution.starts = chosen.starts
-    solution.others = tuple(replace(other, value=in_unit(other.value, unit, objective)) for other in chosen.others)
-    if chosen.finite and on_speed_floor(problem, solution.gait):
-        _add_finite(solution, [[restated(level_found(found), unit, objective) for found in levels] for levels in chosen.finite])
-    solution.seconds = time.perf_counter() - begin
+        explored = explore_relaxed(problem, starts or RELAXED_STARTS, goes_on)
+        solution = realised_solution(explored.optima[0])
+    else:
+        explored = _explored(problem, starts or STARTS, goes_on)
+        solution = choose(problem, _certified_best(problem, explored))
+    solution.starts, solution.others = explored.starts, explored.others
     return solution
 
 
-def _best_certified(
-    problem: Problem, contenders: list[list[Level]], on_level: Report | None, goes_on: Callable[[], bool]
-) -> Solution:
-    """The best solution that levels lead to, best first; the next ones are solved for where a certificate does not hold, or
-    where a gait lost more on its refined mesh than they are behind."""
-    tried: list[Solution] = []
-    for levels in contenders[:_CONTENDERS]:
-        best = max((s.value for s in tried if s.status == SOLVED), default=-np.inf)
-        promised = levels[-1].value - _REFINED * abs(levels[-1].value)
-        if tried and (promised < best or not goes_on()):
+def _explored(problem: Problem, starts: int, goes_on: Callable[[], bool]) -> Exploration:
+    if starts > 1:
+        try:
+            return explore(problem, starts, goes_on)
+        except NotConvergedError:
+            pass  # what fails with the guess alone is said in detail
+    return Exploration((begin_at(problem, problem.guess),), 1)
+
+
+def _certified_best(problem: Problem, explored: Exploration) -> list[Certified]:
+    """The best gaits, certified: of finite size first, then what shrank and is better; in one row where either will do."""
+    if problem.shrinking or explored.starts == 1:
+        return _tried(explored.optima, lambda found: found.holds)
+    finite = [optimum for optimum in explored.optima if is_finite(optimum)]
+    shrunk = [optimum for optimum in explored.optima if not is_finite(optimum)]
+    found = _tried(finite, lambda found: found.holds and found.is_finite)
+    best = max(map(promised, found), default=-np.inf)
+    return [*found, *_tried([optimum for optimum in shrunk if optimum.value > best], lambda found: found.holds)]
+
+
+def _tried(optima: Sequence[Optimum], counts: Callable[[Certified], bool]) -> list[Certified]:
+    """Certified answers, best first: the next one where one does not count, or lost more on its refined mesh than the next one
+    is behind."""
+    tried: list[Certified] = []
+    for optimum in optima[:_CONTENDERS]:
+        best = max((each.answer.value for each in tried if counts(each)), default=-np.inf)
+        if optimum.value - _REFINED * abs(optimum.value) < best:
             break
-        for level in levels:
-            if on_level is not None:
-                on_level(level)
-        tried.append(maximise_efficiency(problem, on_level, levels))
-    solved = [s for s in tried if s.status == SOLVED]
-    if not solved or tried[0].status == SOLVED:
-        return max(solved, key=lambda s: s.value, default=tried[0])
-    solution = max(solved, key=lambda s: s.value)
-    solution.message = f"{solution.message} A gait of {tried[0].value:.4f} is not certified: {tried[0].message}".strip()
-    return solution
+        tried.append(finished(optimum))
+        this_run().answers.append((tried[-1].answer, tried[-1].certificate))
+    return tried
 
 
-def _add_finite(solution: Solution, contenders: list[list[Level]]) -> None:
-    """Solve for the gait of finite size that levels lead to, best first, and put it beside the solution; where it shrinks after
-    all, for the next one."""
-    for levels in contenders[:_FINITE]:
-        finite = maximise_efficiency(solution.problem, None, levels)
-        if on_speed_floor(finite.problem, finite.gait):
-            continue
-        if finite.status != SOLVED:
-            solution.message = f"{solution.message} The best gait of finite size, not certified: {finite.value:.4f}."
-            return
-        found = finite.certificate
-        finite.starts, finite.others = solution.starts, tuple(o for o in solution.others if not o.on_speed_floor)
-        solution.finite = finite
-        text = f"The best gait of finite size: {found.value:.6f} +- {found.value_error:.0e}, certified."
-        solution.message = f"{solution.message} {text}"
-        return
+def finished(optimum: Optimum) -> Certified:
+    """An optimum through the last stages: refined, confirmed, and certified.
+
+    Where it turns out to be a saddle, the search goes on below it; where it is so small that friction is viscous, at a smaller
+    delta: what is slow enough for a large gait is not for a small one.
+    """
+    for _ in range(_DRIER + 1):
+        found = certified(_confirmed(optimum))
+        if not _is_small_and_viscous(found):
+            break
+        optimum = _at_smaller_delta(optimum)
+    return found
 
 
-def _certified(solution: Solution) -> None:
-    """Put the certificate into a solution, and what it says into its message."""
-    problem = solution.problem
+def _confirmed(optimum: Optimum) -> Answer:
+    optimum = refine(descend(optimum))
+    answer = confirm(optimum)
+    for _ in range(_SADDLES):
+        if not answer.second_order.smallest + answer.second_order.error < -_SADDLE:
+            break
+        below = below_saddle(optimum)
+        if below is None:
+            break
+        optimum = refine(below)
+        answer = confirm(optimum)
+    return answer
+
+
+def certified(answer: Answer) -> Certified:
+    """An answer with its certificate; without one where it goes nowhere, or cannot be replayed."""
+    problem, run = answer.problem, this_run()
+    if problem.gait.free and is_trivial(answer):
+        return Certified(answer)
+    run.told("certify", 0, 1)
+    roughly: dict[str, Any] = {} if answer.optimal else {"tolerance": _ROUGHLY, "instants": problem.body.usual.instants}
     try:
-        if solution.last.optimal:
-            solution.certificate = certify(solution)
-        else:  # it cannot pass: what it does is told roughly, for exactly may take minutes
-            solution.certificate = certify(solution, tolerance=_ROUGHLY, instants=problem.body.usual.instants)
+        return Certified(answer, run.kept("certify", (answer,), lambda: certify(answer, **roughly)))
     except NotConvergedError as error:
-        solution.message = f"the replay failed: {error}"
-        return
-    if solution.message and not solution.last.optimal:
-        return  # why the search ended says more than what does not hold for that
-    failed = solution.certificate.failures
-    if failed:
-        failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
-        advice = " and ".join(dict.fromkeys(ADVICE.get(c.name, FINER) for c in failed))
-        parts = [f"the certificate failed: {failures}. Try {advice}.", solution.message]
-        solution.message = " ".join(p for p in parts if p)
-    elif problem.gait.free and on_speed_floor(problem, solution.gait):
-        better = "more efficient" if problem.objective == EFFICIENCY else "better"
-        solution.message = (
-            f"the optimum lies on the bound smallest_shape_speed = {problem.smallest_shape_speed:g}: the gait shrinks as far "
-            f"as it may, smaller ones are {better} still. Lower the bound (and delta with it) to see how far that goes."
-        )
+        return Certified(answer, failure=str(error))
+
+
+def _is_small_and_viscous(found: Certified) -> bool:
+    """Whether nothing fails but the influence of delta, at a gait that shrank to the bound on the shape speed, or nearly."""
+    small = found.answer.gait.shape_speed < _SMALL * found.answer.problem.smallest_shape_speed
+    return small and [check.name for check in found.certificate.failures] == ["delta influence"]
+
+
+def _at_smaller_delta(optimum: Optimum) -> Optimum:
+    return replace(optimum, problem=optimum.problem.with_(delta=FACTOR * optimum.problem.delta))
+
+
+def _interrupted(problem: Problem, run: Run, why: str) -> Solution:
+    """The best that was found before an interrupt."""
+    found = [Certified(*each) for each in run.answers]
+    if any(each.holds for each in found):
+        solution = choose(problem, found)
+    elif found:
+        solution = Solution(problem, found[0].answer)
+    else:
+        best = run.best or as_it_is(*space_about(problem, problem.guess), problem.delta_start)
+        solution = Solution(problem, (unrefined if problem.gait.mixes else unconfirmed)(best))
+    solution.interrupted = True
+    solution.message = f"{why}; this is the best gait so far. {solution.message}".strip()
+    return solution

@@ -14,14 +14,17 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.starts import LATIN_HYPERCUBE
-from colloc.results.answer import Level, SearchStep
 from colloc.results.archive import StartName, open_archive, save_archive
 from colloc.results.distinct_optima import Basin, basins
 from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.solve import best_gait, maximise_efficiency
+from colloc.search.run import Progress
+from colloc.search.solve import REDUCED
+from colloc.search.solve import solve as search_solve
 from colloc.studies.campaign import run_starts
-from colloc.studies.run import Progress, StudyRun
+from colloc.studies.run import Progress as StudyProgress
+from colloc.studies.run import StudyRun
+from colloc.studies.saved import solved_and_saved
 from colloc.studies.study import Study, read_study_file
 from colloc.studies.table import StudyTable, cell_text, study_table
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -36,8 +39,10 @@ def solve(
     starts: int | None = None,
     *,
     seconds: float = np.inf,
+    search: str = REDUCED,
+    output: str | os.PathLike[str] | None = None,
     verbose: bool = False,
-    progress: Callable[[Level | SearchStep | str], object] | None = None,
+    progress: Callable[[Progress], object] | None = None,
 ) -> Solution:
     """The most efficient gait of a problem, certified: what ``colloc solve`` finds.
 
@@ -48,22 +53,29 @@ def solve(
     starts : int, optional
         Starts to find the best gait of; 1 is the guess alone. By default what the file says, else 32 (relaxed gaits: 8).
     seconds : float
-        Wall time after which no other start is begun.
+        Wall time allowed: then the best gait so far is returned.
+    search : {"reduced", "full"}
+        "full": IPOPT on the full program at every level of delta, from the guess alone.
+    output : path-like, optional
+        Of an HDF5 file in which the solution is saved. What is found on the way is kept beside it: after Ctrl-C, or a power
+        cut, the same call goes on.
     verbose : bool
-        Print a line for every start and every level of delta as it ends.
+        Print a line for every step.
     progress : callable, optional
-        Called with a `colloc.results.answer.SearchStep` after every start and every gait that is followed, then with every
-        `colloc.results.answer.Level` of the best one; of relaxed gaits with what is under way, in words.
+        Called with every `colloc.search.run.Progress`.
 
     Returns
     -------
     Solution
-        Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that does not converge.
+        Look at ``solution.success`` and ``solution.message``: nothing is raised for a solve that does not converge, or that
+        Ctrl-C interrupts.
 
     Raises
     ------
     ProblemError
         If the file states no problem that can be solved.
+    StoreError
+        If `output` cannot be written, or what an earlier call left beside it cannot be read.
 
     Examples
     --------
@@ -78,10 +90,12 @@ def solve(
         raise ProblemError(f"starts must be at least 1, not {starts}.")
     if not seconds > 0:
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
-    told = _told(verbose, progress)
-    solution = best_gait(stated.problem, starts or stated.starts, told, seconds, watch=told)
-    solution.source = stated.source
-    return solution
+    how = {"seconds": seconds, "search": search, "progress": _told(verbose, progress)}
+    if output is None:
+        solution = search_solve(stated.problem, starts or stated.starts, **how)  # type: ignore[arg-type]
+        solution.source = stated.source
+        return solution
+    return solved_and_saved(stated, Path(output), starts=starts or stated.starts, **how)[0]  # type: ignore[arg-type]
 
 
 def _stated(problem: Stated) -> ProblemFile:
@@ -152,8 +166,8 @@ class Starts:
 def reopened(problem: Problem, outcome: Outcome) -> Solution:
     """The solution that a start led to: solved at the final delta from its gait, or again from its guess if it failed."""
     if outcome.status != SOLVED or problem.gait.mixes:  # no finite gait says what it comes near
-        return maximise_efficiency(problem.with_(guess=outcome.guess))
-    return maximise_efficiency(problem.with_(guess=outcome.gait, delta_start=problem.delta))
+        return search_solve(problem.with_(guess=outcome.guess), 1)
+    return search_solve(problem.with_(guess=outcome.gait, delta_start=problem.delta), 1)
 
 
 def multistart(
@@ -218,7 +232,7 @@ def sweep(
     *,
     workers: int = 1,
     verbose: bool = False,
-    progress: Callable[[Progress], object] | None = None,
+    progress: Callable[[StudyProgress], object] | None = None,
 ) -> StudyTable:
     """Solve every problem of a study: what ``colloc sweep`` finds, as labelled arrays.
 

@@ -10,17 +10,13 @@ from dataclasses import replace
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
-from colloc.results.answer import Level
-from colloc.results.checks import Certificate
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
-from colloc.search.solve import is_trivial, maximise_efficiency
+from colloc.search.choose import is_trivial
+from colloc.search.run import Progress
+from colloc.search.solve import FULL, REDUCED, solve
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, completed, process_pool
-
-
-class _TimeLimit(Exception):
-    pass
 
 
 def run_start(
@@ -28,7 +24,7 @@ def run_start(
 ) -> Outcome:
     """Solve and certify one start. Whatever goes wrong becomes the outcome's status and message; nothing is raised.
 
-    The time limit [s] is checked between the levels of the continuation. A `known` gait takes the place of the sample.
+    A start that takes longer than the time limit [s] is given up. A `known` gait takes the place of the sample.
     """
     return run_guess(problem, lambda: known or start_gait(problem, sampler, seed, start), start, time_limit)
 
@@ -41,46 +37,38 @@ def run_guess(
     With `literal`, IPOPT searches on the full program (`colloc.search.literal`).
     """
     begin, cpu = time.perf_counter(), time.process_time()
-    guess = problem.guess
-    reached: list[Level] = []
+    guess, seen = problem.guess, list[Progress]()
     outcome = Outcome(start, ERROR, "", guess, guess)
-
-    def watch(level: Level) -> None:
-        reached.append(level)
-        if time.perf_counter() - begin > time_limit:
-            raise _TimeLimit
-
     try:
         guess = start_from()
         outcome = Outcome(start, ERROR, "", guess, guess)
-        solution = maximise_efficiency(problem.with_(guess=guess), watch, literal=literal)
-        outcome = _outcome(start, guess, solution)
-    except _TimeLimit:
-        deltas = [level.delta for level in reached if level.optimal]
-        where = f"the last optimum was at delta = {min(deltas):.1e}" if deltas else "no optimum at any delta yet"
-        status, message = TIME_LIMIT, f"gave up after {time_limit:g} s; {where}."
+        search = FULL if literal else REDUCED
+        solution = solve(problem.with_(guess=guess), 1, seconds=time_limit, search=search, progress=seen.append)
+        if solution.interrupted:
+            if time.perf_counter() - begin < time_limit:
+                raise KeyboardInterrupt
+            where = f"the last optimum was at delta = {solution.answer.delta:.1e}" if seen[-1].best else "no optimum yet"
+            outcome = replace(outcome, status=TIME_LIMIT, message=f"gave up after {time_limit:g} s; {where}.")
+        else:
+            outcome = _outcome(start, guess, solution)
     except Exception as error:
-        status, message = ERROR, f"{type(error).__name__}: {error}"
-    else:
-        status, message = outcome.status, outcome.message
-    iterations = sum(level.iterations for level in reached)
-    wall, cpu = time.perf_counter() - begin, time.process_time() - cpu
-    return replace(outcome, status=status, message=message, iterations=iterations, seconds=wall, cpu_seconds=cpu)
+        outcome = replace(outcome, status=ERROR, message=f"{type(error).__name__}: {error}")
+    return replace(outcome, seconds=time.perf_counter() - begin, cpu_seconds=time.process_time() - cpu)
 
 
 def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
-    optimal = [level for level in solution.levels if level.optimal]
+    optimal = [step for step in solution.history if step.optimal]
     certificate = solution.certificate
-    measured: Certificate | Level | None = certificate if certificate.replayed else optimal[-1] if optimal else None
-    status = TRIVIAL if is_trivial(solution) else solution.status
-    outcome = Outcome(start, status, solution.message, guess, solution.gait)
-    if measured is not None:
-        found = {name: getattr(measured, name) for name in ("value", "efficiency", "distance", "work")}
-        level = solution.last if certificate.replayed else optimal[-1]
-        outcome = replace(outcome, delta=level.delta, **found)
+    status = TRIVIAL if is_trivial(solution.answer) else solution.status
+    iterations = sum(step.iterations for step in solution.history)
+    outcome = Outcome(start, status, solution.message, guess, solution.gait, iterations=iterations)
     if certificate.replayed:
-        errors = {name: getattr(certificate, name) for name in ("value_error", "efficiency_error")}
-        outcome = replace(outcome, **errors)
+        names = ("value", "efficiency", "distance", "work", "value_error", "efficiency_error")
+        return replace(outcome, delta=solution.answer.delta, **{name: getattr(certificate, name) for name in names})
+    if optimal:
+        last = optimal[-1]
+        found = {name: getattr(last, name) for name in ("delta", "value", "distance", "work")}
+        return replace(outcome, efficiency=last.distance / last.work, **found)
     return outcome
 
 
@@ -107,7 +95,7 @@ def run_starts(
     workers : int
         Starts under way at a time.
     time_limit : float
-        Seconds a start may take, checked between levels.
+        Seconds a start may take.
     executor : callable
         Makes an executor for a number of workers: processes by default; threads, or the one a Dask client gives
         (``lambda n: client.get_executor()``), will do. When a worker dies (killed, out of memory) a new one is made, the

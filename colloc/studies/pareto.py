@@ -17,7 +17,7 @@ from colloc.gaits.objective import EFFICIENCY, SPEED, Objective, objective_from
 from colloc.gaits.problem import Problem
 from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
-from colloc.search.solve import best_gait, maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.verification.slope_replay import replayer
@@ -123,7 +123,7 @@ def pareto_front(
 
     last = points - 1
     for k, aim in zip((0, last), aims, strict=True):
-        put(k, best_gait(problem.with_(objective=aim), starts))
+        put(k, _uninterrupted(problem.with_(objective=aim), starts))
         if not found[k].success:
             raise ProblemError(f"the gait of best {aim.name} is not certified, so there is no front: {found[k].message}")
     least, most = (_value(found[k], aims[1]) for k in (0, last))
@@ -134,7 +134,7 @@ def pareto_front(
     def begun_at(k: int, neighbour: int) -> Solution:
         reached = (*problem.at_least, (aims[1], float(levels[k])))
         gait = found[neighbour].gait
-        return maximise_efficiency(problem.with_(objective=aims[0], at_least=reached, guess=gait, delta_start=problem.delta))
+        return _uninterrupted(problem.with_(objective=aims[0], at_least=reached, guess=gait, delta_start=problem.delta), 1)
 
     for k in range(last - 1, 0, -1):
         put(k, begun_at(k, k + 1))
@@ -144,6 +144,13 @@ def pareto_front(
         if k > 0 and _value(found[k + 1], aims[0]) > _value(found[k], aims[0]):
             put(k, begun_at(k, k + 1))
     return ParetoFront(problem, aims, tuple(found[k] for k in range(points)))
+
+
+def _uninterrupted(problem: Problem, starts: int) -> Solution:
+    solution = solve(problem, starts)
+    if solution.interrupted:
+        raise KeyboardInterrupt
+    return solution
 
 
 def _value(solution: Solution, aim: Objective) -> float:

@@ -53,3 +53,7 @@ class StoreError(CollocError, OSError):
 
 class ChangedFileWarning(UserWarning):
     """A results file is not as colloc wrote it, and was read all the same."""
+
+
+class ReadOnlyRunWarning(UserWarning):
+    """What a solve has found so far cannot be kept on the disk; it goes on."""

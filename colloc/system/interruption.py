@@ -11,7 +11,9 @@ import contextlib
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -28,11 +30,46 @@ class _Heard:
 
 
 _heard = _Heard()  # of the process, as signals are; only the main thread writes to it
+_DEADLINE: ContextVar[float] = ContextVar("deadline", default=float("inf"))
 
 
 def interrupted() -> bool:
-    """Whether Ctrl-C came, for code within `interruptible` that can stop by itself."""
-    return _heard.asked and threading.current_thread() is threading.main_thread()
+    """Whether Ctrl-C came, or a `time_limit` is over, for code within `interruptible` that can stop by itself."""
+    return (_heard.asked and _in_main_thread()) or time.monotonic() > _DEADLINE.get()
+
+
+def heeded() -> None:
+    """Say that what an interrupt asked for was done: the process goes on."""
+    if _in_main_thread():
+        _heard.asked = False
+
+
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """A block that ends in KeyboardInterrupt, as by Ctrl-C, when so many seconds are over.
+
+    In the main thread it does so wherever the block is, if `interruptible` is around it; in others only in the parts that ask
+    `interrupted`.
+    """
+    if seconds == float("inf"):
+        yield
+        return
+    token = _DEADLINE.set(time.monotonic() + seconds)
+    timer = threading.Timer(seconds, _again)
+    timer.daemon = True
+    if _in_main_thread():
+        timer.start()
+    try:
+        yield
+    finally:
+        _DEADLINE.reset(token)
+        if _in_main_thread():
+            timer.cancel()
+            timer.join()
 
 
 def _hear(number: int, frame: FrameType | None) -> None:
@@ -82,9 +119,11 @@ def interruptible(*, polled: bool = True) -> Iterator[None]:
         The block asks `interrupted` now and then: the first Ctrl-C raises nothing before its end, a second one does at once.
         False, for a whole command: every Ctrl-C raises at once, and the command may end well after it.
     """
-    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    handler = signal.getsignal(signal.SIGINT) if _in_main_thread() else None
     if handler not in (signal.default_int_handler, end_at_once, _hear):
         yield
+        if polled and interrupted():
+            raise KeyboardInterrupt
         return
     outermost = handler is not _hear
     if outermost:

@@ -1,0 +1,18 @@
+"""What a space of gaits is made of, so that it can be made again."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
+
+
+class Given(NamedTuple):
+    """What a space was made of, besides problem and pairs of links: made of the same it is the same."""
+
+    near: AnyGait
+    """A gait that says which members of a class are meant: of paths, how they wind. None if there is one kind only."""
+    edges: np.ndarray | None
+    scheme: str

@@ -1,0 +1,100 @@
+"""Friction gets drier: a gait is followed from the delta at which it was found down to the problem's, and off any saddle.
+
+A gait may satisfy the first-order conditions only because its symmetry keeps the search from falling: a start with more
+symmetry than its class never leaves it, as the gradient has it too. Such a gait may be the best of the symmetric ones and still
+no optimum. The curvature (`colloc.reduced.second_order`) shows the way down. Where rows bind they bend away from that straight
+line, so it is the Lagrangian that has to fall along it; what counts is where the search then ends.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.gaits.problem import Problem
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.second_order import Lagrangian, curvature
+from colloc.search.converge import NEXT_RADIUS, converged
+from colloc.search.optimum import ROUGH, Effort, Optimum
+from colloc.search.run import this_run
+
+FACTOR = 0.2
+"""Of one delta to the one before."""
+_ALMOST = 1.2
+"""A level within this factor of the last one is the last one."""
+_STEPS = (0.1, 0.03, 0.01)
+"""Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
+_FALLS = 1e-3
+"""A curvature below minus this part of the objective [1/rad^2] is one to follow."""
+_GAIN = 1e-7
+"""The part of the objective that leaving a saddle has to gain."""
+_DRIER, _LOST = 0.1, 0.5
+"""A gait that loses this part of its value at so many times its delta owes it to delta."""
+
+
+def levels(problem: Problem, first: float) -> list[float]:
+    """The deltas from a first one down to the problem's."""
+    found = [first]
+    while found[-1] > problem.delta:
+        below = FACTOR * found[-1]
+        found.append(below if below > _ALMOST * problem.delta else problem.delta)
+    return found
+
+
+def descend(optimum: Optimum, effort: Effort = ROUGH) -> Optimum:
+    """The gait at the problem's delta, on the same mesh.
+
+    Parameters
+    ----------
+    optimum : Optimum
+        At a larger delta, or at that one: then it is returned as it is.
+    effort : Effort
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    NotConvergedError
+        If friction does not hold the body on its slope all the way.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> from colloc.search.descend import descend
+    >>> from colloc.search.explore import begin_at
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> descend(begin_at(problem, problem.guess)).delta
+    0.01
+    """
+    run, below = this_run(), levels(optimum.problem, optimum.delta)[1:]
+    for done, delta in enumerate(below):
+        run.told("descend", done, len(below), optimum)
+        history = optimum.history
+        optimum = converged(optimum.space, optimum.v, delta, NEXT_RADIUS, effort, optimum.curvature).after(*history)
+    return optimum
+
+
+def below_saddle(optimum: Optimum) -> Optimum | None:
+    """A better gait that the search comes to from beside a gait of negative curvature; None if there is none."""
+    program = optimum.program()
+    here = curvature(program, optimum.v)
+    if here.smallest + here.error >= -_FALLS * abs(optimum.objective):
+        return None
+    lagrangian, length = Lagrangian(program, optimum.v), np.linalg.norm(optimum.v)
+    value = lagrangian.value(optimum.v)
+    for step in _STEPS:
+        for side in (1.0, -1.0):
+            beside = optimum.v + side * step * length * here.direction
+            if lagrangian.value(beside) >= value:
+                continue
+            other = converged(optimum.space, beside, optimum.delta, NEXT_RADIUS, ROUGH)
+            if other.objective < optimum.objective - _GAIN * abs(optimum.objective):
+                return other.after(*optimum.history)
+    return None
+
+
+def is_viscous(optimum: Optimum) -> bool:
+    """Whether the gait owes its value to delta: at a tenth of it half is lost. Slow parts of a retraced gait do that."""
+    dry = ReducedProgram(optimum.space, _DRIER * optimum.delta).objective(optimum.v)
+    return not dry <= optimum.objective + (1 - _LOST) * abs(optimum.objective)

@@ -1,0 +1,122 @@
+"""The mesh is refined until the collocated objective is as accurate as the problem asks for; a smooth body's panels with it.
+
+Every mesh is planned as a whole for the gait at hand (`colloc.verification.refinement`), and the gait optimised on it, until it
+needs no other. On the way it need not be optimised to the last digit: the next mesh moves it by more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colloc.reduced.program import ReducedProgram, SearchSpace
+from colloc.reduced.spaces import space_of
+from colloc.search.converge import NEXT_RADIUS, REMESH_RADIUS, converged
+from colloc.search.optimum import FINE, ROUGH, Optimum, replace_keeping_space
+from colloc.search.run import this_run
+from colloc.system.errors import NotConvergedError
+from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
+
+_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
+"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
+half, then a quarter of it, and keep all their knots."""
+_GROWTH, _FEW_POINTS = 3, 300
+"""A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
+_MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
+"""Panels of a smooth body, and how much they grow at once, at most; error that they may leave, over what the mesh may. Every
+doubling was seen to leave a sixth or less, with a point at rest that moves over the panels."""
+NOWHERE = 1e-4
+"""Value of the objective on a slope up to which a gait goes nowhere: relative to that no mesh is fine enough."""
+
+
+@dataclass
+class _Meshes:
+    """The meshes tried so far, and the phases that have to stay knots."""
+
+    count: int = 0
+    kept: np.ndarray = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        self.kept = np.empty(0)
+
+    def plan(self, optimum: Optimum) -> MeshPlan | None:
+        """A mesh on which the gait is accurate enough; None if its own will do."""
+        problem, gait, late = optimum.problem, optimum.gait, max(0, self.count - _SAME_AIM)
+        mesh = optimum.space.phase_mesh(gait)
+        return planned_mesh(
+            problem,
+            mesh,
+            gait,
+            optimum.delta * gait.delta_unit,
+            problem.mesh_tolerance,
+            kept=self.kept,
+            nested=self.count >= _SAME_AIM,
+            aim=AIM * 0.5 ** min(late, _HALVINGS),
+            most_points=min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS),
+        )
+
+
+def refine(optimum: Optimum) -> Optimum:
+    """The gait on a mesh that meets the problem's ``mesh_tolerance``.
+
+    Parameters
+    ----------
+    optimum : Optimum
+        At the final delta.
+
+    Returns
+    -------
+    Optimum
+        Optimised to the last digit. Its `lacks` says what is missing if no mesh was fine enough.
+    """
+    problem, run = optimum.problem, this_run()
+    refines, meshes = problem.mesh_tolerance > 0, _Meshes()
+    if problem.slope is not None and optimum.objective > -NOWHERE:
+        return optimum
+    while True:
+        run.told("refine", meshes.count, _MESHES, optimum)
+        finer = on_more_panels(optimum) if refines else None
+        plan = meshes.plan(optimum) if refines and finer is None else None
+        if finer is None and plan is None and optimum.effort == FINE:
+            return optimum
+        if meshes.count == _MESHES:
+            lacks = f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
+            return replace_keeping_space(optimum, lacks=lacks)
+        space, v, radius, effort = optimum.space, optimum.v, NEXT_RADIUS, FINE
+        if finer is not None:
+            (space, v), radius, effort = finer, REMESH_RADIUS, ROUGH
+        if plan is not None:
+            meshes.count, meshes.kept, radius = meshes.count + 1, np.concatenate([meshes.kept, plan.kept]), REMESH_RADIUS
+            space = space.remeshed(optimum.gait, plan.edges, plan.scheme)
+            effort = FINE if meshes.count > _SAME_AIM else ROUGH
+            try:
+                v = space.parameters(optimum.gait)
+            except NotConvergedError:
+                v = space.laid(optimum.gait)  # breaks a row a little, as its own mesh lets it
+        known = optimum.curvature if optimum.v.size == v.size else None
+        optimum = converged(space, v, optimum.delta, radius, effort, known).after(*optimum.history)
+
+
+def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
+    """The class with a smooth body on as many panels as the gait needs, and its parameters; None if its own will do.
+
+    They do where half as many change the objective by no more than six times what the mesh may. The gait will still move, so
+    panels grow slowly.
+    """
+    space, v, here, problem = optimum.space, optimum.v, optimum.objective, optimum.problem
+    panels, mesh = problem.body.panels, space.phase_mesh(optimum.gait)
+    if panels == 0:
+        return None
+
+    def on(count: int) -> tuple[SearchSpace, np.ndarray, float]:
+        body = problem.body.on_panels(count)
+        space = space_of(problem.with_(body=body), optimum.gait, mesh.edges, mesh.scheme.name, optimum.far)
+        v = space.parameters(optimum.gait)
+        return space, v, ReducedProgram(space, optimum.delta).objective(v)
+
+    before, most = on(panels // 2)[2], min(_PANELS_GROW * panels, _MOST_PANELS)
+    while abs(here - before) > _LEFT * problem.mesh_tolerance * abs(here) and 2 * panels <= most:
+        panels, before = 2 * panels, here
+        space, v, here = on(panels)
+    return None if space is optimum.space else (space, v)

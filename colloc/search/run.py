@@ -1,0 +1,178 @@
+"""A run of the search: what its stages found is kept as it appears, and found again, not computed again, by the next run.
+
+A stage is a function of values. So what it finds can be kept under a digest of its name and these values, and a run that was
+interrupted, by Ctrl-C or a power cut, goes on by doing everything once more: whatever is known already takes no time, and the
+end is the same to the last bit. No stage knows of it but for the line that says what is worth keeping (`kept`).
+"""
+
+from __future__ import annotations
+
+import json
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from colloc.gaits.gait_fields import GAITS
+from colloc.gaits.problem import Problem
+from colloc.reduced.given import Given
+from colloc.results.answer import Answer, SecondOrder, Step
+from colloc.results.checks import Certificate, Check
+from colloc.results.relaxation import Optimality, Realised, Relaxation
+from colloc.search.optimum import Effort, Optimum
+from colloc.system.errors import ReadOnlyRunWarning, StoreError
+from colloc.system.interruption import interruptible, time_limit
+from colloc.system.plain_values import Codec, Own
+from colloc.system.row_file import hash_of, put_rows, read_rows
+
+Value = TypeVar("Value")
+ROWS = "colloc run 1"
+EVERY = 2.0
+"""Seconds between writes: as much may have to be computed again after a crash. Short solves write nothing."""
+_PROBLEM = "problem"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a solve has come.
+
+    Attributes
+    ----------
+    stage : str
+        "explore", "descend", "refine", "confirm" or "certify".
+    done, count : int
+        Of starts and gaits followed, of levels of delta, or of meshes; the last ones at most so many.
+    best : Optimum, optional
+        The best gait so far.
+    seconds : float
+        Since the solve began.
+    """
+
+    stage: str
+    done: int
+    count: int
+    best: Optimum | None
+    seconds: float
+
+    @property
+    def left(self) -> float:
+        """Seconds that the rest of this stage will probably take; infinite if nobody can know yet."""
+        return self.seconds / self.done * (self.count - self.done) if self.done else float("inf")
+
+    def __str__(self) -> str:
+        text = f"{self.stage}, {self.done} of {self.count}"
+        if self.best is None:
+            return text
+        return f"{text}; best {self.best.problem.objective.short} = {self.best.value:.4f} at delta = {self.best.delta:.0e}"
+
+
+@dataclass(eq=False)
+class Run:
+    """What one solve found so far.
+
+    Parameters
+    ----------
+    path : path, optional
+        Of the file that keeps it; by default nothing is kept.
+    problem : Problem, optional
+        That is solved; a file knows its problems by how they differ from that.
+    progress : callable, optional
+        Called with every `Progress`.
+    """
+
+    path: Path | None = None
+    problem: Problem | None = None
+    progress: Callable[[Progress], object] = lambda news: None
+    best: Optimum | None = None
+    answers: list[tuple[Answer, Certificate]] = field(default_factory=list)
+    found_again: int = 0
+    """Values that an earlier run had kept."""
+
+    def __post_init__(self) -> None:
+        self._begin = self._last = time.monotonic()
+        self._known: dict[str, Any] = {}
+        self._pending: dict[str, Any] = {}
+        self._problems: dict[str, Problem] = {}
+        if self.path is None:
+            return
+        assert self.problem is not None
+        self._stated = self.problem.to_dict()
+        stages = [Answer, Certificate, Check, Effort, Given, Optimum, SecondOrder, Step]
+        self._codec = Codec(
+            [*stages, Optimality, Realised, Relaxation, *GAITS],
+            {Problem: Own(self._changes, self._with_changes)},
+        )
+        rows = read_rows(self.path, ROWS).values
+        if rows.pop(_PROBLEM, self.problem.hash) != self.problem.hash:
+            raise StoreError(f"{self.path} was left by a run of another problem of that name; --fresh begins again.")
+        self._known = rows
+
+    def _changes(self, problem: Problem) -> dict[str, Any]:
+        stated = problem.to_dict()
+        return {name: stated.get(name) for name in {*stated, *self._stated} if stated.get(name) != self._stated.get(name)}
+
+    def _with_changes(self, changes: dict[str, Any]) -> Problem:
+        key = json.dumps(changes, sort_keys=True)
+        if key not in self._problems:
+            stated = {**self._stated, **changes}
+            self._problems[key] = Problem.from_dict({name: value for name, value in stated.items() if value is not None})
+        return self._problems[key]
+
+    def kept(self, stage: str, given: tuple, compute: Callable[[], Value]) -> Value:
+        """What a stage makes of given values: as an earlier run found it, else computed, and kept."""
+        if self.path is None:
+            return compute()
+        key = f"{stage} {hash_of(self._codec.written(given))}"
+        if key in self._known:
+            with suppress(KeyError, TypeError, ValueError):
+                found = self._codec.read(self._known[key])
+                self.found_again += 1
+                return found
+        value = compute()
+        self._known[key] = self._pending[key] = self._codec.written(value)
+        if time.monotonic() - self._last > EVERY:
+            self.write()
+        return value
+
+    def write(self) -> None:
+        """Put what was found since the last time into the file; a warning, once, where that is not possible."""
+        self._last = time.monotonic()
+        if self.path is None or not self._pending:
+            return
+        assert self.problem is not None
+        try:
+            put_rows(self.path, ROWS, {_PROBLEM: self.problem.hash, **self._pending})
+            self._pending = {}
+        except StoreError as error:
+            warnings.warn(f"{error} The solve goes on; an interrupt would lose it.", ReadOnlyRunWarning, stacklevel=2)
+            self.path = None
+
+    def told(self, stage: str, done: int, count: int, best: Optimum | None = None) -> None:
+        """Say how far a stage has come, and which gait is the best so far."""
+        self.best = best or self.best
+        self.progress(Progress(stage, done, count, self.best, time.monotonic() - self._begin))
+
+    @contextmanager
+    def under_way(self, seconds: float) -> Iterator[None]:
+        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds."""
+        token = _CURRENT.set(self)
+        try:
+            with interruptible(polled=False), time_limit(seconds):
+                yield
+        finally:
+            _CURRENT.reset(token)
+            self.write()
+
+
+_CURRENT: ContextVar[Run] = ContextVar("run")
+_NOTHING = Run()
+"""Where a stage is called by itself."""
+
+
+def this_run() -> Run:
+    """The run that is under way; one that keeps nothing if there is none."""
+    return _CURRENT.get(_NOTHING)

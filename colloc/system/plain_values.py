@@ -1,0 +1,99 @@
+"""Values as plain numbers, strings, lists and dictionaries, and back, exact to the last bit: for files of rows.
+
+Arrays become the base64 text of their bytes. A dataclass or named tuple becomes its fields and the name of its kind; kinds are
+listed by whoever reads, and nothing else is made from a file. Reading does not run what a kind does when it is made, such as
+scaling vectors to length 1, which would change the last bit.
+"""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+KIND, ARRAY = "kind", "array"
+
+
+class Own(NamedTuple):
+    """How a kind is written and read where its fields are not what should be kept."""
+
+    written: Callable[[Any], Any]
+    read: Callable[[Any], Any]
+
+
+class Codec:
+    """Writes and reads values of some kinds.
+
+    Parameters
+    ----------
+    kinds : iterable of type
+        Dataclasses and named tuples.
+    own : mapping of type to Own, optional
+        Kinds that are written otherwise.
+
+    Examples
+    --------
+    >>> from colloc.system.plain_values import Codec
+    >>> from colloc.mechanics.friction import Friction
+    >>> codec = Codec([Friction])
+    >>> codec.read(codec.written((Friction(2.0), 0.1)))
+    (Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.1)
+    """
+
+    def __init__(self, kinds: Iterable[type], own: Mapping[type, Own] | None = None) -> None:
+        self._kinds = {kind.__name__: kind for kind in kinds}
+        self._own = {kind.__name__: how for kind, how in (own or {}).items()}
+
+    def written(self, value: Any) -> Any:
+        """The value as JSON can hold it. `TypeError` for a kind that is not listed."""
+        name = type(value).__name__
+        if name in self._own:
+            return {KIND: name, "of": self._own[name].written(value)}
+        if name in self._kinds:
+            named = dict(zip(value._fields, value, strict=True)) if isinstance(value, tuple) else _fields(value)  # type: ignore[attr-defined]
+            return {KIND: name, "of": {key: self.written(part) for key, part in named.items()}}
+        if isinstance(value, np.ndarray):
+            data = np.ascontiguousarray(value)
+            return {ARRAY: base64.b64encode(data.tobytes()).decode(), "type": data.dtype.str, "shape": list(value.shape)}
+        if isinstance(value, np.generic):
+            return value.item()
+        if isinstance(value, tuple):
+            return {KIND: "tuple", "of": [self.written(part) for part in value]}
+        if isinstance(value, list):
+            return [self.written(part) for part in value]
+        if isinstance(value, dict):
+            return {KIND: "dict", "of": [[self.written(k), self.written(v)] for k, v in value.items()]}
+        if value is None or isinstance(value, (bool, int, float, str)):
+            return value
+        raise TypeError(f"cannot write a {name}.")
+
+    def read(self, plain: Any) -> Any:
+        """The value that `written` wrote. `KeyError`, `TypeError` or `ValueError` if it did not."""
+        if isinstance(plain, list):
+            return [self.read(part) for part in plain]
+        if not isinstance(plain, dict):
+            return plain
+        if ARRAY in plain:
+            data = np.frombuffer(base64.b64decode(plain[ARRAY]), dtype=np.dtype(plain["type"]))
+            return data.reshape(plain["shape"]).copy()
+        name, of = plain[KIND], plain["of"]
+        if name == "tuple":
+            return tuple(self.read(part) for part in of)
+        if name == "dict":
+            return {self.read(k): self.read(v) for k, v in of}
+        if name in self._own:
+            return self._own[name].read(of)
+        kind, values = self._kinds[name], {key: self.read(part) for key, part in of.items()}
+        if issubclass(kind, tuple):
+            return kind(**values)
+        made: Any = object.__new__(kind)
+        for key, value in values.items():
+            object.__setattr__(made, key, value)
+        return made
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
