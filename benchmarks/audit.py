@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.independent_replay import Crawler, Gait, Played, played_together
-from colloc import Chain, Friction, Harmonic, Problem, maximise_efficiency
+from colloc import Chain, Friction, Harmonic, Problem, solve
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.results.measured import measured
 from colloc.results.solution import SOLVED
@@ -61,7 +61,7 @@ def solved(number: int) -> dict[str, Any]:
     """What a search from the problem's guess says; with the gait and its certificate if there is one."""
     begin = time.process_time()
     problem, _, _ = random_problem(number)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     row: dict[str, Any] = {"number": number, "status": solution.status, "seconds": time.process_time() - begin}
     if solution.status != SOLVED:
         return row | {"fails": [check.name for check in solution.certificate.failures] or solution.message}

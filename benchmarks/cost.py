@@ -65,7 +65,7 @@ def anatomy(name: str) -> dict[str, float]:
     level, _ = answer(found)
     lap("full program by IPOPT")
     solution = Solution(problem, [*levels, level])
-    solution.certificate = certify(solution)
+    solution.certificate = certify(solution.answer)
     lap("certificate")
     save(solution, folder / "x.h5")
     lap("saving")

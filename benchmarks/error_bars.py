@@ -97,7 +97,7 @@ def solved_gait(number: int, own: bool) -> dict[str, list[float]] | None:
     """The same for the gait that the zoo's problem is solved by; None if the search fails."""
     problem = zoo_problem(number)
     solution = optimum(problem)
-    if not solution.levels or not solution.last.optimal:
+    if not solution.history or not solution.answer.optimal:
         return None
     breaks, body = solution.gait.corner_phases, problem.body
     friction = problem.friction

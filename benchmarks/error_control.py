@@ -98,7 +98,7 @@ def outcome(problem: Problem) -> dict:
     """Estimate and true errors of one case; ``optimal`` is False if there is nothing to judge."""
     begin = time.process_time()
     solution = optimum(problem)
-    if not solution.last.optimal or solution.last.delta != problem.delta:
+    if not solution.answer.optimal or solution.answer.delta != problem.delta:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
     error = mesh_error(problem, solution.mesh, gait, delta, max(problem.mesh_tolerance, 1e-6))
@@ -108,7 +108,7 @@ def outcome(problem: Problem) -> dict:
         guess=gait, delta_start=delta, scheme="gauss-5", intervals=max(problem.intervals, 24), mesh_tolerance=1e-7
     )
     reference = optimum(finer)
-    certificate = certify(reference, tolerance=1e-8) if reference.last.optimal else None
+    certificate = certify(reference.answer, tolerance=1e-8) if reference.answer.optimal else None
     if certificate is not None and certificate.efficiency < (1.0 - FLOOR) * fine.efficiency:
         certificate = None  # below the gait it started from: an optimum of another basin, not the reference of this one
     return {

@@ -29,9 +29,9 @@ def main() -> None:
         begin = time.process_time()
         solution = optimum(problem)
         spent = time.process_time() - begin
-        iterations = sum(level.iterations for level in solution.levels)
-        found = f"{solution.last.efficiency:.6f}" if solution.last.optimal else solution.last.status
-        print(f"{intervals:9d} {built:10.2f} {spent:17.2f} {len(solution.levels):7d} {iterations:11d}  {found}")
+        iterations = sum(level.iterations for level in solution.history)
+        found = f"{solution.answer.efficiency:.6f}" if solution.answer.optimal else solution.answer.status
+        print(f"{intervals:9d} {built:10.2f} {spent:17.2f} {len(solution.history):7d} {iterations:11d}  {found}")
 
 
 if __name__ == "__main__":

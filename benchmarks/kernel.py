@@ -26,7 +26,7 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.results.solution import SOLVED
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from scripts.models.ellipses import admissible
 from scripts.models.sweep import Route, performance
 
@@ -75,7 +75,7 @@ def starts(count: int) -> str:
     stated = read_problem_file(Path("problems/three_link.py")).problem
     for law in LAWS:
         problem = dataclasses.replace(stated, friction=law)
-        maximise_efficiency(problem)
+        solve(problem, 1)
         spent, certified, furthest = dict.fromkeys(WAYS, 0.0), dict.fromkeys(WAYS, 0), 0.0
         for k in range(count):
             found = {}
@@ -83,7 +83,7 @@ def starts(count: int) -> str:
             for name, way in WAYS.items():
                 begin = time.process_time()
                 with way():
-                    found[name] = maximise_efficiency(guessed)
+                    found[name] = solve(guessed, 1)
                 spent[name] += time.process_time() - begin
                 certified[name] += found[name].status == SOLVED
             furthest = max(furthest, abs(found["kernel"].efficiency - found["NumPy"].efficiency))

@@ -32,8 +32,8 @@ def solved(name: str, tolerance: float) -> list[object]:
     begin = time.process_time()
     solution = optimum(problem)
     seconds = time.process_time() - begin
-    error = solution.efficiency / certify(solution, tolerance=1e-8, instants=6400).efficiency - 1
-    effort = sum(level.iterations for level in solution.levels)
+    error = solution.efficiency / certify(solution.answer, tolerance=1e-8, instants=6400).efficiency - 1
+    effort = sum(level.iterations for level in solution.history)
     label = "uniform" if tolerance == 0 else f"{tolerance:.0e}"
     return [name, label, solution.mesh.n, f"{solution.efficiency:.7f}", error, effort, seconds]
 

@@ -22,7 +22,7 @@ from benchmarks.tables import markdown_table
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, Solution, Viscous, ellipse, replay
 from colloc.gaits.gait_fields import AnyGait as Gait
 from colloc.mechanics.law import Law
-from colloc.search.solve import best_gait
+from colloc.search.solve import solve
 from colloc.smooth.motion import Motion, sine_wave, tanh_wave
 from scripts.models.period import period
 
@@ -61,7 +61,7 @@ def sentence(what: str, source: str, printed: str, ours: str, holds: bool, note:
 
 def solved(law: Law, gait: Harmonic, starts: int = 8, **stated: object) -> Solution:
     """The certified optimum of three equal links."""
-    found = best_gait(Problem("published", friction=law, gait=gait, **stated), starts)  # type: ignore[arg-type]
+    found = solve(Problem("published", friction=law, gait=gait, **stated), starts)  # type: ignore[arg-type]
     if found.status != "solved":
         raise RuntimeError(f"{found.problem!r}: {found.status}; {found.message}")
     return found

@@ -94,15 +94,15 @@ def outcome(problem: Problem) -> dict:
     begin = time.process_time()
     solution = optimum(problem)
     seconds = time.process_time() - begin
-    replayed = certify(solution, tolerance=1e-8, instants=6400).efficiency
+    replayed = certify(solution.answer, tolerance=1e-8, instants=6400).efficiency
     return {
-        "optimal": solution.last.optimal and solution.last.delta == problem.delta,
+        "optimal": solution.answer.optimal and solution.answer.delta == problem.delta,
         "scheme": solution.mesh.scheme.name,
         "intervals": solution.mesh.n,
         "points": solution.mesh.n_point,
         "efficiency": solution.efficiency,
         "replayed": replayed,
-        "iterations": sum(level.iterations for level in solution.levels),
+        "iterations": sum(level.iterations for level in solution.history),
         "seconds": seconds,
     }
 

@@ -26,7 +26,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.results.solution import SOLVED
 from colloc.search.explore import STARTS
-from colloc.search.solve import best_gait
+from colloc.search.solve import solve
 
 BEST = Path(__file__).with_name("zoo_best.json")
 GOOD = 0.99
@@ -134,7 +134,7 @@ def main() -> None:
         problem = options.of(number)
         begin = time.process_time()
         try:
-            solution = best_gait(problem, options.starts)
+            solution = solve(problem, options.starts)
             status, value, message = solution.status, solution.value, solution.message
         except Exception as error:  # whatever goes wrong is what this is looking for
             status, value, message = "error", np.nan, f"{type(error).__name__}: {error}"

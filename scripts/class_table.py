@@ -21,7 +21,7 @@ from colloc.gaits.gait_fields import AnyGait, fields, gait_from
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.starts import delta_in, laid_into, over_links, prolonged
 from colloc.results.solution import Solution
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
 from scripts.class_report import DELTA, best, load, store, write
@@ -57,13 +57,13 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
         start = laid_into(row.gait_class, guess, body)
         stated = Problem("class", start, body, friction, row.gait_class, delta, FAR * delta, intervals=row.intervals)
         if known is None:
-            solution = maximise_efficiency(stated, watch)
+            solution = solve(stated, watch, 1)
         else:
-            solution = maximise_efficiency(prolonged(stated, guess, row.gait_class), watch)
+            solution = solve(prolonged(stated, guess, row.gait_class), watch, 1)
         for unit in (DELTA, SMALLER * DELTA):
             less, at = delta_in(row.gait_class, solution.gait, unit), solution.problem.delta
             if less < 0.5 * at and delta_matters(solution):
-                solution = maximise_efficiency(stated.with_(guess=solution.gait, delta=less, delta_start=at), watch)
+                solution = solve(stated.with_(guess=solution.gait, delta=less, delta_start=at), watch, 1)
     except TooLong:
         pass
     except CollocError as error:

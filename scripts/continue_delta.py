@@ -29,11 +29,11 @@ def value_at_zero_delta(solution: Solution) -> Limit:
         If fewer than two deltas converged.
     """
     first: dict[float, Level] = {}
-    for level in solution.levels:
+    for level in solution.history:
         if level.optimal:
             first.setdefault(level.delta, level)
     deltas = np.array(sorted(first))
-    if deltas.size < 2 or not solution.last.optimal:
+    if deltas.size < 2 or not solution.answer.optimal:
         raise ValueError("the limit delta -> 0 needs at least two converged levels of delta; start at a larger delta.")
     values = np.array([first[d].value for d in deltas])
     slopes = np.diff(values) / np.diff(deltas)
@@ -51,7 +51,7 @@ def resolution_warning(solution: Solution) -> str | None:
     Judged by the error of collocating the gait on its mesh, against a finer quadrature with velocities solved
     anew (see `colloc.verification.mesh_error`): stick phases that fall between the nodes show there.
     """
-    mesh, level = solution.mesh, solution.last
+    mesh, level = solution.mesh, solution.answer
     errors = mesh_errors(solution)
     if errors.sum() <= RESOLVED:
         return None

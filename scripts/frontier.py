@@ -41,7 +41,7 @@ from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save
 from colloc.search.relaxed import certified, relaxed_gaits
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import CollocError, NotConvergedError
 from scripts.check_potential import potentials
 from scripts.few_corners import polygon_near
@@ -173,7 +173,7 @@ def loop(row: Row, starts: int) -> dict[str, Any]:
         f"frontier-{row.name}-loop", Corners(inside * path), row.body, friction, Polygon(path.shape[1]), LOOP_DELTA,
         100 * LOOP_DELTA, row.limit, SPEED, intervals=30,
     )  # fmt: skip
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     save(solution, row.file("loop"))
     certificate = solution.certificate
     return {

@@ -24,7 +24,7 @@ from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_s
 from colloc.pictures.style import styled
 from colloc.results.solution import Solution, versions
 from colloc.search.explore import STARTS
-from colloc.search.solve import best_gait
+from colloc.search.solve import solve
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
@@ -59,14 +59,14 @@ def solved_row(solution: Solution) -> dict[str, Any]:
     """Numbers of a solved problem, by its certificate."""
     certificate = solution.certificate
     if not certificate.replayed:
-        return {"status": solution.status, "delta": solution.last.delta}
+        return {"status": solution.status, "delta": solution.answer.delta}
     return {
         "status": solution.status,
         "efficiency": certificate.efficiency,
         "error": certificate.efficiency_error,
         "distance": certificate.distance,
         "work": certificate.work,
-        "delta": solution.last.delta,
+        "delta": solution.answer.delta,
     }
 
 
@@ -125,7 +125,7 @@ def main() -> None:
         if names and example.name not in names:
             continue
         begin = time.process_time()
-        solution = best_gait(example.stated["PROBLEM"], example.stated.get("STARTS", STARTS))
+        solution = solve(example.stated["PROBLEM"], example.stated.get("STARTS", STARTS))
         row = solved_row(solution)
         row["cpu_seconds"] = round(time.process_time() - begin, 1)
         table[example.name] = row

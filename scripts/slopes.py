@@ -19,7 +19,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.results.solution import Solution
-from colloc.search.solve import best_gait
+from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
 from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.slope import slope_motion
@@ -46,7 +46,7 @@ def climbers(friction: Friction, harmonics: int, grades: tuple[float, ...], star
         problem = Problem("slope", guess, friction=friction, gait=Harmonic(harmonics, "bilateral"), grade=grade)
         best = None
         with suppress(NotConvergedError):
-            best = best_gait(problem, starts)
+            best = solve(problem, starts)
         found.append(best if best is not None and best.certificate.replayed else None)
         guess = guess if found[-1] is None else found[-1].gait
     return found

@@ -16,7 +16,7 @@ from colloc import Chain, Corners, Friction, Polygon, Problem
 from colloc.bounds.infinitesimal import small_gait
 from colloc.gaits.path_samples import path_length
 from colloc.results.solution import SOLVED
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from scripts.link_gaps import LYING, gaps
 
 SPEEDS = (0.1, 0.04, 0.02)
@@ -32,7 +32,7 @@ def row(symmetry: str, speed: float) -> list[str]:
     guess = Corners(small_gait(Chain(), Friction(), shape).path(shape, length))
     delta = DELTA_PER_SPEED * speed
     stated = Problem("small", guess, gait=Polygon(3, symmetry), intervals=30, smallest_shape_speed=speed)
-    solution = maximise_efficiency(stated.with_(delta=delta, delta_start=100 * delta))
+    solution = solve(stated.with_(delta=delta, delta_start=100 * delta), 1)
     certificate = solution.certificate
     if solution.status != SOLVED:
         return [symmetry, f"{2 * np.pi * speed:.3f}", f"{delta:.0e}", solution.status, *6 * [""]]

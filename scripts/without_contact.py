@@ -23,7 +23,7 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait, fields, gait_from
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.starts import delta_in, laid_into, prolonged
 from colloc.results.solution import SOLVED, Solution
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import CollocError
 from colloc.system.replaced_file import replaced_file
 from scripts.class_rows import equal_links, named_gait
@@ -112,7 +112,7 @@ def solved(case: Case, known: dict) -> Solution:
     start = guess(case, known)
     before = known.get(case.start, {}) if isinstance(case.start, str) else {}
     problem = stated(case, start)
-    return maximise_efficiency(prolonged(problem, start, case.gait_class) if "efficiency" in before else problem)
+    return solve(prolonged(problem, start, case.gait_class) if "efficiency" in before else problem, 1)
 
 
 def attempt(case: Case, known: dict) -> dict:

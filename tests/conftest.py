@@ -51,12 +51,12 @@ def solved(once):
     def result(name):
         from colloc.gaits.problem_file import read_problem_file
         from colloc.search.explore import STARTS
-        from colloc.search.solve import best_gait
+        from colloc.search.solve import solve
 
         stated = read_problem_file(ROOT / "problems" / f"{name}.py")
 
         def solve():
-            solution = best_gait(stated.problem, stated.starts or STARTS)
+            solution = solve(stated.problem, stated.starts or STARTS)
             solution.source = stated.source
             return solution
 

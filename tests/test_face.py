@@ -120,7 +120,7 @@ def test_progress_is_told_and_printed_only_if_asked(capsys):
     problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     levels, outcomes = [], []
     solution = colloc.solve(problem, starts=1, progress=levels.append)
-    assert [level.delta for level in levels] == [level.delta for level in solution.levels]
+    assert [level.delta for level in levels] == [level.delta for level in solution.history]
     found = colloc.multistart(problem, 2, progress=outcomes.append)
     assert {o.start for o in outcomes} == {0, 1}
     assert found.optima[0].best.efficiency == max(o.efficiency for o in outcomes)
@@ -139,7 +139,7 @@ def test_a_search_over_many_starts_tells_of_every_one_in_units_of_the_friction_s
     assert {s.count for s in tried} == {4}
     assert [s.done for s in followed] == list(range(1, len(followed) + 1))
     assert len(followed) >= 1
-    assert told[len(steps) :] == list(solution.levels)
+    assert told[len(steps) :] == list(solution.history)
     assert followed[-1].efficiency == pytest.approx(solution.efficiency, rel=1e-2)
     printed = capsys.readouterr().out.splitlines()
     assert printed[3].startswith("4 of 4 starts; best d/W = 0.02")

@@ -14,7 +14,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.results.store import load, save
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -62,7 +62,7 @@ def test_four_motors_do_better_than_two(monkeypatch):
     own = run("own_body.md", monkeypatch)
     gait = own.found.gait
     guess = Fourier(*(own.problem.body.belts @ part for part in (gait.mean, gait.cos, gait.sin)))
-    free = maximise_efficiency(own.problem.with_(body=Chain((0.2,) * 5), guess=guess))
+    free = solve(own.problem.with_(body=Chain((0.2,) * 5), guess=guess), 1)
     assert free.status == "solved"
     assert free.efficiency > own.found.efficiency
 

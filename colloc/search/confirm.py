@@ -185,7 +185,7 @@ def answer_of(problem: Problem, program: GaitProgram, result: NlpResult, delta: 
 
 
 def unconfirmed(optimum: Optimum) -> Answer:
-    """The gait as the search found it, with every other variable following from its balance: where there is no time for more."""
+    """The gait as the search found it, every other variable following from its balance: where there is no time for more."""
     space, (scaled, unit) = optimum.space, in_friction_units(optimum.problem)
     mesh, layout = space.phase_mesh(optimum.gait), problem_layout(scaled, space.mesh, space.knots)
     x = balanced_variables(scaled, layout, mesh, optimum.gait, space.full_parameters(optimum.v), optimum.delta)

@@ -95,8 +95,8 @@ def test_panels_and_steps_of_a_smooth_body():
 @pytest.mark.parametrize(("name", "iterations", "levels"), [("three_link", 65, 10), ("three_link_offset", 65, 10)])
 def test_effort_of_a_solve(solved, name, iterations, levels):
     solution, _ = solved(name)
-    assert sum(level.iterations for level in solution.levels) <= iterations
-    assert len(solution.levels) <= levels
+    assert sum(level.iterations for level in solution.history) <= iterations
+    assert len(solution.history) <= levels
     assert solution.mesh.n <= 40
 
 

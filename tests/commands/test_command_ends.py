@@ -261,7 +261,7 @@ def test_a_result_that_another_program_opened_is_read_and_verify_decides(result,
         again = load(result)
     assert again.changed
     assert not before.changed
-    assert again.last.x.tobytes() == before.last.x.tobytes()
+    assert again.answer.x.tobytes() == before.answer.x.tobytes()
     assert colloc(["verify", str(result)]) == 0
     printed = capsys.readouterr()
     assert "the file was changed after colloc wrote it" in printed.out

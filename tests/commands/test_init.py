@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from colloc import maximise_efficiency
+from colloc import solve
 from colloc.commands.ending import BAD_PROBLEM, OK
 from colloc.commands.init import main
 from colloc.gaits.problem_file import read_problem_file
@@ -23,7 +23,7 @@ def test_the_file_states_a_problem_of_so_many_links(links, tmp_path, capsys):
 def test_the_file_runs_as_it_is(tmp_path):
     path = tmp_path / "mine.py"
     main([str(path), "--links", "4"])
-    solution = maximise_efficiency(read_problem_file(path).problem)
+    solution = solve(read_problem_file(path).problem, 1)
     assert solution.status == "solved", solution.message
 
 

@@ -9,7 +9,7 @@ from colloc.gaits.starts import laid_into, over_links, prolonged
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
 from colloc.reduced.spaces import nearest_parameters, transcribed
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 from scripts.class_rows import FEWER, equal_links, named_gait, rows
 
@@ -98,10 +98,10 @@ def test_a_richer_class_keeps_what_its_seed_had():
     """From 100 times the final delta, where friction is regularised most, the search leaves this optimum: 0.3998."""
     problem = Problem("five", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60)
     near = prolonged(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"))
-    from_afar = maximise_efficiency(near.with_(delta_start=100 * near.delta))
+    from_afar = solve(near.with_(delta_start=100 * near.delta), 1)
     assert from_afar.status == "solved"
     assert from_afar.certificate.efficiency < 0.4003
-    solution = maximise_efficiency(near)
+    solution = solve(near, 1)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4010
 
@@ -109,7 +109,7 @@ def test_a_richer_class_keeps_what_its_seed_had():
 def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
     hexagon = Corners(np.array([[2.58068, 3.11378, 2.97774, 2.81594], [-2.58068, -2.58089, -2.67289, -2.81594]]), "bilateral")
     problem = Problem("six", hexagon, gait=Polygon(6, "bilateral"), intervals=60)
-    solution = maximise_efficiency(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80))
+    solution = solve(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4015
 

@@ -6,7 +6,7 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, replay
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")
@@ -48,7 +48,7 @@ def test_an_optimum_in_the_viscous_regime_is_not_called_solved():
     problem = Problem(
         "small", ellipse(1.0, 1e-6, 0.7e-6), gait=BILATERAL, intervals=12, smallest_shape_speed=1e-9, delta_start=1e-4
     )
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     if solution.status == SOLVED:  # only if it left the viscous regime altogether
         speed = np.abs(solution.gait.rates(FINE)).max()
         assert speed > 1e3 * problem.delta
@@ -67,7 +67,7 @@ def test_touching_is_admissible_and_crossing_is_not():
 
 def test_from_a_gait_that_touches_itself_the_answer_does_not_cross_or_is_refused():
     problem = Problem("touching", ellipse(0.0, 1.0, TOUCHING), gait=BILATERAL, intervals=12, delta_start=1e-2, delta=1e-3)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     depth = crossing_depth(BODY, solution.gait.angles(FINE)).max()
     if solution.status == SOLVED:
         assert depth < 1e-6
@@ -79,7 +79,7 @@ def test_from_a_gait_that_touches_itself_the_answer_does_not_cross_or_is_refused
 def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, delta):
     """The replay knows better than the mesh: a wrong efficiency is never called solved, and the message says why."""
     problem = Problem("coarse", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, intervals=intervals, delta=delta, mesh_tolerance=0)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     if delta < 1e-9:
         # gradients then carry rounding of 1e-16 / delta: first-order conditions may not be reached to 1e-6
         assert solution.status != SOLVED
@@ -96,7 +96,7 @@ def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, del
 
 def test_refinement_repairs_what_a_coarse_mesh_gets_wrong():
     problem = Problem("refined", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, intervals=8, delta=1e-8, delta_start=1e-3)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     assert solution.status == SOLVED
     assert solution.efficiency == pytest.approx(solution.certificate.efficiency, rel=1e-4)
 
@@ -114,7 +114,7 @@ def test_refinement_repairs_what_a_coarse_mesh_gets_wrong():
 def test_extreme_coefficients_are_solved_or_refused(law):
     friction = Friction(*law)
     problem = Problem("extreme", ellipse(0.2, 1.0, 0.6), friction=friction, gait=BILATERAL, intervals=12, delta=1e-3)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     if solution.status == SOLVED:
         assert solution.certificate.efficiency <= 1 / friction.smallest
         again = replay(BODY, friction, lambda t: (solution.gait.angles(t), solution.gait.rates(t)), 1e-3, tolerance=1e-7)

@@ -17,7 +17,7 @@ from colloc.laws.viscous import Viscous
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 
 COULOMB = OwnLaw("-where(vs > 0, 1, 1.5)*vs/speed", "-2*vn/speed")
@@ -88,7 +88,7 @@ def test_a_stated_law_has_the_optimum_of_the_built_in_one():
     values = []
     for law in (Friction(2.0, 1.0, 1.0), OwnLaw("-vs/speed", "-2*vn/speed")):
         problem = Problem("own", friction=law, gait=Harmonic(1, "bilateral"), guess=ellipse(0, 2.5, 1.2), mesh_tolerance=1e-3)
-        solution = maximise_efficiency(problem)
+        solution = solve(problem, 1)
         assert solution.status == "solved"
         values.append(solution.efficiency)
     assert values[0] == pytest.approx(values[1], rel=1e-6)

@@ -19,7 +19,7 @@ from colloc.laws.viscous import Viscous
 from colloc.mechanics.chain import Chain
 from colloc.pictures.report_page import report_page
 from colloc.results.store import load, save
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
@@ -91,7 +91,7 @@ def test_a_retraced_stroke_goes_nowhere():
 
 
 def test_purcells_swimmer_is_solved_certified_kept_and_read(tmp_path):
-    solution = maximise_efficiency(load_problem(ROOT / "problems/purcell.py"))
+    solution = solve(load_problem(ROOT / "problems/purcell.py"), 1)
     assert solution.status == "solved"
     assert solution.measured.value == pytest.approx(0.0115705, abs=1e-7)
     read = load(save(solution, tmp_path / "purcell.h5"))
@@ -106,7 +106,7 @@ def test_harmonics_settle_the_pace_and_more_of_them_come_closer_to_the_best_one_
     problem = load_problem(ROOT / "problems/purcell.py")
     spread = []
     for harmonics, best in ((1, 0.0115705), (3, 0.0123108)):
-        solution = maximise_efficiency(problem.with_(gait=Harmonic(harmonics, "antipodal")))
+        solution = solve(problem.with_(gait=Harmonic(harmonics, "antipodal")), 1)
         assert solution.status == "solved"
         assert solution.measured.value == pytest.approx(best, abs=1e-7)
         power = solution.power(solution.sample(np.arange(64) / 64))

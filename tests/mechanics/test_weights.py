@@ -14,7 +14,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5)]
@@ -93,9 +93,9 @@ def test_the_replay_is_that_of_a_program_of_its_own():
 
 def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
     problem = Problem("heavy_ends", body=Chain(weights=(0.4, 0.2, 0.4)), gait=Harmonic(1, "bilateral"))
-    found = maximise_efficiency(problem)
+    found = solve(problem, 1)
     assert found.status == "solved"
-    assert found.last.program == "full"
+    assert found.answer.program == "full"
     again = load(save(found, tmp_path / "heavy.h5"))
     assert again.problem.body == problem.body
     assert again.problem.hash == problem.hash

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Harmonic, Problem, ProblemError, ellipse, maximise_efficiency
+from colloc import Chain, Harmonic, Problem, ProblemError, ellipse, solve
 from colloc.bounds.coulomb_motion import admissible
 from colloc.mechanics.contact import crossing_depth, ends_and_links, gap, overlap, square_distance
 
@@ -76,7 +76,7 @@ def test_a_guess_that_overlaps_is_refused():
 def test_the_best_folded_gait_keeps_its_width_and_pays_for_it():
     guess, width = ellipse(A0=2.4, A1=0.3, B1=0.5), 0.03
     problem = Problem("folded", guess, Chain(width=width), gait=Harmonic(1, "bilateral"), delta_start=1e-3, intervals=12)
-    wide = maximise_efficiency(problem)
+    wide = solve(problem, 1)
     assert wide.status == "solved"
     # as lines the links lie on each other, at 0.1030 (problems/three_link_folded.py)
     assert 0.09 < wide.certificate.efficiency < 0.098

@@ -122,7 +122,7 @@ EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&<!--"
 
 def test_everything_from_the_file_is_escaped(three_link):
     checks = (Check(EVIL, 1.0, 0.0, EVIL), *three_link.certificate.checks)
-    levels = [replace(three_link.levels[0], status=EVIL, optimal=False), *three_link.levels]
+    levels = [replace(three_link.history[0], status=EVIL, optimal=False), *three_link.history]
     versions = {EVIL: EVIL, "colloc": EVIL}
     evil = Solution(three_link.problem, levels, replace(three_link.certificate, checks=checks), 1.0, EVIL, EVIL, versions)
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
@@ -174,7 +174,7 @@ def test_pictures_take_colour_and_font_from_the_page_and_do_not_style_it(page):
 
 def test_failures_show_in_red_and_a_solve_without_levels_has_a_page_too(three_link):
     bad = replace(three_link.certificate, checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks))
-    text = " ".join(outline(report_page(Solution(three_link.problem, three_link.levels, bad))).text)
+    text = " ".join(outline(report_page(Solution(three_link.problem, three_link.history, bad))).text)
     assert "✗ fails" in text
     assert "✗ certificate failed" in text
     empty = Solution(three_link.problem, [], message="no first level.")
@@ -283,10 +283,10 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
 
 
 def test_levels_on_the_way_do_not_alarm_and_the_last_one_does(three_link):
-    rough = replace(three_link.levels[0], optimal=False, status="not stationary")
-    good = replace(three_link, levels=[rough, *three_link.levels[1:]])
+    rough = replace(three_link.history[0], optimal=False, status="not stationary")
+    good = replace(three_link, levels=[rough, *three_link.history[1:]])
     text = " ".join(outline(report_page(good)).text)
     assert "on the way" in text
     assert "✗" not in text
-    bad = replace(three_link, levels=[*three_link.levels[:-1], rough])
+    bad = replace(three_link, levels=[*three_link.history[:-1], rough])
     assert "✗ not stationary" in " ".join(outline(report_page(bad)).text)

@@ -79,7 +79,7 @@ def certificates_of_guesses():
     for solution, second in zip(_solutions(), (None, left_out, None, left_out), strict=True):
         if solution.problem.name == "smooth":  # which takes as long as all others
             continue
-        judged = certify(solution, tolerance=1e-3, instants=60, second_order=second)
+        judged = certify(solution.answer, tolerance=1e-3, instants=60, second_order=second)
         lines = [(check.name, check.meaning, check.threshold, check.passed) for check in judged.checks]
         noise = ("balance at nodes", "closure", "KKT error", "constraint violation")
         values = {check.name: check.value for check in judged.checks if check.name not in noise}
@@ -94,7 +94,7 @@ def motions_of_guesses():
         data = solution.to_xarray(t)
         found += [motion, solution.power(motion), solution.at_points()[1], solution.measured, solution.standing, repr(solution)]
         found += [{name: (str(data[name].dims), data[name].attrs, data[name].values) for name in data.variables}]
-        found += [solution.status, solution.value, solution.delta_per_period, repr(solution.last), repr(motion)]
+        found += [solution.status, solution.value, solution.delta_per_period, repr(solution.answer), repr(motion)]
         found.append([str(name) for name in solution.to_dataframe(t).columns])
     return found
 
@@ -122,7 +122,7 @@ def solutions_on_the_disk():
         for k, solution in enumerate(_solutions()[1:]):
             path = save(solution, Path(folder) / f"{k}.h5")
             again = load(path)
-            found += [_contents(path), again.last.x, again.status, again.message, again.problem.hash == solution.problem.hash]
+            found += [_contents(path), again.answer.x, again.status, again.message, again.problem.hash == solution.problem.hash]
     return found
 
 
@@ -164,7 +164,7 @@ CURVATURES = (
 def verdicts_of_second_order():
     """The same solution with curvatures of every kind."""
     solution, found = _solutions()[0], []
-    size = abs(solution.last.value)
+    size = abs(solution.answer.value)
     with pytest.MonkeyPatch.context() as patch:
         for smallest, error, free, slope in CURVATURES:
             known = Curvature(

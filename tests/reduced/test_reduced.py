@@ -98,7 +98,7 @@ def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
     space, v = space_near(problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))]))
     solution = Solution(problem, [level_found(Found.at(space, v, problem.delta))])
     again = load(save(solution, tmp_path / "path.h5"))
-    np.testing.assert_array_equal(again.last.knots, edges)
+    np.testing.assert_array_equal(again.answer.knots, edges)
     np.testing.assert_array_equal(again.gait.shapes, solution.gait.shapes)
 
 
@@ -109,7 +109,7 @@ def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     """Tail velocities and link forces among the variables, the balance among the constraints; two programs, one solution."""
     problem = Problem("p", ellipse(1.0, 0.7, 1.1), friction=Friction(1.7, 1, 1.3), gait=gait, intervals=24, delta=3e-3)
     solution = optimum(problem.with_(mesh_tolerance=0.0))
-    found, answer = solution.levels[-2:]
+    found, answer = solution.history[-2:]
     assert (found.program, answer.program) == ("reduced", "full")
     assert max(answer.kkt_error, answer.violation, answer.complementarity) < 1e-8
     assert answer.iterations <= 15

@@ -167,9 +167,9 @@ def test_the_gait_between_two_ways_of_bending_is_a_saddle():
 
 def test_an_optimum_is_better_than_its_neighbours():
     solution = optimum(PROBLEM.with_(friction=Friction(10, 1, 1), intervals=20))
-    space, v = space_near(solution.problem, solution.gait, solution.last.edges, solution.last.scheme)
+    space, v = space_near(solution.problem, solution.gait, solution.answer.edges, solution.answer.scheme)
     space.move_checks(v)
-    program = ReducedProgram(space, solution.last.delta)
+    program = ReducedProgram(space, solution.answer.delta)
     found = curvature(program, v)
     assert found.n_free == v.size
     assert found.smallest > 100 * found.error

@@ -36,7 +36,7 @@ def replays(three_link):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(measured, "replay", kept)
-        assert certify(three_link).passed
+        assert certify(three_link.answer).passed
     return found
 
 
@@ -47,13 +47,13 @@ def failures(three_link, replays, monkeypatch):
     def names(solution=three_link, change=lambda part, replayed: replayed):
         largest = max(replays)
         monkeypatch.setattr(measured, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
-        return {check.name for check in certify(solution).failures}
+        return {check.name for check in certify(solution.answer).failures}
 
     return names
 
 
 def with_last(solution, **changes):
-    return Solution(solution.problem, [*solution.levels[:-1], replace(solution.last, **changes)])
+    return Solution(solution.problem, [*solution.history[:-1], replace(solution.answer, **changes)])
 
 
 def judged(name, run):
@@ -83,7 +83,7 @@ def test_balance_at_the_nodes(failures, three_link):
     index = three_link.layout.z[0, 10]
 
     def off(step):
-        x = three_link.last.x.copy()
+        x = three_link.answer.x.copy()
         x[index] += step
         return with_last(three_link, x=x)
 
@@ -107,11 +107,11 @@ def test_what_the_replay_measures(failures, name, changes):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_collocated_against_replayed_efficiency(failures, three_link, replays, sign):
-    true, before = replays[max(replays)].efficiency, three_link.levels[-2]
+    true, before = replays[max(replays)].efficiency, three_link.history[-2]
 
     def run(f):
         claimed = true * (1 + sign * f * 1e-4)
-        levels = [*three_link.levels[:-2], replace(before, efficiency=claimed), replace(three_link.last, efficiency=claimed)]
+        levels = [*three_link.history[:-2], replace(before, efficiency=claimed), replace(three_link.last, efficiency=claimed)]
         return failures(Solution(three_link.problem, levels))
 
     judged("replay gap", run)
@@ -137,7 +137,7 @@ def test_joint_limits_are_those_of_the_problem(failures, three_link):
     largest = np.abs(three_link.gait.angles(np.linspace(0, 1, 20001))).max()
 
     def run(f):
-        return failures(Solution(three_link.problem.with_(joint_limit=largest - f * 1e-6), three_link.levels))
+        return failures(Solution(three_link.problem.with_(joint_limit=largest - f * 1e-6), three_link.history))
 
     judged("joint limits", run)
 
@@ -238,7 +238,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
 def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to_delta(three_link, replays, monkeypatch):
     fine = replays[max(replays)]
     monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(fine, distance=fine.distance * (1 + 3 * a[3])))
-    assert certify(three_link).efficiency_at_zero_delta == pytest.approx(fine.efficiency, rel=1e-12)
+    assert certify(three_link.answer).efficiency_at_zero_delta == pytest.approx(fine.efficiency, rel=1e-12)
 
 
 def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(three_link, replays):
@@ -253,7 +253,7 @@ def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(thre
 
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
     monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
-    known, fine = certify(three_link), replays[max(replays)]
+    known, fine = certify(three_link.answer), replays[max(replays)]
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
 
@@ -280,7 +280,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     assert failures(gapped) == {"replay gap"}
     assert failures(gapped, open_by(2.5e-4)) == set()
     monkeypatch.setattr(measured, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
-    known = certify(three_link)
+    known = certify(three_link.answer)
     assert min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency) >= 5e-3
     assert known.work_error >= 5e-3 * known.work
 
@@ -298,12 +298,12 @@ def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link, monk
     assert run(0.5, error=1.0) == set()
     assert run(1.1, error=1.0) == {"second order"}
     monkeypatch.setattr(second_order, "curvature", lambda *a: Curvature(-1.0, 0.0, 3, np.eye(3)[0], 0.0))
-    assert "a saddle" in next(c.meaning for c in certify(three_link).checks if c.name == "second order")
+    assert "a saddle" in next(c.meaning for c in certify(three_link.answer).checks if c.name == "second order")
     monkeypatch.setattr(second_order, "curvature", lambda *a: Curvature(1e-6, 0.0, 3, np.eye(3)[0], 0.0))
-    assert "flat" in next(c.meaning for c in certify(three_link).checks if c.name == "second order")
+    assert "flat" in next(c.meaning for c in certify(three_link.answer).checks if c.name == "second order")
 
 
 def test_an_optimum_is_said_to_be_one(three_link):
-    (check,) = (c for c in certify(three_link).checks if c.name == "second order")
+    (check,) = (c for c in certify(three_link.answer).checks if c.name == "second order")
     assert check.passed
     assert "an optimum" in check.meaning

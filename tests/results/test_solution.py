@@ -18,7 +18,7 @@ from colloc.pictures.solution_figure import solution_figure
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.certify import certify
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
@@ -38,8 +38,8 @@ def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):
 
 
 def test_iterations_stay_within_budget(three_link):
-    assert sum(level.iterations for level in three_link.levels) < 120
-    assert all(level.optimal for level in three_link.levels)
+    assert sum(level.iterations for level in three_link.history) < 120
+    assert all(level.optimal for level in three_link.history)
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
@@ -55,7 +55,7 @@ def test_sampled_motion_is_consistent(symmetry, solved):
     error = np.gradient(motion.theta, dt)[middle] - motion.z[2][middle]
     assert np.median(np.abs(error)) < 1e-3
     body = solution.problem.body
-    now = instant(body, solution.problem.friction, motion.angles, motion.rates, motion.z, solution.last.delta)
+    now = instant(body, solution.problem.friction, motion.angles, motion.rates, motion.z, solution.answer.delta)
     cx, cy = body.centre_velocity(now.posture, now.velocity)
     c, s = np.cos(motion.theta), np.sin(motion.theta)
     speed = np.stack([c * cx[0] - s * cy[0], s * cx[0] + c * cy[0]])
@@ -65,7 +65,7 @@ def test_sampled_motion_is_consistent(symmetry, solved):
     velocity = np.stack([c * along - s * across, s * along + c * across])
     assert np.median(np.abs(np.gradient(motion.tail, dt, axis=1) - velocity)) < 2e-3
     # tail velocities are those of the balance
-    exact = solve_balance(body, solution.problem.friction, motion.angles, motion.rates, solution.last.delta).z
+    exact = solve_balance(body, solution.problem.friction, motion.angles, motion.rates, solution.answer.delta).z
     assert np.median(np.abs(motion.z - exact)) < 2e-3
     # a period advances by d along x and does not turn
     np.testing.assert_allclose(motion.centre[:, -1] - motion.centre[:, 0], [solution.distance, 0.0], atol=2e-6)
@@ -78,9 +78,9 @@ def test_sampled_motion_is_consistent(symmetry, solved):
 def test_headings_a_turn_further_are_those_of_the_same_motion(unsolved):
     problem = Problem("turned", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "antipodal"), delta=0.3, delta_start=0.3)
     solution, t = unsolved(problem), np.linspace(0, 2, 41)
-    x = solution.last.x.copy()
+    x = solution.answer.x.copy()
     x[solution.layout.theta] += 2 * np.pi
-    before, after = solution.sample(t), Solution(problem, [replace(solution.last, x=x)]).sample(t)
+    before, after = solution.sample(t), Solution(problem, [replace(solution.answer, x=x)]).sample(t)
     np.testing.assert_allclose(after.theta, before.theta + 2 * np.pi, atol=1e-12)
     np.testing.assert_allclose(after.centre, before.centre, atol=1e-12)
     np.testing.assert_allclose(after.tail, before.tail, atol=1e-12)
@@ -91,11 +91,11 @@ def _smooth(symmetry):
     problem = Problem(
         "smooth", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, symmetry), delta=0.3, delta_start=0.3, mesh_tolerance=1e-4
     )
-    return maximise_efficiency(problem)
+    return solve(problem, 1)
 
 
 def test_distance_and_work_equal_those_of_the_replay_on_a_grid_ten_times_finer(three_link):
-    certificate = certify(three_link, instants=2 * 10 * three_link.mesh.n_point)
+    certificate = certify(three_link.answer, instants=2 * 10 * three_link.mesh.n_point)
     assert abs(three_link.efficiency / certificate.efficiency - 1) < 1e-4
     assert certificate.efficiency_error < 1e-6
     assert certificate.passed
@@ -105,15 +105,15 @@ def test_a_solution_that_lies_fails_its_certificate(three_link):
     from colloc.results.solution import Solution
 
     def with_last(**changes):
-        return Solution(three_link.problem, [*three_link.levels[:-1], replace(three_link.last, **changes)])
+        return Solution(three_link.problem, [*three_link.history[:-1], replace(three_link.last, **changes)])
 
     names = {c.name for c in certify(with_last(efficiency=three_link.efficiency * 1.001)).failures}
     assert names == {"replay gap"}
-    wrong = three_link.last.x.copy()
+    wrong = three_link.answer.x.copy()
     wrong[three_link.layout.parameters[0, 0]] += 0.3
     names = {c.name for c in certify(with_last(x=wrong)).failures}
     assert {"joint limits", "replay gap"} <= names
-    for changes in ({"optimal": False}, {"delta": 1.5 * three_link.last.delta}):  # the last level, and the delta asked for
+    for changes in ({"optimal": False}, {"delta": 1.5 * three_link.answer.delta}):  # the last level, and the delta asked for
         failed = with_last(**changes)
         failed.certificate = three_link.certificate
         assert failed.status == "not converged"
@@ -131,8 +131,8 @@ def test_refined_meshes_reach_one_part_in_a_million(scheme):
         scheme=scheme,
         mesh_tolerance=1e-6,
     )
-    solution = maximise_efficiency(problem)
-    certificate = certify(solution, tolerance=1e-8, instants=6400)
+    solution = solve(problem, 1)
+    certificate = certify(solution.answer, tolerance=1e-8, instants=6400)
     assert solution.status == "solved"
     assert abs(solution.efficiency / certificate.efficiency - 1) < 1e-6 + certificate.efficiency_error / certificate.efficiency
     assert abs(certificate.efficiency - 0.2600297) < 1e-6
@@ -140,21 +140,21 @@ def test_refined_meshes_reach_one_part_in_a_million(scheme):
 
 @pytest.mark.slow
 def test_lifted_and_map_formulations_find_the_same_optimum(three_link):
-    other = maximise_efficiency(three_link.problem.with_(formulation="full", intervals=30))
+    other = solve(three_link.problem.with_(formulation="full", intervals=30), 1)
     assert other.status == "solved"
     assert abs(other.certificate.efficiency - three_link.certificate.efficiency) < 1e-5
 
 
 def test_a_solution_is_shown_in_a_line(three_link):
     assert re.fullmatch(r"<Solution three_link, solved, d/W = 0\.26003 \+- \de-\d\d at delta = 1.0e-04>", repr(three_link))
-    failed = Solution(three_link.problem, three_link.levels[:1])
+    failed = Solution(three_link.problem, three_link.history[:1])
     assert "three_link, not converged" in repr(failed)
     assert "(not replayed) at delta = 2.0e-02" in repr(failed)
     assert repr(Solution(three_link.problem, [])) == "<Solution three_link, not converged>"
 
 
 def test_the_tour_of_the_readme_works_on_a_failed_solution_and_certifies_nothing(three_link, tmp_path):
-    for failed in (Solution(three_link.problem, three_link.levels[:1]), Solution(three_link.problem, [])):
+    for failed in (Solution(three_link.problem, three_link.history[:1]), Solution(three_link.problem, [])):
         again = load(save(failed, tmp_path / "failed.h5"))
         for solution in (failed, again):
             assert solution.status == "not converged"

@@ -18,8 +18,8 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
     assert again.status == "solved"
     assert again.certificate == three_link.certificate
     assert again.source == three_link.source
-    assert len(again.levels) == len(three_link.levels)
-    np.testing.assert_array_equal(again.last.x, three_link.last.x)
+    assert len(again.history) == len(three_link.history)
+    np.testing.assert_array_equal(again.answer.x, three_link.answer.x)
     t = np.linspace(0, 2, 11)
     np.testing.assert_array_equal(again.sample(t).tail, three_link.sample(t).tail)
 
@@ -31,7 +31,7 @@ def test_plain_h5py_reads_the_motion_with_units(three_link, tmp_path):
         assert angles.shape == (2, file["motion/t"].size)
         assert file.attrs["status"].decode() == "solved"
         assert "PROBLEM" in file["source"].asstr()[()]
-        assert file["levels/000"].attrs["delta"] == three_link.levels[0].delta
+        assert file["levels/000"].attrs["delta"] == three_link.history[0].delta
 
 
 def test_nothing_is_left_behind_and_a_failed_write_keeps_the_old_file(three_link, tmp_path, monkeypatch):
@@ -119,9 +119,9 @@ def test_a_file_of_the_former_format_is_read_verified_and_saved_as_the_present_o
     from colloc.commands.main import main as colloc
 
     solution = load(former)
-    assert (solution.status, solution.problem.name, solution.last.delta) == ("solved", "quick", 1e-2)
+    assert (solution.status, solution.problem.name, solution.answer.delta) == ("solved", "quick", 1e-2)
     with h5py.File(former) as file:
-        np.testing.assert_array_equal(solution.last.x, file[f"levels/{len(solution.levels) - 1:03d}/x"])
+        np.testing.assert_array_equal(solution.answer.x, file[f"levels/{len(solution.history) - 1:03d}/x"])
         np.testing.assert_array_equal(solution.gait.cos, file["gait/cos"])
         assert solution.source == file["source"].asstr()[()]
         assert [check.meaning for check in solution.certificate.checks] == file["certificate/meaning"].asstr()[()].tolist()

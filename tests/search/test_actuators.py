@@ -24,7 +24,7 @@ from colloc import (
 from colloc.commands import verify
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power_in_balance, joint_moments
 from colloc.mechanics.balance import instant
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 
 ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
@@ -100,12 +100,12 @@ def test_of_a_law_without_a_degree_driven_power_is_the_positive_part_up_to_what_
 
 @pytest.fixture(scope="module")
 def free():
-    return maximise_efficiency(USUAL)
+    return solve(USUAL, 1)
 
 
 @pytest.fixture(scope="module")
 def weak():
-    return maximise_efficiency(USUAL.with_(power_limit=0.6))
+    return solve(USUAL.with_(power_limit=0.6), 1)
 
 
 def test_the_replay_tells_the_largest_torques_and_powers(free):
@@ -117,14 +117,14 @@ def test_the_replay_tells_the_largest_torques_and_powers(free):
 
 
 def test_limits_that_nothing_reaches_change_nothing(free):
-    same = maximise_efficiency(USUAL.with_(torque_limit=0.06, power_limit=(0.9, 0.9)))
+    same = solve(USUAL.with_(torque_limit=0.06, power_limit=(0.9, 0.9)), 1)
     assert same.status == "solved"
     assert same.efficiency == pytest.approx(free.efficiency, rel=1e-8)
 
 
 def test_weak_motors_cost_efficiency_and_keep_their_limit_between_the_nodes(free, weak):
     assert weak.status == "solved"
-    assert weak.last.program == "full"
+    assert weak.answer.program == "full"
     assert weak.efficiency < 0.95 * free.efficiency
     shares = replay(Chain(), Friction(), weak.gait, 1e-4, instants=6400, limits=ONE).shares
     assert shares[2:].max() == pytest.approx(0.6, rel=1e-4)
@@ -154,7 +154,7 @@ def test_limits_are_kept_in_files_and_verified(weak, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_weaker_friction_and_motors_as_much_weaker_have_the_same_gait(weak):
-    scaled = maximise_efficiency(USUAL.with_(friction=Friction(1e-3, 1e-3, 1e-3), power_limit=6e-4))
+    scaled = solve(USUAL.with_(friction=Friction(1e-3, 1e-3, 1e-3), power_limit=6e-4), 1)
     assert scaled.status == "solved"
     assert scaled.efficiency == pytest.approx(1e3 * weak.efficiency, rel=1e-9)
 
@@ -162,18 +162,18 @@ def test_weaker_friction_and_motors_as_much_weaker_have_the_same_gait(weak):
 @pytest.mark.slow
 def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_price_it():
     problem = Problem("four", body=Chain((0.25,) * 4), gait=Harmonic(1, "bilateral"), torque_limit=(0.1, 0.047, 0.1))
-    found = maximise_efficiency(problem.with_(guess=maximise_efficiency(problem.with_(torque_limit=None)).gait))
+    found = solve(problem.with_(guess=solve(problem.with_(torque_limit=None), 1).gait), 1)
     assert found.status == "solved"
     # the price of a limit is the sum of the multipliers of its rows: shares are moments over it
-    price = np.abs(found.last.lam_g[-3 * found.mesh.n_point :]).sum() / 0.047
+    price = np.abs(found.answer.lam_g[-3 * found.mesh.n_point :]).sum() / 0.047
     less, more = (found.problem.with_(torque_limit=(0.1, limit, 0.1), guess=found.gait) for limit in (0.0465, 0.0475))
-    gained = maximise_efficiency(more).efficiency - maximise_efficiency(less).efficiency
+    gained = solve(more, 1).efficiency - solve(less, 1).efficiency
     assert gained / 1e-3 == pytest.approx(price, rel=0.05)
 
 
 @pytest.mark.slow
 def test_joints_too_weak_for_any_gait_are_named():
-    found = maximise_efficiency(USUAL.with_(torque_limit=0.05))
+    found = solve(USUAL.with_(torque_limit=0.05), 1)
     assert found.status == "not converged"
     assert "the limit on the torque of joint" in found.message
     assert "allow the joints more" in found.message

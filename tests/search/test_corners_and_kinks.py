@@ -5,7 +5,7 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.starts import latin_hypercube_gait
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 
 
 def from_start(start, friction, symmetry, **fields):
@@ -17,7 +17,7 @@ def from_start(start, friction, symmetry, **fields):
 
 def test_an_optimum_that_rounds_the_corner_of_the_contact_region_is_certified():
     """The fourth maximum of the paper's sweep, 0.1240. Constrained at fixed instants it ended 6e-3 rad inside the region."""
-    solution = maximise_efficiency(from_start(2, Friction(), "antipodal", intervals=20))
+    solution = solve(from_start(2, Friction(), "antipodal", intervals=20), 1)
     assert solution.status == "solved", solution.message
     assert solution.certificate.efficiency == pytest.approx(0.1240, abs=1e-4)
     # it does round the corner: both sums of the angles are near pi at once
@@ -28,13 +28,13 @@ def test_an_optimum_that_rounds_the_corner_of_the_contact_region_is_certified():
 @pytest.mark.slow
 def test_refinement_encloses_a_kink_instead_of_following_it():
     """Five meshes, each with its knot moved after the kink, had ended at an error of 3.1e-5."""
-    first = maximise_efficiency(from_start(6, Friction(1.7, 1.0, 1.3), "none", intervals=40))
+    first = solve(from_start(6, Friction(1.7, 1.0, 1.3), "none", intervals=40), 1)
     problem = first.problem.with_(guess=first.gait, delta=1e-6, delta_start=4e-3)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     assert solution.status == "solved", solution.message
     checks = {check.name: check for check in solution.certificate.checks}
     assert checks["mesh error"].value < 2e-5
-    assert len({level.edges.size for level in solution.levels}) <= 4
+    assert len({level.edges.size for level in solution.history}) <= 4
 
 
 @pytest.mark.slow
@@ -42,7 +42,7 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
 def test_refinement_ends_where_an_optimum_is_flat(start):
     """Every new mesh moved these gaits by 0.01 rad, away from where it was fine: after eight the error was 8e-5 and 1.1e-4."""
     problem = Problem("flat", body=Chain((0.2, 0.5, 0.3)), friction=Friction(3, 1, 1), gait=Harmonic(3, "none"))
-    solution = maximise_efficiency(problem.with_(guess=latin_hypercube_gait(problem, 0, start)))
+    solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, start)), 1)
     assert solution.status == "solved", solution.message
     checks = {check.name: check for check in solution.certificate.checks}
     assert checks["mesh error"].value < 3e-5
@@ -53,7 +53,7 @@ def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     problem = Problem(
         "kink", body=Chain((0.2, 0.5, 0.3)), friction=Friction(0.5, 1.0, 5.0), gait=Harmonic(3, "none"), delta=1e-4
     )
-    solution = maximise_efficiency(problem.with_(guess=latin_hypercube_gait(problem, 0, 3)))
+    solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 3)), 1)
     assert solution.status == "solved", solution.message
     assert "kink" in solution.message
     assert solution.certificate.efficiency == pytest.approx(0.4162, abs=2e-4)

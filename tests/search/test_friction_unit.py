@@ -7,7 +7,7 @@ from colloc.gaits.friction_unit import friction_unit, in_friction_units
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 
 
 def stated(*mu, **changes):
@@ -24,23 +24,23 @@ def test_friction_of_usual_size_is_left_alone():
 
 @pytest.fixture(scope="module")
 def usual():
-    return maximise_efficiency(stated(1.0, 1.0, 1.0))
+    return solve(stated(1.0, 1.0, 1.0), 1)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_coefficients_of_any_size_are_solved_and_certified(usual, size):
     """Work is proportional to the coefficients, efficiency inversely; the gait is the same."""
     seen = []
-    solution = maximise_efficiency(stated(size, size, size), seen.append)
+    solution = solve(stated(size, size, size), seen.append, 1)
     assert solution.status == "solved"
     assert solution.efficiency * size == pytest.approx(usual.efficiency, rel=1e-9)
     assert solution.certificate.efficiency * size == pytest.approx(usual.certificate.efficiency, rel=1e-6)
     assert solution.work / size == pytest.approx(usual.work, rel=1e-9)
     np.testing.assert_allclose(solution.gait.cos, usual.gait.cos, rtol=1e-6)
-    assert [level.efficiency for level in seen] == [level.efficiency for level in solution.levels]
-    assert solution.last.kkt_error < 1e-6
+    assert [level.efficiency for level in seen] == [level.efficiency for level in solution.history]
+    assert solution.answer.kkt_error < 1e-6
 
-    resumed = maximise_efficiency(stated(size, size, size), before=solution.levels)
+    resumed = solve(stated(size, size, size), before=solution.history, 1)
     assert resumed.status == "solved"
     assert resumed.efficiency == pytest.approx(solution.efficiency, rel=1e-6)
 

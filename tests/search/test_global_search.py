@@ -13,14 +13,14 @@ from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load, save
 from colloc.search import explore, solve
 from colloc.search.explore import candidates
-from colloc.search.solve import best_gait
+from colloc.search.solve import solve
 
 UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Friction(2, 1, 1.4), gait=Harmonic(2, "none"))
 
 
 @pytest.mark.slow
 def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside_it(tmp_path):
-    solution = best_gait(UNEQUAL)
+    solution = solve(UNEQUAL)
     assert on_speed_floor(solution.problem, solution.gait)
     assert solution.finite is not None
     assert solution.finite.status == "solved"
@@ -55,7 +55,7 @@ def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside
 )
 def test_the_answer_does_not_depend_on_what_the_search_is_given(changed, starts):
     """Before, options decided: 0.234, 0.493 and 0.647 were each called solved."""
-    solution = best_gait(UNEQUAL.with_(**changed), starts)
+    solution = solve(UNEQUAL.with_(**changed), starts)
     assert solution.status == "solved"
     assert solution.efficiency == pytest.approx(0.64685, rel=2e-4)
 
@@ -143,7 +143,7 @@ def test_the_answer_is_the_best_gait_whose_certificate_holds(monkeypatch, ends, 
         status, value = ends[len(asked) - 1]
         return SimpleNamespace(status=status, value=value, message="", number=len(asked) - 1)
 
-    monkeypatch.setattr(solve, "maximise_efficiency", solution)
+    monkeypatch.setattr(solve, "solve", solution)
     contenders = [[SimpleNamespace(value=1.0 - 0.1 * k)] for k in range(len(ends))]
     found = solve._best_certified(UNEQUAL, contenders, None, lambda: True)
     assert (found.number, len(asked)) == (answer, solved_for)
@@ -173,7 +173,7 @@ def test_where_a_gait_of_finite_size_shrinks_after_all_the_next_one_stands_besid
         return SimpleNamespace(problem=None, gait=gait, status="solved", value=value, certificate=certificate)
 
     ends = {"first": solved("small", 0.5), "second": solved("large", 0.4)}
-    monkeypatch.setattr(solve, "maximise_efficiency", lambda problem, on_level, levels: ends[levels])
+    monkeypatch.setattr(solve, "solve", lambda problem, on_level, levels: ends[levels])
     monkeypatch.setattr(solve, "on_speed_floor", lambda problem, gait: gait == "small")
     solution = SimpleNamespace(problem=None, message="", starts=32, others=(), finite=None)
     solve._add_finite(solution, ["first", "second"])

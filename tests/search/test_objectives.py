@@ -26,7 +26,7 @@ from colloc.mechanics.actuators import actuator_powers, driven_power
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 
 THRIFT = "sqrt(distance) / (work + 0.1 * length)"
 TURNED = "(distance + rotation**2) / (work + length)"
@@ -94,16 +94,16 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
 
 @pytest.fixture(scope="module")
 def usual():
-    return maximise_efficiency(Problem("usual", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral")))
+    return solve(Problem("usual", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral")), 1)
 
 
 @pytest.fixture(scope="module")
 def fast():
-    return maximise_efficiency(Problem("fast", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective="speed"))
+    return solve(Problem("fast", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective="speed"), 1)
 
 
 def test_an_expression_that_equals_the_efficiency_has_its_optimum(usual):
-    same = maximise_efficiency(usual.problem.with_(objective="1 / (work / distance)"))
+    same = solve(usual.problem.with_(objective="1 / (work / distance)"), 1)
     assert same.success
     assert same.value == pytest.approx(usual.value, rel=1e-9)
     assert same.certificate.value == pytest.approx(usual.certificate.efficiency, rel=1e-7)
@@ -134,7 +134,7 @@ def test_a_result_says_what_it_is_best_at_and_comes_back_from_its_file(fast, tmp
 
 
 def test_speed_does_not_depend_on_the_size_of_friction(fast):
-    light = maximise_efficiency(fast.problem.with_(friction=Friction(1e-3, 1e-3, 1e-3)))
+    light = solve(fast.problem.with_(friction=Friction(1e-3, 1e-3, 1e-3)), 1)
     assert light.success
     assert light.value == pytest.approx(fast.value, rel=1e-9)
     assert light.certificate.efficiency == pytest.approx(1e3 * fast.certificate.efficiency, rel=1e-6)
@@ -142,9 +142,9 @@ def test_speed_does_not_depend_on_the_size_of_friction(fast):
 
 def test_a_least_distance_is_reached_for_the_price_of_efficiency():
     friction = Friction(3, 1, 1)
-    free = maximise_efficiency(Problem("free", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1, "bilateral"), friction=friction))
+    free = solve(Problem("free", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1, "bilateral"), friction=friction), 1)
     least = 1.05 * free.distance
-    far = maximise_efficiency(free.problem.with_(at_least={"distance": least}, guess=free.gait))
+    far = solve(free.problem.with_(at_least={"distance": least}, guess=free.gait), 1)
     assert free.success
     assert far.success
     assert far.certificate.distance == pytest.approx(least, rel=1e-4)
@@ -153,13 +153,13 @@ def test_a_least_distance_is_reached_for_the_price_of_efficiency():
 
 
 def test_a_turning_gait_turns_by_the_prescribed_angle():
-    solution = maximise_efficiency(Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3))
+    solution = solve(Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3), 1)
     assert solution.success
     gait, problem = solution.gait, solution.problem
     measured = replay(problem.body, problem.friction, gait, solution.delta_per_period, instants=3000)
     assert measured.rotation == pytest.approx(0.3, abs=1e-5)
     # of free gaits, one turns by more and for less work per angle
-    free = maximise_efficiency(problem.with_(rotation=None, guess=gait))
+    free = solve(problem.with_(rotation=None, guess=gait), 1)
     assert free.success
     assert free.certificate.rotation > 0.5
     assert free.value > solution.value
@@ -167,7 +167,7 @@ def test_a_turning_gait_turns_by_the_prescribed_angle():
 
 @pytest.mark.slow
 def test_an_efficient_gait_may_turn_as_well():
-    solution = maximise_efficiency(Problem("arc", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.2))
+    solution = solve(Problem("arc", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.2), 1)
     assert solution.success
     assert solution.problem.objective == EFFICIENCY
     assert solution.certificate.rotation == pytest.approx(0.2, abs=1e-4)
@@ -175,14 +175,15 @@ def test_an_efficient_gait_may_turn_as_well():
 
 def test_an_objective_may_be_negative_and_of_any_sign():
     """Work costs more than the distance is worth: the best gait is the smallest."""
-    solution = maximise_efficiency(
+    solution = solve(
         Problem(
             "idle",
             ellipse(0.0, 0.6, 0.4),
             gait=Harmonic(1, "bilateral"),
             objective=Objective("distance - work", "net"),
             delta=1e-3,
-        )
+        ),
+        1,
     )
     assert solution.success
     assert solution.value < 0
@@ -212,12 +213,12 @@ def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
     problem = Problem("brake", SKEW, gait=Harmonic(1), objective="driven efficiency", delta=1e-3)
     before = replay(problem.body, problem.friction, SKEW, 1e-3, driven=True)
     assert before.driven_work > (1 + 1e-3) * before.work
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     assert solution.success
     found = solution.certificate
     assert found.value == pytest.approx(found.distance / found.driven_work, rel=1e-12)
     assert found.value <= found.efficiency
-    usual = maximise_efficiency(problem.with_(objective="efficiency", guess=solution.gait))
+    usual = solve(problem.with_(objective="efficiency", guess=solution.gait), 1)
     assert solution.value >= replay(problem.body, problem.friction, usual.gait, 1e-3, objective=problem.objective).value * (
         1 - 1e-6
     )
@@ -230,14 +231,14 @@ def test_driven_work_needs_the_forces_on_the_parts():
 
 def test_every_joint_has_a_limit_of_its_own():
     problem = Problem("stiff", gait=Harmonic(1), joint_limit=(1.0, 2.0), friction=Friction(3, 1, 1), delta=1e-3)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     assert solution.success
     first, second = np.abs(solution.gait.angles(np.linspace(0, 1, 20_001))).max(axis=1)
     assert first == pytest.approx(1.0, abs=1e-6)
     assert 1.0 < second < 2.0
     assert Problem.from_dict(problem.to_dict()).joint_limit == (1.0, 2.0)
     same = [{"gait": Harmonic(1, "bilateral"), "joint_limit": limit} for limit in (1.0, (1.0, 1.0))]
-    values = [maximise_efficiency(problem.with_(guess=None, **changes)).value for changes in same]
+    values = [solve(problem.with_(guess=None, **changes), 1).value for changes in same]
     assert values[0] == values[1]
 
 

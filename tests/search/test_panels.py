@@ -48,9 +48,9 @@ def test_a_gait_on_more_panels_is_replayed_and_kept(tmp_path):
     solution = optimum(stated.with_(intervals=8))
     gait = solution.gait
     again = replay(stated.body, stated.friction, lambda t: (gait.angles(t), gait.rates(t)), 0.1, instants=80, tolerance=1e-5)
-    assert solution.last.panels > 4
+    assert solution.answer.panels > 4
     assert abs(solution.efficiency / again.efficiency - 1) < 1e-4
     read = load(save(solution, tmp_path / "two.h5"))
-    assert (read.last.panels, read.problem.body) == (solution.last.panels, stated.body)
+    assert (read.answer.panels, read.problem.body) == (solution.answer.panels, stated.body)
     _, now = read.at_points()
     assert np.abs(now.force).max() < 1e-6

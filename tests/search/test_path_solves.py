@@ -13,7 +13,7 @@ from colloc.mechanics.bodies import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
 from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
-from colloc.search.solve import best_gait, maximise_efficiency
+from colloc.search.solve import solve
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {
@@ -73,7 +73,7 @@ def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
     corners = np.array([[3.1416, 3.13, 3.13, 3.05], [-0.15, 0.0, 0.12, 0.12]])
     corners[0] = np.minimum(corners[0], np.pi)
     problem = Problem("fold", Corners(corners), gait=Polygon(4), intervals=24, delta_start=1e-3)
-    solution = maximise_efficiency(problem)
+    solution = solve(problem, 1)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.44
     assert np.abs(solution.gait.corners).max() == pytest.approx(np.pi, abs=1e-6)
@@ -82,8 +82,8 @@ def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
 
 def test_more_curvature_allows_more_and_each_bound_is_kept(tmp_path):
     first = Problem("p", ellipse(0, 2.8, 1.3), gait=FreePath(1.0, "bilateral"), intervals=30, mesh_tolerance=1e-4, delta=1e-3)
-    one = maximise_efficiency(first)
-    solutions = [one, maximise_efficiency(prolonged(first, one.gait, FreePath(2.0, "bilateral")))]
+    one = solve(first, 1)
+    solutions = [one, solve(prolonged(first, one.gait, FreePath(2.0, "bilateral")), 1)]
     assert [s.status for s in solutions] == ["solved"] * 2
     one, two = (s.certificate.efficiency_at_zero_delta for s in solutions)
     assert one == pytest.approx(0.287, abs=2e-3)
@@ -124,8 +124,8 @@ def test_a_free_path_of_three_joints_with_outer_links_that_would_cross():
     problem = Problem(
         "four", guess, FOUR["body"], gait=FreePath(2.0, "bilateral"), intervals=50, delta=1e-3, mesh_tolerance=0.0
     )
-    solution = best_gait(problem)
-    assert solution.last.optimal
+    solution = solve(problem)
+    assert solution.answer.optimal
     certificate = solution.certificate
     assert certificate.efficiency > 0.59
     # at this delta the certificate asks for less; what concerns the motion itself holds
@@ -144,7 +144,7 @@ def test_triangles_at_the_fold_approach_the_best_infinitesimal_gait_in_proportio
         guess = Corners(small_gait(Chain(), Friction(), shape).path(shape, 1.1 * length))
         delta = 1e-3 * speed
         stated = Problem("small", guess, gait=Polygon(3, "none"), delta=delta, intervals=30, smallest_shape_speed=speed)
-        solution = maximise_efficiency(stated.with_(delta_start=100 * delta))
+        solution = solve(stated.with_(delta_start=100 * delta), 1)
         assert solution.status == SOLVED
         assert path_length(solution.gait) == pytest.approx(length, rel=1e-3)
         shortfalls.append((limit - solution.certificate.efficiency) / length)

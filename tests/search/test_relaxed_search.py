@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Friction, Problem, ProblemError, Relaxed, maximise_efficiency, replay
+from colloc import Friction, Problem, ProblemError, Relaxed, replay, solve
 from colloc.gaits.relaxed import Mixture
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results import realisation
@@ -149,8 +149,8 @@ def test_what_is_collocated_of_the_finite_gait_is_what_its_replay_says(solution)
     assert len(solution.plot().axes) == 5
     assert dict(solution.to_xarray().sizes) == {"t": 401, "joint": 2, "velocity": 3, "axis": 2}
     assert solution.gait.corners == pytest.approx(solution.relaxed.best.gait.corners, abs=1e-12)
-    assert solution.last.efficiency == pytest.approx(solution.measured.efficiency, rel=1e-3)
-    assert solution.last.distance == pytest.approx(solution.measured.distance, rel=1e-3)
+    assert solution.answer.efficiency == pytest.approx(solution.measured.efficiency, rel=1e-3)
+    assert solution.answer.distance == pytest.approx(solution.measured.distance, rel=1e-3)
 
 
 def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution, monkeypatch):
@@ -169,4 +169,4 @@ def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution, mon
 
 def test_other_searches_say_that_relaxed_gaits_are_not_for_them():
     with pytest.raises(ProblemError, match="search of their own"):
-        maximise_efficiency(problem(), literal=True)
+        solve(problem(), search="full")

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from colloc.search.slope_search import climbing_gait
 
 from colloc import (
     Chain,
@@ -27,8 +28,7 @@ from colloc.numerics.mesh import Mesh
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 from colloc.search.certify import _one_motion, gait_certificate
-from colloc.search.slope_search import climbing_gait
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.slope import slope_motion
 
@@ -37,7 +37,7 @@ PROBLEM = Problem("climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral")
 
 @pytest.fixture(scope="module")
 def uphill():
-    return maximise_efficiency(PROBLEM)
+    return solve(PROBLEM, 1)
 
 
 def run(body, gait, grade=0.1, **settings):
@@ -47,8 +47,8 @@ def run(body, gait, grade=0.1, **settings):
 
 def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
     assert uphill.status == "solved", uphill.message
-    assert uphill.last.program == FULL
-    theta = uphill.last.x[uphill.layout.theta[0]]
+    assert uphill.answer.program == FULL
+    theta = uphill.answer.x[uphill.layout.theta[0]]
     assert uphill.gait.theta == pytest.approx(theta[0], abs=1e-9)
     ran = slope_motion(Chain(), Friction(), uphill.gait, 1e-2, 0.1)
     assert uphill.certificate.distance == pytest.approx(ran.climb[0], abs=1e-5)
@@ -154,14 +154,14 @@ def test_a_gait_without_symmetry_does_not_turn_in_a_period():
     free = PROBLEM.with_(
         gait=Harmonic(1), guess=Fourier([0.2, 0.3], [[1.3], [0.1]], [[0.1], [1.2]]), friction=Friction(3, 1, 2), delta=1e-3
     )
-    found = maximise_efficiency(free)
+    found = solve(free, 1)
     assert found.status == "solved", found.message
     assert abs(found.certificate.rotation) < 1e-5
 
 
 @pytest.mark.slow
 def test_a_gait_goes_across_the_slope_if_it_is_asked_to():
-    across = maximise_efficiency(PROBLEM.with_(gait=Harmonic(2, "bilateral"), towards=np.pi / 2))
+    across = solve(PROBLEM.with_(gait=Harmonic(2, "bilateral"), towards=np.pi / 2), 1)
     assert across.status == "solved", across.message
     ran = slope_motion(Chain(), Friction(), across.gait, 1e-2, 0.1)
     assert abs(ran.climb[0]) < 1e-3 * ran.aside[0]
@@ -172,7 +172,7 @@ def test_a_gait_goes_across_the_slope_if_it_is_asked_to():
 
 @pytest.mark.slow
 def test_ipopt_alone_from_the_guess_ends_there_too(uphill):
-    literal = maximise_efficiency(PROBLEM, literal=True)
+    literal = solve(PROBLEM, search="full")
     assert literal.status == "solved", literal.message
     assert literal.certificate.value == pytest.approx(uphill.certificate.value, rel=1e-5)
 
@@ -205,6 +205,6 @@ def test_a_viscous_body_may_be_on_any_slope():
 
 
 def test_a_slope_that_is_not_climbed_is_said_so():
-    found = maximise_efficiency(PROBLEM.with_(grade=0.9))
+    found = solve(PROBLEM.with_(grade=0.9), 1)
     assert found.status == "not converged"
     assert "no gait was found that climbs a grade of 0.9" in found.message

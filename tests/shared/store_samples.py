@@ -83,7 +83,7 @@ class Samples:
         path = path or self.path(kind)
         if kind == "solution":
             found = load(path)
-            return found.seconds, found.problem.hash, found.last.x.tobytes(), found.certificate
+            return found.seconds, found.problem.hash, found.answer.x.tobytes(), found.certificate
         if kind == "archive":
             found = open_archive(problem(), path.with_suffix(".h5"))
             return {name: o.efficiency for name, o in found.outcomes.items()}, found.damaged

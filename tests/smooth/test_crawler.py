@@ -16,7 +16,7 @@ from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.converge import ROUGH, settled
 from colloc.search.prescribed import realised
-from colloc.search.solve import maximise_efficiency
+from colloc.search.solve import solve
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.system.errors import ProblemError
@@ -98,12 +98,12 @@ def test_optimising_beats_the_paper_s_crawler():
 
 @pytest.mark.slow
 def test_the_problem_file_is_certified_beats_the_paper_s_crawler_and_is_kept(tmp_path):
-    found = maximise_efficiency(runpy.run_path("problems/crawler.py")["PROBLEM"])
+    found = solve(runpy.run_path("problems/crawler.py")["PROBLEM"], 1)
     assert found.status == "solved", found.message
     assert found.certificate.efficiency_at_zero_delta > 0.9069  # what equal sides of the path allow
-    assert found.last.panels > found.problem.body.panels
+    assert found.answer.panels > found.problem.body.panels
     read = load(save(found, tmp_path / "crawler.h5"))
-    assert (read.problem.hash, read.last.panels) == (found.problem.hash, found.last.panels)
+    assert (read.problem.hash, read.answer.panels) == (found.problem.hash, found.answer.panels)
     np.testing.assert_array_equal(read.sample(0.3).tail, found.sample(0.3).tail)
 
 

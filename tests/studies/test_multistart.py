@@ -28,7 +28,7 @@ from colloc.results.equivalence import distance, images, phase_distance, reverse
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
-from colloc.search.solve import is_trivial, maximise_efficiency, optimum
+from colloc.search.solve import solve
 from colloc.studies import campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
@@ -125,7 +125,7 @@ def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, 
 def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
     stated = problem(gait=Harmonic(1, "none"), intervals=20)
     solution = optimum(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
-    assert solution.last.optimal
+    assert solution.answer.optimal
     assert not is_trivial(solution)
     assert phase_distance(solution.gait, reversed_in_time(solution.gait)) > 0.1
 
@@ -133,7 +133,7 @@ def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
     monkeypatch.setattr(optimise, "TRIVIAL_EFFICIENCY", 2.0)
-    solution = maximise_efficiency(problem())
+    solution = solve(problem(), 1)
     assert is_trivial(solution)
     assert solution.status != SOLVED
     assert "goes nowhere" in solution.message
@@ -144,11 +144,11 @@ def test_a_start_that_reached_no_optimum_is_told_with_what_its_replay_measured(m
     problem = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=10)
 
     def stopped(*asked, **how):
-        solution = maximise_efficiency(*asked, **how)
-        solution.levels[:] = [replace(level, optimal=False) for level in solution.levels]
+        solution = solve(*asked, **how, 1)
+        solution.history[:] = [replace(level, optimal=False) for level in solution.history]
         return solution
 
-    monkeypatch.setattr(campaign, "maximise_efficiency", stopped)
+    monkeypatch.setattr(campaign, "solve", stopped)
     outcome = campaign.run_guess(problem, lambda: problem.guess, 3, np.inf)
     assert outcome.status not in (ERROR, SOLVED)
     assert outcome.delta == problem.delta
@@ -159,7 +159,7 @@ def test_an_optimum_on_the_speed_floor_says_so(tmp_path, capsys):
     # without the bound the best gait has a shape speed of 1.86
     bounds = {"smallest_shape_speed": 2.0, "delta": 1e-3, "mesh_tolerance": 1e-4}
     stated = problem(friction=Friction(0.5, 1, 5), guess=ellipse(0, 1.8, 1.2), **bounds)
-    solution = maximise_efficiency(stated)
+    solution = solve(stated, 1)
     assert solution.status == SOLVED
     assert on_speed_floor(stated, solution.gait)
     assert "smallest_shape_speed = 2" in solution.message
@@ -254,11 +254,11 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
         solution = optimum(stated, watch)
         if solve.calls == 3:
             monkeypatch.setattr(campaign.time, "perf_counter", lambda: 1e12)
-            watch(solution.last)
+            watch(solution.answer)
         return solution
 
     solve.calls = 0
-    monkeypatch.setattr(campaign, "maximise_efficiency", solve)
+    monkeypatch.setattr(campaign, "solve", solve)
     found = list(campaign.run_starts(problem(), range(3), executor=ThreadPoolExecutor))
     assert [o.start for o in found] == [0, 1, 2]
     assert found[0].iterations > 0

@@ -8,7 +8,7 @@ import pytest
 from colloc import Friction, Harmonic, Problem, ProblemError, load, pareto_front
 from colloc.commands.main import main
 from colloc.pictures.front_figure import front_figure
-from colloc.search.solve import best_gait
+from colloc.search.solve import solve
 
 PROBLEM = Problem("wide", gait=Harmonic(1, "bilateral"), friction=Friction(10, 1, 1), delta=1e-2, mesh_tolerance=1e-4)
 
@@ -28,7 +28,7 @@ def test_the_front_is_monotone_and_every_point_is_certified(front):
 
 def test_its_ends_are_the_best_by_one_objective_alone(front):
     for k, (name, at) in enumerate((("speed", 0), ("efficiency", -1))):
-        alone = best_gait(PROBLEM.with_(objective=name), 1)
+        alone = solve(PROBLEM.with_(objective=name), 1)
         assert front.values[at, k] == pytest.approx(alone.certificate.value, rel=1e-9)
 
 

@@ -52,7 +52,7 @@ def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
     assert not (out / "long.h5").exists()
     partial = load(out / "long.partial.h5")
     assert partial.status == "not converged"
-    assert partial.levels[0].optimal
+    assert partial.history[0].optimal
 
     again = subprocess.run(command, capture_output=True, text=True, check=True)
     assert f"going on from {out / 'long.partial.h5'}" in again.stdout
@@ -60,12 +60,12 @@ def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
     solution = load(out / "long.h5")
     assert solution.status == "solved"
     # what was optimal is not solved again
-    last = max(k for k, level in enumerate(partial.levels) if level.optimal)
-    kept = partial.levels[: last + 1]
-    for old, new in zip(kept, solution.levels, strict=False):
+    last = max(k for k, level in enumerate(partial.history) if level.optimal)
+    kept = partial.history[: last + 1]
+    for old, new in zip(kept, solution.history, strict=False):
         assert new.seconds == old.seconds
         np.testing.assert_array_equal(new.x, old.x)
-    assert len(solution.levels) > len(kept)
+    assert len(solution.history) > len(kept)
     assert solution.certificate.efficiency == pytest.approx(0.26003, abs=2e-5)
 
 

@@ -84,8 +84,8 @@ def child(kind, folder, pipe):
 
 def solve_facts(solution, path):
     """What a file of one solve holds: its first level, be the run under way or finished, and the result if it is finished."""
-    facts = {"first level": solution.levels[0].x.sum()}
-    return facts if path.name.endswith(".partial.h5") else facts | {"result": solution.last.x.sum()}
+    facts = {"first level": solution.history[0].x.sum()}
+    return facts if path.name.endswith(".partial.h5") else facts | {"result": solution.answer.x.sum()}
 
 
 def start_facts(outcomes):

@@ -17,7 +17,7 @@ from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.search import converge
-from colloc.search.solve import maximise_efficiency, optimum
+from colloc.search.solve import solve
 from colloc.verification import refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
 from colloc.verification.kinks import kink_phases
@@ -202,7 +202,7 @@ def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     assert plan.estimate > 1e-7
     small = planned_mesh
     monkeypatch.setattr(converge, "planned_mesh", lambda *a, **k: small(*a, **{**k, "most_points": 60}))
-    solution = maximise_efficiency(stated)
+    solution = solve(stated, 1)
     assert solution.status == "certificate failed"
     assert "mesh error" in solution.message
     assert "mesh error" in [check.name for check in solution.certificate.failures]
@@ -211,8 +211,8 @@ def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
 def test_a_refined_solution_knows_its_scheme_and_its_error():
     stated = problem("gauss-2", mesh_tolerance=1e-5)
     solution = optimum(stated)
-    assert solution.last.optimal
-    assert solution.last.scheme == solution.mesh.scheme.name != "gauss-2"
+    assert solution.answer.optimal
+    assert solution.answer.scheme == solution.mesh.scheme.name != "gauss-2"
     gait = solution.gait
     known = replay(stated.body, stated.friction, lambda t: (gait.angles(t), gait.rates(t)), DELTA, tolerance=1e-8)
     assert abs(solution.efficiency / known.efficiency - 1) < 1e-5
