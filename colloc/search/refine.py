@@ -18,7 +18,7 @@ from colloc.search.run import this_run
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
-_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
+MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
 half, then a quarter of it, and keep all their knots."""
 _GROWTH, _FEW_POINTS = 3, 300
@@ -75,13 +75,13 @@ def refine(optimum: Optimum) -> Optimum:
     if problem.slope is not None and optimum.objective > -NOWHERE:
         return optimum
     while True:
-        run.told("refine", meshes.count, _MESHES, optimum)
+        run.told("refine", meshes.count, MESHES, optimum)
         finer = on_more_panels(optimum) if refines else None
         plan = meshes.plan(optimum) if refines and finer is None else None
         if finer is None and plan is None and optimum.effort == FINE:
             return optimum
-        if meshes.count == _MESHES:
-            lacks = f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
+        if meshes.count == MESHES:
+            lacks = f"refinement ended after {MESHES} meshes: the gait still moves with the mesh."
             return replace_keeping_space(optimum, lacks=lacks)
         space, v, radius, effort = optimum.space, optimum.v, NEXT_RADIUS, FINE
         if finer is not None:

@@ -20,7 +20,7 @@ from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import space_about
 from colloc.results.answer import Answer
 from colloc.results.solution import Solution
-from colloc.search.certify import certify
+from colloc.search.certify import SADDLE, certify
 from colloc.search.choose import Certified, choose, is_trivial, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is
@@ -49,8 +49,6 @@ _EXPLORING = 0.6
 """The share of the time allowed that is spent on starts; the rest is for the answer."""
 _ROUGHLY = 1e-3
 """Relative error to which a gait is replayed that is no optimum: exactly may take minutes."""
-_SADDLE = 1e-2
-"""Curvature from which the certificate calls a gait a saddle (`colloc.search.certify.SADDLE`)."""
 
 
 def solve(
@@ -177,7 +175,7 @@ def _confirmed(optimum: Optimum) -> Answer:
     optimum = refine(descend(optimum))
     answer = confirm(optimum)
     for _ in range(_SADDLES):
-        if not answer.second_order.smallest + answer.second_order.error < -_SADDLE:
+        if not answer.second_order.smallest + answer.second_order.error < -SADDLE:
             break
         below = below_saddle(optimum)
         if below is None:
