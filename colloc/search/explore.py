@@ -37,8 +37,9 @@ from colloc.search.run import this_run
 from colloc.search.small_starts import small_loops
 from colloc.system.errors import CollocError, NotConvergedError
 
-STARTS = 32
-"""Starts where none are asked for."""
+STARTS, _AGREE = 32, 8
+"""Starts where no number is asked for, at most unless they lead on; then the search also ends once so many have met the best
+gait. (`python -m benchmarks.stopping`: that saves a fifth of the starts, and loses none of the best gaits of the zoo.)"""
 FOLLOW = Effort(ROUGH.accuracy, ROUGH.kkt_error, 3, ROUGH.iterations)
 """Of gaits that are followed: refinement goes on from there."""
 _FEWEST = 12
@@ -112,14 +113,15 @@ def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
     return found
 
 
-def explore(problem: Problem, starts: int = STARTS, goes_on: Callable[[], bool] = lambda: True) -> Exploration:
-    """The best gaits of a problem's class that so many starts lead to.
+def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], bool] = lambda: True) -> Exploration:
+    """The best gaits of a problem's class that many starts lead to.
 
     Parameters
     ----------
     problem : Problem
-    starts : int
-        At least: they go on while they lead on, to three times as many at most.
+    starts : int, optional
+        At least so many: they go on while they lead on, to three times as many at most. By default 32, or fewer once eight of
+        them have met the best gait.
     goes_on : callable
         Whether there is time for another start, and another gait to be followed.
 
@@ -176,9 +178,9 @@ def same_gait(problem: Problem, a: Optimum, b: Optimum) -> bool:
     return are_one(one, other, problem.body, problem.friction)
 
 
-def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
+def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
     """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
-    run = this_run()
+    run, count = this_run(), asked or STARTS
     coarse = problem.with_(intervals=min(problem.intervals, max(problem.gait.coarse_intervals(problem.body.n_joint), _FEWEST)))
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)  # compared where friction is nearly dry
     deltas = [max(delta, problem.delta) for delta in (problem.delta_start, FACTOR * usual)]
@@ -191,8 +193,13 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tup
     for loop in run.kept("small loops", (problem,), lambda: small_loops(problem)):
         with suppress(CollocError):
             _follow(*space_about(coarse, closed_gait(coarse, loop, dry)), _LOOP, [dry], [loops])
-    starts, last, tried, best = starting_gaits(problem), count - 1, 0, 0.0
-    while tried == 0 or (tried <= min(last, _MOST * count - 1) and goes_on()):
+    starts, tried, better, best = starting_gaits(problem), 0, -_PATIENCE, 0.0
+
+    def knows() -> bool:
+        enough = tried >= count or (asked is None and _met_best(known[-1]) >= _AGREE)
+        return enough and tried > better + _PATIENCE
+
+    while tried == 0 or (tried < _MOST * count and not knows() and goes_on()):
         start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
@@ -203,7 +210,7 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tup
                 _follow(*space_about(coarse, shaken), start, deltas[-1:], known[-1:])
         before, best = best, min((c.optimum.objective for c in known[-1]), default=0.0)
         if start > 0 and best < before - SAME_VALUE * abs(before):
-            last = max(last, start + _PATIENCE)
+            better = start
         run.told("explore", tried, max(tried, count), _best([c.optimum for c in (*known[-1], *loops)]))
 
     for candidate in (ends := [*known[-1], *loops]):
@@ -214,6 +221,12 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tup
 def objective_at(delta: float, optimum: Optimum) -> float:
     """Minus the value of a gait at another delta, as it is; inf where it has none."""
     return float(np.nan_to_num(ReducedProgram(optimum.space, delta).objective(optimum.v), nan=np.inf))
+
+
+def _met_best(candidates: Sequence[Candidate]) -> int:
+    """How many starts met the best gait so far."""
+    best = min(candidates, key=lambda c: c.optimum.objective, default=None)
+    return 0 if best is None else len(best.starts)
 
 
 def _best(optima: Sequence[Optimum]) -> Optimum | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_of
+from colloc.search.certify import NOWHERE
 from colloc.search.converge import NEXT_RADIUS, REMESH_RADIUS, converged
 from colloc.search.optimum import FINE, ROUGH, Optimum, replace_keeping_space
 from colloc.search.run import this_run
@@ -26,8 +27,6 @@ _GROWTH, _FEW_POINTS = 3, 300
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
 """Panels of a smooth body, and how much they grow at once, at most; error that they may leave, over what the mesh may. Every
 doubling was seen to leave a sixth or less, with a point at rest that moves over the panels."""
-NOWHERE = 1e-4
-"""Value of the objective on a slope up to which a gait goes nowhere: relative to that no mesh is fine enough."""
 
 
 @dataclass
@@ -73,7 +72,7 @@ def refine(optimum: Optimum) -> Optimum:
     problem, run = optimum.problem, this_run()
     refines, meshes = problem.mesh_tolerance > 0, _Meshes()
     if problem.slope is not None and optimum.objective > -NOWHERE:
-        return optimum
+        return optimum  # relative to nothing no mesh is fine enough
     while True:
         run.told("refine", meshes.count, MESHES, optimum)
         finer = on_more_panels(optimum) if refines else None

@@ -12,7 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
-from colloc.search.choose import is_trivial
+from colloc.search.certify import is_trivial
 from colloc.search.run import Progress
 from colloc.search.solve import FULL, REDUCED, solve
 from colloc.system.errors import ProblemError
