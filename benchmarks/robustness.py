@@ -33,7 +33,7 @@ import numpy as np
 
 from colloc import Chain, FreePath, Friction, Harmonic, Problem
 from colloc.gaits.gait_fields import law_fields
-from colloc.gaits.harmonic import Fourier, shifted
+from colloc.gaits.harmonic import Fourier, harmonics_within, shifted
 from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
 from colloc.results.distinct_optima import basins
@@ -63,7 +63,7 @@ class Table(NamedTuple):
 
     def gait_class(self, symmetry: str) -> Harmonic | FreePath:
         """Free paths where a curvature is given."""
-        return Harmonic(self.harmonics, symmetry) if self.curvature is None else FreePath(self.curvature, symmetry)
+        return harmonics_within(self.harmonics, symmetry) if self.curvature is None else FreePath(self.curvature, symmetry)
 
     @property
     def words(self) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
-from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
 from colloc.numerics.arcs import advance, direction
@@ -209,7 +209,7 @@ class FreePath(ClassOfGaits):
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for its gaits."""
-        return Harmonic(harmonics, self.symmetry)
+        return harmonics_within(harmonics, self.symmetry)
 
     def own_checks(self, gait: ArcPath) -> list[tuple[str, float, float, str]]:
         """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""
