@@ -66,6 +66,8 @@ def about(solution: Solution, trajectory: Trajectory, rate: float, limits: Seque
         "objective": solution.problem.objective.name,
         "value": measured.value,
         "distance_per_period_body_lengths": measured.distance,
+        "rotation_per_period_rad": solution.rotation,
+        "turning_radius_body_lengths": solution.turning_radius if solution.turning else None,
         "work_per_period_weight_times_length": measured.work,
         "problem_hash": solution.problem.hash,
         **paced,

@@ -56,7 +56,7 @@ def _besides(solution: Solution) -> list[str]:
     if problem.uses("driven_work"):
         lines.append(f"  driven work W+  {found.driven_work:.6f}")
     if problem.rotation != 0:
-        lines.append(f"  net rotation    {found.rotation:.6f} rad")
+        lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines
 
 

@@ -48,6 +48,7 @@ def _headline(solution: Solution) -> str:
         f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}{near}   "
         f"{problem.friction.label},  δ = {solution.last.delta:.0e}{verdict}\n"
         f"class: {problem.gait.describe()}{'' if problem.slope is None else f';  {problem.slope.describe()} (x: uphill)'}"
+        f"{f';  {solution.turning}' if solution.turning else ''}"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
-from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
+from colloc.results.motion import SAMPLES, Column, RigidMotion, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
 from colloc.results.steps import REALISED, Alternative, Level
 from colloc.system.errors import ProblemError
@@ -154,6 +155,31 @@ class Solution:
         return self.last.work
 
     @property
+    def rotation(self) -> float:
+        """Net rotation over a period [rad], counter-clockwise: of the replay if there was one, else as collocated."""
+        return self.certificate.rotation if self.certificate.replayed else self.motion.rotation
+
+    @property
+    def turning_radius(self) -> float:
+        """Of the circle on which the gait crawls [body lengths]; infinite where it is asked to crawl straight on.
+
+        Period after period the centre of mass comes to points of a circle, on chords of length `distance`, which `rotation`
+        turns. That is the centre of mass at phase 0: at another phase it goes round the same point at another distance.
+        """
+        if self.problem.rotation == 0:
+            return math.inf
+        return RigidMotion(self.rotation, complex(self.measured.distance)).radius
+
+    @property
+    def turning(self) -> str:
+        """How the gait turns, in words; "" where it is asked to crawl straight on."""
+        if self.problem.rotation == 0:
+            return ""
+        side = "counter-clockwise" if self.rotation > 0 else "clockwise"
+        turned = f"turns {math.degrees(abs(self.rotation)):.4g}° {side}"
+        return f"{turned}, on a circle of radius {self.turning_radius:.4g} body lengths"
+
+    @property
     def standing(self) -> list[str]:
         """What the gait is the best of, and what else the search met."""
         if self.starts == 1 or not self.others:
@@ -203,7 +229,7 @@ class Solution:
         return self.mesh.times, self.motion.at_points
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers; whole periods add up: `CollocatedMotion.sample`."""
+        """The motion at phases t, any real numbers, period after period: `CollocatedMotion.sample`."""
         return self.motion.sample(t)
 
     def power(self, motion: SampledMotion) -> np.ndarray:
@@ -225,6 +251,7 @@ class Solution:
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
         about = {"name": self.problem.name, "status": self.status, "efficiency": self.measured.efficiency}
+        about |= {"rotation": self.rotation, "turning_radius": self.turning_radius}
         if self.problem.objective != EFFICIENCY:
             about |= {"objective": self.problem.objective.name, "value": self.measured.value}
         return motion_dataset(self._columns(t), about)
