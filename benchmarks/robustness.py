@@ -38,8 +38,9 @@ from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
 from colloc.results.distinct_optima import basins
 from colloc.results.outcome import Outcome, counts
-from colloc.results.solution import SOLVED, versions
+from colloc.results.solution import SOLVED
 from colloc.studies.campaign import process_pool, run_starts
+from colloc.system.versions import versions
 from colloc.verification.replay import replay
 
 Laws = tuple[tuple[float, float, float], ...]

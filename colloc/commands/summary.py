@@ -33,7 +33,7 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
         reason = solution.problem.paced_by
         paced = f"; run in a period of 1, as {reason}" if reason else ""
         lines += [] if solution.problem.slope is None else [f"  ground          {solution.problem.slope.describe()}"]
-        gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
+        gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines()]
         lines += [f"  gait            {text}" for text in gait]
         lines += [f"  {check.line()}" for check in certificate.checks]
         if solution.relaxed is not None:

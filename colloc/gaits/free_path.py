@@ -124,7 +124,7 @@ class ArcPath(UnitSpeedGait):
             return None
         return round(float(self.tangents[0, -1] - self.tangents[0, 0]) / (2 * np.pi * fraction(self.symmetry)))
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """Length, winding and sharpest bend."""
         turned = "" if self.winding is None else f", winding {self.winding}"
         sharpest = np.abs(self.curvatures()).max()

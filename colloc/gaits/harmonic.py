@@ -76,7 +76,7 @@ class Fourier(GaitFunction):
         k, cos, sin = self._waves(np.asarray(t, dtype=float))
         return -self.cos @ (k * sin) + self.sin @ (k * cos)
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """The formula, joint by joint, or mode by mode."""
         found = []
         for j in range(self.n_joint):
@@ -84,7 +84,7 @@ class Fourier(GaitFunction):
             for k in range(self.n_harmonic):
                 wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
                 terms.append(f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}")
-            found.append(f"{coordinate} {j + 1}: " + " ".join(terms))
+            found.append(f"{self.coordinate} {j + 1}: " + " ".join(terms))
         return found
 
     def mapped(self, matrix: np.ndarray) -> Fourier:

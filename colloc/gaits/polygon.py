@@ -106,7 +106,7 @@ class Corners(UnitSpeedGait):
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
         return vertices[:, k], (np.diff(vertices) / np.diff(phases))[:, k], phase - phases[k]
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """Length and, if they are few, corners."""
         n = self.corners.shape[1]
         if n > _MOST_TOLD:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.bodies import Body
 from colloc.system.late_binding import optional
 
 if TYPE_CHECKING:
@@ -103,12 +104,13 @@ class Column(NamedTuple):
     dims: tuple[str, ...]
 
 
-def motion_columns(motion: SampledMotion, power: np.ndarray) -> dict[str, Column]:
-    """Name to column, with the power against friction ``(n_time,)``."""
+def motion_columns(motion: SampledMotion, power: np.ndarray, body: Body) -> dict[str, Column]:
+    """Name to column, with the power against friction ``(n_time,)``; shape coordinates are named as their body names them."""
+    shape = body.coordinate, "t"
     return {
         "t": Column(motion.t, "period", ("t",)),
-        "joint_angles": Column(motion.angles, "rad", ("joint", "t")),
-        "joint_rates": Column(motion.rates, "rad/period", ("joint", "t")),
+        f"{body.quantity.replace(' ', '_')}s": Column(motion.angles, "rad", shape),
+        f"{body.coordinate}_rates": Column(motion.rates, "rad/period", shape),
         "tail_velocity": Column(motion.z, "length/period, length/period, rad/period", ("velocity", "t")),
         "theta": Column(motion.theta, "rad", ("t",)),
         "centre": Column(motion.centre, "length", ("axis", "t")),
@@ -138,6 +140,7 @@ def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
 
 
 def _labels(columns: dict[str, Column]) -> dict[str, list]:
-    """Labels along the dimensions other than time."""
-    joints = [*range(1, len(columns["joint_angles"].values) + 1)]
-    return {"joint": joints, "velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
+    """Labels along the dimensions other than time: names, or numbers from 1."""
+    named: dict[str, list] = {"velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
+    sizes = {column.dims[0]: len(column.values) for column in columns.values() if len(column.dims) > 1}
+    return {dim: named.get(dim, [*range(1, size + 1)]) for dim, size in sizes.items()}

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-import platform
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +25,7 @@ from colloc.results.relaxation import Relaxation
 from colloc.results.steps import REALISED, Alternative, Level
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
+from colloc.system.versions import versions
 
 if TYPE_CHECKING:
     import pandas
@@ -212,7 +211,8 @@ class Solution:
         """The gait of the last level."""
         parameters = self.last.x[self.layout.parameters[:, 0]]
         knots = self.last.edges if self.last.knots is None else self.last.knots
-        return self.problem.gait.member(parameters, self.problem.body.n_joint, knots)
+        body = self.problem.body
+        return self.problem.gait.member(parameters, body.n_joint, knots).named(body.coordinate)
 
     @property
     def delta_per_period(self) -> float:
@@ -236,9 +236,13 @@ class Solution:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         return self.motion.sliding(motion.angles, motion.rates, motion.z).power[0]
 
-    def plot(self) -> Any:
-        """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it."""
-        return bound("plot")(self)
+    def plot(self, ax: Any = None) -> Any:
+        """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it.
+
+        With `ax`, a matplotlib Axes, the gait alone is drawn there, and the Axes returned: its path in the plane of two shape
+        coordinates, of one or more than two their course in time.
+        """
+        return bound("plot")(self) if ax is None else bound("plot_gait")(ax, self)
 
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""
@@ -248,34 +252,31 @@ class Solution:
         """Write the web page of `colloc report`."""
         return bound("report")(self, Path(path))
 
+    def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+        """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`: ``solution.export("mine.csv",
+        period=4)``; returns what the file says about them. Options as for `colloc.results.export.write_export`."""
+        return bound("export")(self, Path(path), **options)
+
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
         about = {"name": self.problem.name, "status": self.status, "efficiency": self.measured.efficiency}
         about |= {"rotation": self.rotation, "turning_radius": self.turning_radius}
         if self.problem.objective != EFFICIENCY:
             about |= {"objective": self.problem.objective.name, "value": self.measured.value}
-        return motion_dataset(self._columns(t), about)
+        return motion_dataset(self.columns(t), about)
 
     def to_dataframe(self, t: np.ndarray | None = None) -> pandas.DataFrame:
-        """The motion at phases `t` (one period by default) as a pandas DataFrame: ``joint_angles_1``, ``centre_x``, ..."""
-        return motion_frame(self._columns(t))
+        """The motion at phases `t` (one period by default) as a pandas DataFrame: ``joint_angles_1``, ``centre_x``, ...
 
-    def _columns(self, t: np.ndarray | None) -> dict[str, Column]:
+        Of a body with modes for joints these are ``modes_1``, ``mode_rates_1``, and so in `to_xarray`.
+        """
+        return motion_frame(self.columns(t))
+
+    def columns(self, t: np.ndarray | None = None) -> dict[str, Column]:
+        """The motion at phases `t` (one period by default): name to values with their units and dimensions."""
         motion = self.sample(np.linspace(0.0, 1.0, SAMPLES) if t is None else t)
-        return motion_columns(motion, self.power(motion))
+        return motion_columns(motion, self.power(motion), self.problem.body)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: verdict, numbers and checks."""
         return bound("card")(self)
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything a result depends on."""
-    names = ("colloc", "casadi", "numpy", "scipy", "h5py")
-    found = {"python": platform.python_version()}
-    for name in names:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "source tree"
-    return found

@@ -141,7 +141,7 @@
     document.querySelectorAll(".dot").forEach(mark => {
       // percent of left, right, top and bottom, which show these angles
       const side = mark.dataset.sides.split(",").map(Number), limit = mark.dataset.limits.split(",").map(Number);
-      const part = (joint, k) => (angles[Number(joint)] - limit[k]) / (limit[k + 1] - limit[k]);
+      const part = (axis, k) => (angles[Number(axis)] - limit[k]) / (limit[k + 1] - limit[k]);
       mark.style.left = side[0] + part(mark.dataset.first, 0) * (side[1] - side[0]) + "%";
       mark.style.top = side[3] - part(mark.dataset.second, 2) * (side[3] - side[2]) + "%";
     });
