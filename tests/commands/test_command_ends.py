@@ -228,7 +228,8 @@ def test_a_bound_that_cannot_be_computed_costs_no_summary(quick, tmp_path, capsy
     assert colloc(["solve", str(tmp_path / "p.py"), "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
     printed = capsys.readouterr()
     assert "quick:" in printed.out
-    assert "no bound: bounds are computed for at most five links" in printed.err
+    assert "no bound: upper bounds are computed for at most 5 links, not 6" in printed.err
+    assert "--bound" not in printed.out  # nobody is sent to ask again
 
 
 def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys):
