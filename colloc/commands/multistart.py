@@ -142,7 +142,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
     if not quiet:
         print(f"{len(done)} starts done already, {to_go} to go", flush=True)
         if archive.damaged:
-            print(f"  {archive.damaged} damaged rows beside {path} were left out; their starts are solved again", flush=True)
+            print(f"  {archive.loss}; these starts are solved again", flush=True)
         print(OUTCOME_HEADER, flush=True)
     begin = time.perf_counter()
     interrupted = False

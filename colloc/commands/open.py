@@ -52,13 +52,15 @@ def _open(options: argparse.Namespace) -> int:
     if options.start is None:
         shown = list(archive.outcomes.values())
         found = basins(problem, shown)
-        tell(options, summary_dict(problem, shown, found, archive.path), summary_lines(problem, shown, found))
+        facts = {**summary_dict(problem, shown, found, archive.path), "damaged": list(archive.damaged)}
+        tell(options, facts, [*summary_lines(problem, shown, found), *([f"  {archive.loss}"] if archive.loss else [])])
         return OK if found else NONE_FOUND
     if options.start not in outcomes:
         there = sorted({f"{name.sampler} seed {name.seed}" for name in archive.outcomes})
         raise ProblemError(
             f"{options.archive} holds no start {options.start} of {options.sampler} seed {options.seed}; "
-            f"it holds {len(archive.outcomes)} starts of {', '.join(there) or 'no sampler'}."
+            f"it holds {len(archive.outcomes)} starts of {', '.join(there) or 'no sampler'}"
+            f"{'; ' if archive.loss else ''}{archive.loss}."
         )
     name = f"{problem.name}.start-{options.start}"
     path = output_path(options.output, Path(options.archive).with_name(f"{name}.h5"))

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import io
 import multiprocessing
 import os
 import resource
@@ -15,8 +16,9 @@ import numpy as np
 import pytest
 from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
 
+from colloc.commands import open as show_archive
 from colloc.commands import sweep as sweep_study
-from colloc.results.archive import StartName, open_archive
+from colloc.results.archive import StartName, archive_at, open_archive
 from colloc.studies.journal import append_records, read_journal
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.file_lock import locked
@@ -118,6 +120,32 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(samples, tmp
         assert in_child(attempt) == 10
     assert list(folder.iterdir()) == []
     assert Path(tempfile.gettempdir()).stat().st_mode == temporary
+
+
+def test_an_archive_is_read_where_nothing_can_be_written_and_its_damaged_rows_are_named(tmp_path, tmp_path_factory):
+    folder = tmp_path / "published"
+    kept = open_archive(problem(), folder / "a.h5")
+    kept.add({StartName("sobol", 3, k): outcome(k, (4 + k) / 8) for k in range(4)})
+    rows = folder / "a.sqlite"
+    rows.write_bytes(rows.read_bytes().replace(b"0.75,", b"0.76,"))
+    folder.chmod(0o755)
+    before = sorted(p.name for p in folder.iterdir())
+
+    def shown():
+        if os.geteuid() == 0:
+            os.setuid(65534)
+        else:
+            os.chmod(folder, 0o555)
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            code = show_archive.main([str(folder / "a.h5")])
+        told = f"1 damaged rows of {rows} were left out: start 2 (sobol 3)"
+        return 10 * (code == 0) + (told in said.getvalue()) + ("3 starts: 3 solved" in said.getvalue())
+
+    with open_to_others(tmp_path, tmp_path_factory.getbasetemp()):
+        assert in_child(shown) == 12
+    assert sorted(p.name for p in folder.iterdir()) == before
+    assert archive_at(folder / "a.h5").damaged == ("sobol 3 2",)
 
 
 def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
