@@ -36,8 +36,8 @@ PROBLEM = Problem("climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral")
 
 
 @pytest.fixture(scope="module")
-def uphill():
-    return maximise_efficiency(PROBLEM)
+def uphill(once):
+    return once("climber", lambda: maximise_efficiency(PROBLEM))
 
 
 def run(body, gait, grade=0.1, **settings):
