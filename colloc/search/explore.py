@@ -39,7 +39,7 @@ from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS, _AGREE = 32, 8
 """Starts where no number is asked for, at most unless they lead on; then the search also ends once so many have met the best
-gait. On the zoo that ends 44 of 99 searches early and loses no best gait (`python -m benchmarks.zoo`, and with `--starts 32`)."""
+gait. On the zoo that ends 44 of 99 searches early and loses no best gait (`python -m benchmarks.zoo`; with `--starts 32`)."""
 FOLLOW = Effort(ROUGH.accuracy, ROUGH.kkt_error, 3, ROUGH.iterations)
 """Of gaits that are followed: refinement goes on from there."""
 _FEWEST = 12
