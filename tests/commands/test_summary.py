@@ -51,7 +51,7 @@ def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_pa
     """The collocated ones differ from them by more than their errors, so here they are made to differ by much."""
     last = three_link.last
     off = replace(last, efficiency=9.0, distance=9.0, work=9.0)
-    solution = replace(three_link, levels=[*three_link.levels[:-1], off])
+    solution = replace(three_link, levels=[*three_link.history[:-1], off])
     facts = summary_dict(replace(solution, finite=solution), tmp_path, None, None)
     for name in ("value", "efficiency", "distance", "work"):
         assert facts[name] == facts["certificate"][name] == getattr(three_link.certificate, name)

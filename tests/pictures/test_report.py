@@ -24,8 +24,8 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames, lab_outline
 from colloc.pictures.report_page import PLAIN, environment, report_page
 from colloc.pictures.style import INK
-from colloc.results import certificate
-from colloc.results.certificate import certify
+from colloc.search import certify as certificate
+from colloc.search.certify import certify
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
 from colloc.results.store import save

@@ -30,7 +30,7 @@ from colloc.gaits.relaxed import Mixture
 from colloc.mechanics.actuators import UNLIMITED
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
-from colloc.results import certificate
+from colloc.search import certify as certificate
 from colloc.results.answer import Alternative, SearchStep
 from colloc.results.archive import KIND, VERSION, StartName, save_archive
 from colloc.results.checks import UNCERTIFIED, Check

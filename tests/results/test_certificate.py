@@ -152,7 +152,7 @@ def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(failures,
 
     def run(f):
         asked = three_link.problem.with_(at_least={"distance": there / (1 - f * 1e-4)})
-        return failures(Solution(asked, three_link.levels))
+        return failures(Solution(asked, three_link.history))
 
     judged("least distance", run)
     assert run(-1.0) == run(0.0) == set()
