@@ -26,7 +26,6 @@ from colloc.gaits.harmonic import harmonics_within
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.results.solution import SOLVED
-from colloc.search.explore import STARTS
 from colloc.search.solve import solve
 
 BEST = Path(__file__).with_name("zoo_best.json")
@@ -121,7 +120,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--problems", type=int, default=100, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
-    parser.add_argument("--starts", type=int, default=STARTS, metavar="N", help="more look for better answers")
+    parser.add_argument("--starts", type=int, metavar="N", help="more look for better answers")
     family = parser.add_mutually_exclusive_group()
     family.add_argument("--laws", dest="of", action="store_const", const=law_problem, help="other laws, objectives and limits")
     family.add_argument(
@@ -136,7 +135,8 @@ def main() -> None:
         begin = time.process_time()
         try:
             solution = solve(problem, options.starts)
-            status, value, message = solution.status, solution.value, solution.message
+            best_of_both = solution.shrunk or solution  # the best ever found may be as small as its bound allows
+            status, value, message = solution.status, best_of_both.value, solution.message
         except Exception as error:  # whatever goes wrong is what this is looking for
             status, value, message = "error", np.nan, f"{type(error).__name__}: {error}"
         seconds.append(time.process_time() - begin)

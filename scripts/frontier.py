@@ -40,7 +40,7 @@ from colloc.mechanics.friction import Friction
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save
-from colloc.search.relaxed import certified, relaxed_gaits
+from colloc.search.relaxed import explore_relaxed, realised_solution
 from colloc.search.solve import solve
 from colloc.system.errors import CollocError, NotConvergedError
 from scripts.check_potential import potentials
@@ -139,11 +139,11 @@ def gait(row: Row, starts: int) -> dict[str, Any]:
             joint_limit=row.limit,
         )  # fmt: skip
         with suppress(NotConvergedError):
-            ends.append(relaxed_gaits(problem, starts, first=tuple(first), least_extent=LEAST_EXTENT)[0][0])
+            ends.append(explore_relaxed(problem, starts, first=tuple(first), least_extent=LEAST_EXTENT).optima[0])
     travel = [end for end in ends if end.gait.extent >= LEAST_EXTENT]
     if not travel:
         raise NotConvergedError("no start led to a gait that travels.")
-    solution = certified(min(travel, key=lambda end: end.objective), REPEATS)
+    solution = realised_solution(min(travel, key=lambda end: end.objective), REPEATS)
     save(solution, row.file("gait"))
     return finite(row.body, solution, time.process_time() - begin)
 

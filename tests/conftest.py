@@ -50,17 +50,16 @@ def solved(once):
 
     def result(name):
         from colloc.gaits.problem_file import read_problem_file
-        from colloc.search.explore import STARTS
         from colloc.search.solve import solve
 
         stated = read_problem_file(ROOT / "problems" / f"{name}.py")
 
-        def solve():
-            solution = solve(stated.problem, stated.starts or STARTS)
+        def made():
+            solution = solve(stated.problem, stated.starts)
             solution.source = stated.source
             return solution
 
-        return once(name, solve), stated.reference
+        return once(name, made), stated.reference
 
     return result
 
@@ -79,15 +78,18 @@ def unsolved():
 def guess_in_balance(problem):
     from colloc.collocation.transcription import transcribe
     from colloc.collocation.warm_start import feasible_point
-    from colloc.results.answer import Level
+    from colloc.results.answer import Answer
     from colloc.results.solution import Solution
     from colloc.verification.replay import replay
 
     transcription = transcribe(problem)
     x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
-    gait = problem.guess
+    gait, mesh = problem.guess, transcription.mesh
     fine = replay(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta, instants=200)
-    zero = np.zeros(transcription.assembly.m)
-    edges, measured = transcription.mesh.edges, (fine.efficiency, fine.distance, fine.work)
-    level = Level(problem.delta, edges, x, 0 * x, zero, *measured, 1.0, 1.0, 0.0, "guess", False, 0, 0.0, 0.0)
-    return Solution(problem, [level], message="only a guess.")
+    measured = {"value": fine.efficiency, "distance": fine.distance, "work": fine.work}
+    conditions = {"kkt_error": 1.0, "violation": 1.0, "complementarity": 0.0, "optimal": False, "status": "guess"}
+    answer = Answer(
+        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, None, x, 0 * x, np.zeros(transcription.assembly.m),
+        **measured, **conditions, iterations=0, seconds=0.0,
+    )  # fmt: skip
+    return Solution(problem, answer, message="only a guess.")

@@ -77,28 +77,27 @@ def environment() -> Environment:
 def report_page(solution: Solution, reference: Reference | None = None, gap: str = "") -> str:
     """The page as a string, also of a solution that failed: what does not exist is left out. The reference is the value to hold
     the result against, `gap` a sentence about the upper bound."""
-    found: dict[str, Any] = {"gait_pictures": [], "convergence_pictures": [], "motion": None, "errors": None}
-    if solution.history:
-        errors = mesh_errors(solution)
-        drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
-        drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
-        planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
-        body = solution.problem.body
-        captions = {"angles": f"{body.quantity}s", "speeds": "speeds along the body; what is near δ sticks"}
-        captions["power"] = "power against friction; ticks: mesh"
-        found["gait_pictures"] = [
-            _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1)) for j, name in enumerate(planes)
-        ]
-        found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
-        if solution.relaxed is not None:
-            mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
-            mixed["realised"] = "what finite gaits lose to it"
-            found["gait_pictures"] += [_picture(drawn[name], text) for name, text in mixed.items()]
-        found["convergence_pictures"] = [
-            _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
-            _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
-        ]
-        found |= {"motion": motion_data(frames(solution), body), "errors": float(errors.sum())}
+    found: dict[str, Any] = {}
+    errors = mesh_errors(solution)
+    drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
+    drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
+    planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
+    body = solution.problem.body
+    captions = {"angles": f"{body.quantity}s", "speeds": "speeds along the body; what is near δ sticks"}
+    captions["power"] = "power against friction; ticks: mesh"
+    found["gait_pictures"] = [
+        _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1)) for j, name in enumerate(planes)
+    ]
+    found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
+    if solution.relaxed is not None:
+        mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
+        mixed["realised"] = "what finite gaits lose to it"
+        found["gait_pictures"] += [_picture(drawn[name], text) for name, text in mixed.items()]
+    found["convergence_pictures"] = [
+        _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
+        _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
+    ]
+    found |= {"motion": motion_data(frames(solution), body), "errors": float(errors.sum())}
     return (
         environment()
         .get_template("report.html")
@@ -134,8 +133,6 @@ def write_report(solution: Solution, path: Path, reference: Reference | None = N
 
 
 def _headline(solution: Solution) -> str:
-    if not solution.history:
-        return "no gait was found"
     measured = solution.measured
     best = solution.problem.objective
     other = "" if best == EFFICIENCY else f"; {best.name} {measured.value:.3g}"

@@ -164,14 +164,15 @@ def finished(optimum: Optimum) -> Certified:
     delta: what is slow enough for a large gait is not for a small one.
     """
     for _ in range(_DRIER + 1):
-        found = certified(_confirmed(optimum))
+        found = certified(confirmed(optimum))
         if not _is_small_and_viscous(found):
             break
         optimum = _at_smaller_delta(optimum)
     return found
 
 
-def _confirmed(optimum: Optimum) -> Answer:
+def confirmed(optimum: Optimum) -> Answer:
+    """An optimum through the stages to the answer, which has no certificate yet."""
     optimum = refine(descend(optimum))
     answer = confirm(optimum)
     for _ in range(_SADDLES):

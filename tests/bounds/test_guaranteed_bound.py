@@ -407,7 +407,7 @@ def test_halves_of_cells_fill_them_and_thin_ones_keep_their_rates():
         k = of.astype(int)
         assert np.all((inside >= low[:, k] - 1e-15) & (inside + extent <= low[:, k] + size[:, k] + 1e-15))
         np.add.at(volume, k, extent.prod(axis=0))
-        thin = finer.history[2] == 0
+        thin = finer.levels[2] == 0
         assert np.all((size[2, k] < 0.5 * size[:2, k].min(axis=0)) == thin)
         np.testing.assert_allclose(extent[2], size[2, k] * (1.0 if thin else 0.5))
     np.testing.assert_allclose(volume, size.prod(axis=0))

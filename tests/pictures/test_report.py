@@ -24,11 +24,11 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.motion_frames import frames, lab_outline
 from colloc.pictures.report_page import PLAIN, environment, report_page
 from colloc.pictures.style import INK
-from colloc.search import certify as certificate
-from colloc.search.certify import certify
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
 from colloc.results.store import save
+from colloc.search import certify as certificate
+from colloc.search.certify import certify
 
 BROWSER = next((path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path), None)
 VOID = {"meta", "br", "hr", "input", "img", "link"}

@@ -12,7 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, passing_depth
 from colloc.mechanics.friction import Friction
-from colloc.search.far_contact import crossing_pairs, last_free
+from colloc.search.converge import crossing_pairs, last_free
 from colloc.search.ipopt import Solver
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay

@@ -86,7 +86,7 @@ class Samples:
             return found.seconds, found.problem.hash, found.answer.x.tobytes(), found.certificate
         if kind == "archive":
             found = open_archive(problem(), path.with_suffix(".h5"))
-            return {name: o.efficiency for name, o in found.outcomes.items()}, found.damaged
+            return {name: o.efficiency for name, o in found.outcomes.items()}, len(found.damaged)
         if kind == "arrays":
             return {k: v.tolist() for k, v in read_arrays(path).items()}
         if kind == "study":
