@@ -84,7 +84,7 @@ def guess_in_balance(problem):
 
     transcription = transcribe(problem)
     x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
-    gait, mesh = problem.guess, transcription.mesh
+    gait, mesh = transcription.member(x[transcription.layout.parameters[:, 0]]), transcription.mesh
     fine = replay(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta, instants=200)
     measured = {"value": fine.efficiency, "distance": fine.distance, "work": fine.work}
     conditions = {"kkt_error": 1.0, "violation": 1.0, "complementarity": 0.0, "optimal": False, "status": "guess"}

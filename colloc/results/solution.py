@@ -115,7 +115,7 @@ class Solution:
     @property
     def history(self) -> tuple[Step, ...]:
         """How the search came to the answer; the last step is the answer."""
-        return self.answer.history
+        return self.answer.history or (self.answer.step,)
 
     @property
     def measured(self) -> Certificate | Answer:

@@ -123,9 +123,10 @@ EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&<!--"
 
 def test_everything_from_the_file_is_escaped(three_link):
     checks = (Check(EVIL, 1.0, 0.0, EVIL), *three_link.certificate.checks)
-    levels = [replace(three_link.history[0], status=EVIL, optimal=False), *three_link.history]
+    history = (*three_link.history, replace(three_link.history[0], status=EVIL, optimal=False))
+    answer = replace(three_link.answer, history=history)
     versions = {EVIL: EVIL, "colloc": EVIL}
-    evil = Solution(three_link.problem, levels, replace(three_link.certificate, checks=checks), 1.0, EVIL, EVIL, versions)
+    evil = Solution(three_link.problem, answer, replace(three_link.certificate, checks=checks), 1.0, EVIL, EVIL, versions)
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
     seen = outline(page)
     assert "<img" not in page
@@ -173,15 +174,15 @@ def test_pictures_take_colour_and_font_from_the_page_and_do_not_style_it(page):
         assert "#ffffff" not in picture.replace("fill: #ffffff; stroke", "")  # no white background
 
 
-def test_failures_show_in_red_and_a_solve_without_levels_has_a_page_too(three_link):
+def test_failures_show_in_red_and_an_interrupted_solve_has_a_page_too(three_link):
     bad = replace(three_link.certificate, checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks))
-    text = " ".join(outline(report_page(Solution(three_link.problem, three_link.history, bad))).text)
+    text = " ".join(outline(report_page(Solution(three_link.problem, three_link.answer, bad))).text)
     assert "✗ fails" in text
     assert "✗ certificate failed" in text
-    empty = Solution(three_link.problem, [], message="no first level.")
-    text = " ".join(outline(report_page(empty)).text)
-    assert "✗ not converged" in text
-    assert "no first level." in text
+    ended = Solution(three_link.problem, three_link.answer, message="ended early.", interrupted=True)
+    text = " ".join(outline(report_page(ended)).text)
+    assert "✗ interrupted" in text
+    assert "ended early." in text
 
 
 @pytest.mark.parametrize("n_link", [2, 3, 5, 8])
@@ -214,8 +215,9 @@ def turning(unsolved):
     guess = Fourier(mean=[0.5, 0.9], cos=[[1.0], [0.2]], sin=[[0.0], [1.1]])
     free = unsolved(crawler(3, rotation=None, guess=guess, intervals=40, mesh_tolerance=0))
     assert abs(free.rotation) > 0.1
-    asked = replace(free, problem=free.problem.with_(rotation=free.rotation))
-    return replace(asked, certificate=certify(asked))
+    problem = free.problem.with_(rotation=free.rotation)
+    asked = replace(free, problem=problem, answer=replace(free.answer, problem=problem))
+    return replace(asked, certificate=certify(asked.answer))
 
 
 def test_periods_of_a_turning_gait_are_drawn_one_after_the_other_as_it_turns(turning):
@@ -325,7 +327,7 @@ def test_a_notebook_shows_a_card(three_link):
     text = " ".join(card.text)
     for words in ("three_link", "solved", "0.26003", "checks, all hold", "distance d"):
         assert words in text
-    failed = Solution(three_link.problem, [], message="no first level.")
+    failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)
 
 
@@ -340,9 +342,9 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
 
 def test_levels_on_the_way_do_not_alarm_and_the_last_one_does(three_link):
     rough = replace(three_link.history[0], optimal=False, status="not stationary")
-    good = replace(three_link, levels=[rough, *three_link.history[1:]])
+    good = replace(three_link, answer=replace(three_link.answer, history=(rough, *three_link.history[1:])))
     text = " ".join(outline(report_page(good)).text)
     assert "on the way" in text
     assert "✗" not in text
-    bad = replace(three_link, levels=[*three_link.history[:-1], rough])
+    bad = replace(three_link, answer=replace(three_link.answer, history=(*three_link.history[:-1], rough)))
     assert "✗ not stationary" in " ".join(outline(report_page(bad)).text)

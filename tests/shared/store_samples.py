@@ -96,4 +96,4 @@ class Samples:
             text = read_journal(path.parent)
             return sorted(r.attempts[0].key for r in text.records), text.damaged
         found = read_rows(path, CACHE)
-        return found.values, found.damaged
+        return found.values, len(found.damaged)
