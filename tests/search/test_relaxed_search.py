@@ -165,7 +165,7 @@ def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution, mon
     assert simple.efficiency > solution.relaxed.certificate.efficiency - 0.3 * (
         solution.relaxed.certificate.efficiency - mean.efficiency
     )
-    assert len(heard) > 3
+    assert len(heard) > 1
 
 
 def test_other_searches_say_that_relaxed_gaits_are_not_for_them():
