@@ -12,7 +12,6 @@ import pytest
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.results.answer import SearchStep
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")
@@ -89,7 +88,7 @@ def test_a_wrong_argument_is_named_with_what_is_right(made, said):
 
 
 def test_what_is_printed_of_a_result_is_short(three_link):
-    shown = (three_link, three_link.problem, three_link.certificate, three_link.last, three_link.gait, three_link.sample(0.0))
+    shown = (three_link, three_link.problem, three_link.certificate, three_link.answer, three_link.gait, three_link.sample(0.0))
     problem = three_link.problem
     for thing in (*shown, colloc.replay(problem.body, problem.friction, three_link.gait, 1e-2, instants=200)):
         assert "\n" not in repr(thing)
@@ -148,31 +147,27 @@ def test_a_missing_library_is_named(three_link, monkeypatch):
 
 def test_progress_is_told_and_printed_only_if_asked(capsys):
     problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    levels, outcomes = [], []
-    solution = colloc.solve(problem, starts=1, progress=levels.append)
-    assert [level.delta for level in levels] == [level.delta for level in solution.history]
+    told, outcomes = [], []
+    solution = colloc.solve(problem, starts=1, progress=told.append)
+    assert [news.stage for news in told][-2:] == ["confirm", "certify"]
+    assert told[-1].best.value == pytest.approx(solution.value, rel=1e-3)
     found = colloc.multistart(problem, 2, progress=outcomes.append)
     assert {o.start for o in outcomes} == {0, 1}
     assert found.optima[0].best.efficiency == max(o.efficiency for o in outcomes)
     assert capsys.readouterr().out == ""
     colloc.solve(problem, starts=1, verbose=True)
-    assert capsys.readouterr().out.count("<Level at delta") == len(levels)
+    assert len(capsys.readouterr().out.splitlines()) == len(told)
 
 
 def test_a_search_over_many_starts_tells_of_every_one_in_units_of_the_friction_stated(capsys):
     problem = colloc.Problem("quick", friction=colloc.Friction(10, 10, 10), gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     told = []
     solution = colloc.solve(problem, starts=4, progress=told.append, verbose=True)
-    steps = [news for news in told if isinstance(news, SearchStep)]
-    tried, followed = ([s for s in steps if s.what == what] for what in ("starts", "gaits"))
-    assert [s.done for s in tried] == [1, 2, 3, 4]
-    assert {s.count for s in tried} == {4}
-    assert [s.done for s in followed] == list(range(1, len(followed) + 1))
-    assert len(followed) >= 1
-    assert told[len(steps) :] == list(solution.history)
-    assert followed[-1].efficiency == pytest.approx(solution.efficiency, rel=1e-2)
+    tried = [news for news in told if news.stage == "explore" and news.count == 4]
+    assert [news.done for news in tried][:5] == [0, 1, 2, 3, 4]
+    assert told[-1].best.value == pytest.approx(solution.efficiency, rel=1e-2)
     printed = capsys.readouterr().out.splitlines()
-    assert printed[3].startswith("4 of 4 starts; best d/W = 0.02")
+    assert printed[4].startswith("explore, 4 of 4; best d/W = 0.02")
     assert len(printed) == len(told)
 
 

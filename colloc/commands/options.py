@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import re
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -131,6 +132,10 @@ def output_path(output: str | None, default: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ProblemError(f"cannot make the folder {path.parent}: {error.strerror or error}.") from None
-    if not os.access(path.parent, os.W_OK) or path.is_dir():
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError:
+        raise ProblemError(f"cannot write {path}; choose another --output.") from None
+    if path.is_dir():
         raise ProblemError(f"cannot write {path}; choose another --output.")
     return path

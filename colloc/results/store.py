@@ -25,10 +25,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from colloc.collocation.layout import problem_layout
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
 from colloc.results.answer import REALISED, Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation
@@ -188,7 +191,12 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
     history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
-    gait = _read_gait(child(file, "gait"))
+    # by the variables, not by what the group gait says for other readers
+    layout = problem_layout(problem, Mesh(scheme(plain["scheme"]), arrays["edges"]), knots)
+    if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
+        raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
+    parameters, meet = arrays["x"][layout.parameters[:, 0]], arrays["edges"] if knots is None else knots
+    gait = problem.gait.member(parameters, problem.body.n_joint, meet)
     return Answer(problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history)
 
 
@@ -199,12 +207,6 @@ def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
             put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
         else:
             put_attribute(group, name, value)
-
-
-def _read_gait(group: h5py.Group) -> AnyGait:
-    """The gait that `_write_gait` wrote."""
-    arrays = {name: array(group, name) for name in _GAIT_ARRAYS if name in group}
-    return gait_from(arrays | {name: attribute(group, name) for name in group.attrs})
 
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
@@ -280,6 +282,4 @@ def _read(file: h5py.File) -> Solution:
     if "relaxed" in file:
         solution.relaxed = _read_relaxation(child(file, "relaxed"))
     solution.interrupted = bool(attribute(file, "interrupted"))
-    if answer.x.shape != (solution.layout.n,) or not np.isfinite(answer.x).all():
-        raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     return solution

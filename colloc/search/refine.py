@@ -29,7 +29,7 @@ _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
 doubling was seen to leave a sixth or less, with a point at rest that moves over the panels."""
 
 
-@dataclass
+@dataclass(eq=False)
 class _Meshes:
     """The meshes tried so far, and the phases that have to stay knots."""
 

@@ -36,7 +36,7 @@ EVERY = 2.0
 _PROBLEM = "problem"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Progress:
     """How far a solve has come.
 

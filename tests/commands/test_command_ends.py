@@ -307,10 +307,10 @@ def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
     class _Begun(Exception):
         pass
 
-    def begun(*_):
+    def begun(*_, **__):
         raise _Begun
 
-    monkeypatch.setattr("colloc.commands.solve._solved", begun)
+    monkeypatch.setattr("colloc.studies.saved.solved_and_saved", begun)
     for intervals, said in ((5000, "5000 intervals will take about 1 min 40 s"), (60, "")):
         with pytest.raises(_Begun):
             colloc(["solve", quick, "--mesh", str(intervals), "--output", f"{tmp_path}/"])

@@ -1,15 +1,12 @@
 """Ctrl-C, and time that is over: a block ends in one KeyboardInterrupt, and compiled code does not swallow it."""
 
 import contextlib
-import re
 import signal
-import subprocess
 import sys
 import threading
 import time
 import weakref
 
-import numpy as np
 import pytest
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity

@@ -4,12 +4,9 @@ import io
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
 import pytest
 
-from colloc.gaits.harmonic import ellipse
-from colloc.gaits.problem import Problem
 from colloc.system.progress import StatusLine, duration
 
 WIPED = "\x1b[1A\x1b[2K"
