@@ -111,8 +111,8 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
 def forbidden(body: Body, joint_limit: Limit, first: int = 0, second: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of two shape coordinates that are forbidden whatever the others are.
 
-    Of a body with no others: by its limits, and where parts cross. Of one with more: by limits on these two alone, such as those
-    of a chain's joints; what a smooth body may do in one of several modes depends on all.
+    Of a body with no others: by its limits, and where parts cross. Of one with more: by limits on these two alone. Those of a
+    chain are of that kind; what a smooth body may do in one of several modes depends on all.
 
     Returns
     -------
