@@ -32,15 +32,7 @@ _PHASES = np.arange(64) / 64
 
 
 def check_actuators_suffice(problem: Problem) -> None:
-    """A `ProblemError` if no gait of a problem keeps the limits on its joints' torques and powers, whatever its efficiency.
-
-    Examples
-    --------
-    >>> from colloc import Harmonic, Problem
-    >>> check_actuators_suffice(Problem("weak", gait=Harmonic(1), torque_limit=0.01))
-    Traceback (most recent call last):
-    colloc.system.errors.ProblemError: no gait keeps torque_limit: ...
-    """
+    """A `ProblemError` if no gait of a problem keeps the limits on its joints' torques and powers, whatever its efficiency."""
     limits = problem.actuator_limits
     if not limits.names or problem.slope is not None or problem.friction.degree is None or _guess_keeps(problem):
         return
@@ -70,6 +62,12 @@ def least_share(problem: Problem) -> float:
     """The smallest value that the largest share of the limits takes at instants as fast as the slowest gait on average.
 
     For laws whose friction does not fall with the speed.
+
+    Examples
+    --------
+    >>> from colloc import Harmonic, Problem
+    >>> round(least_share(Problem("weak", gait=Harmonic(1), torque_limit=0.01)), 1)
+    2.1
     """
     return _smallest(problem, problem.actuator_limits, None, _ROUNDS)
 
