@@ -4,30 +4,36 @@ Two statements about instants, with the shares of the limits (`colloc.mechanics.
 
 - A gait moves at some instant at least as fast as its mean, in some direction of some shape. So it needs no less than the
   smallest share over all shapes and directions at the slowest pace allowed.
-- Follow any combination w of the joint angles of a closed path. Where it is largest, the rates are across w. If the path has no
-  cusp they do not vanish there, and under dry friction torques do not ask how fast they are. So the gait needs no less than the
-  smallest share over all shapes and directions across w. What has cusps nevertheless, an ellipse without width, retraces its
-  path, and goes nowhere if the friction is the same forwards and backwards.
+- The tangent of a closed path of two joints that has no cusps takes every direction, and under dry friction torques do not ask
+  how fast it is followed. So such a gait needs no less than the largest, over the directions, of the smallest share over the
+  shapes. What has cusps nevertheless, an ellipse without width, retraces its path, and goes nowhere if the friction is the same
+  forwards and backwards.
 
-The smallest shares are found by samples and climbs from the best of them, and not proved: so a limit is called hopeless only if
-it is missed by a margin.
+The smallest shares are found, not proved, so a limit is called hopeless only if it is missed by a margin. That links must not
+cross is left out, which makes them no larger.
 """
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
+from scipy.optimize import minimize
 
 from colloc.gaits.limits import of_each
 from colloc.gaits.problem import Problem
 from colloc.mechanics.actuators import ActuatorLimits
+from colloc.reduced.actuator_slopes import share_slopes
 from colloc.system.errors import ProblemError
 
 _MARGIN = 0.05
 """Relative, by which the smallest share found may lie above the smallest there is."""
-_SAMPLES, _KEPT, _ROUNDS = 2000, 50, 30
-_STEP, _SHRINK = 0.4, 0.85
-"""First steps of climbs [rad, and of unit directions], and how they shrink from round to round."""
-_ANGLES = 16
+_SAMPLES, _STARTS = 2000, 10
+"""Instants at random, and of these the best, from which a smaller share is searched for by SLSQP."""
+_ITERATIONS, _ACCURACY = 100, 1e-4
+_DIRECTIONS, _SHAPES = 16, 61
+"""Directions of the tangent of a path of two joints, and shapes along each of these joints."""
 _PHASES = np.arange(64) / 64
 
 
@@ -44,24 +50,24 @@ def check_actuators_suffice(problem: Problem) -> None:
             f"no gait keeps power_limit and goes as far as at_least asks: a distance of {distance:g} takes a power of "
             f"{needed:.3g} on average, and the joints together may deliver {sum(limits.power):.3g}."
         )
-    share = least_share(problem)
+    share = least_share(problem, enough=1.0)
     if share > 1 + _MARGIN:
         raise ProblemError(
             f"no gait keeps {stated}: whatever the body does, some joint needs about {share:.2g} times what it is allowed. "
             "Allow the joints more than that, or take other links."
         )
-    across = least_share_without_cusps(problem)
-    if across > 1 + _MARGIN:
+    share = least_share_without_cusps(problem)
+    if share > 1 + _MARGIN:
         raise ProblemError(
-            f"no gait that goes anywhere keeps {stated}: some joint needs about {across:.2g} times what it is allowed, unless "
-            "the path is retraced. Allow the joints more than that, or take other links."
+            f"no gait that goes anywhere keeps torque_limit: some joint needs about {share:.2g} times what it is allowed, "
+            "unless the path is retraced. Allow the joints more than that, or take other links."
         )
 
 
-def least_share(problem: Problem) -> float:
+def least_share(problem: Problem, enough: float = 0.0) -> float:
     """The smallest value that the largest share of the limits takes at instants as fast as the slowest gait on average.
 
-    For laws whose friction does not fall with the speed.
+    For laws whose friction does not fall with the speed. The search ends at a value that is small `enough`.
 
     Examples
     --------
@@ -69,73 +75,95 @@ def least_share(problem: Problem) -> float:
     >>> round(least_share(Problem("weak", gait=Harmonic(1), torque_limit=0.01)), 1)
     2.1
     """
-    return _smallest(problem, problem.actuator_limits, None, _ROUNDS)
+    rng, n = np.random.default_rng(0), problem.body.n_joint
+    y = rng.uniform(-0.5 * np.pi, 0.5 * np.pi, (n, _SAMPLES)) * rng.uniform(size=_SAMPLES)
+    directions = rng.normal(size=(n, _SAMPLES))
+    samples = np.concatenate([y, directions / np.linalg.norm(directions, axis=0)])
+    found = _shares(problem, problem.actuator_limits, *_instants(problem, samples)).max(axis=0)
+    best = float(found.min())
+    for k in found.argsort()[:_STARTS]:
+        if best <= enough:
+            break
+        best = min(best, _descended(problem, samples[:, k], found[k]))
+    return best
 
 
 def least_share_without_cusps(problem: Problem) -> float:
     """The same of torques, as every gait without cusps needs it somewhere; 0 where the class has others that go anywhere."""
-    limits = ActuatorLimits(torque=problem.actuator_limits.torque)
-    if not (limits.names and problem.gait.without_cusps and problem.friction.reversible and problem.friction.degree == 0):
+    limits, law = ActuatorLimits(torque=problem.actuator_limits.torque), problem.friction
+    if not (limits.names and problem.gait.without_cusps and problem.body.n_joint == 2 and law.reversible and law.degree == 0):
         return 0.0
-    ways = _combinations(problem.body.n_joint)
-    roughly = np.array([_smallest(problem, limits, way, 0) for way in ways])
-    most = 0.0
-    for k in roughly.argsort()[::-1]:
-        if roughly[k] <= most:  # climbs only lower it
-            break
-        most = max(most, _smallest(problem, limits, ways[k], _ROUNDS))
-    return most
+    each = (np.linspace(-most, most, _SHAPES) for most in of_each(problem.joint_limit, 2))
+    shapes = np.stack(np.meshgrid(*each)).reshape(2, -1)
+    turns = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    ways = _slowest_pace(problem) * np.stack([np.cos(turns), np.sin(turns)])
+    return max(float(_shares(problem, limits, shapes, way[:, None] + 0 * shapes).max(axis=0).min()) for way in ways.T)
+
+
+def _slowest_pace(problem: Problem) -> float:
+    """Shape speed [rad per period] of the slowest gaits allowed, on average."""
+    return 2 * np.pi * problem.smallest_shape_speed
 
 
 def _guess_keeps(problem: Problem) -> bool:
     """Whether the guess, which is a member of the class or near one, keeps the limits at some phases."""
-    angles, rates = problem.guess(_PHASES)
-    return bool(_largest(problem, problem.actuator_limits, angles, rates).max() <= 1.0)
+    return bool(_shares(problem, problem.actuator_limits, *problem.guess(_PHASES)).max() <= 1.0)
 
 
-def _combinations(n_joint: int) -> np.ndarray:
-    """Unit vectors ``(n, n_joint)``: of two joints in all directions, else of single joints and of neighbours."""
-    if n_joint == 2:
-        angle = np.pi * np.arange(_ANGLES) / _ANGLES
-        return np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    unit = np.eye(n_joint)
-    pairs = [(unit[i] + side * unit[i + 1]) / np.sqrt(2) for i in range(n_joint - 1) for side in (1, -1)]
-    return np.array([*unit, *pairs])
-
-
-def _largest(problem: Problem, limits: ActuatorLimits, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """The largest share at instants, ``(n,)``; infinite at shapes that are forbidden."""
-    body, law = problem.body, problem.friction
-    delta = problem.delta * (np.linalg.norm(rates, axis=0).mean() if problem.gait.unit_speed else 1.0)
-    shares = limits.shares_in_balance(body, law, angles, rates, body.solve(law, angles, rates, delta).z, delta)
-    found = np.where(np.isfinite(limits.least)[:, None], np.abs(shares), shares).max(axis=0)
-    return np.where(body.crossing_depth(angles) > 0, np.inf, found)
-
-
-def _smallest(problem: Problem, limits: ActuatorLimits, across: np.ndarray | None, rounds: int) -> float:
-    """Of the largest share, over shapes and directions, or directions across a vector ``(n_joint,)``; with so many rounds of
-    climbs from the best samples."""
-    n, rng = problem.body.n_joint, np.random.default_rng(0)
+def _instants(problem: Problem, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angles and rates ``(n_joint, n)`` at the slowest pace of samples (y, direction) ``(2 n_joint, n)``: angles are ``limit
+    sin y``, so that they need no bounds."""
+    n = problem.body.n_joint
     most = np.array(of_each(problem.joint_limit, n))[:, None]
-    pace = 2 * np.pi * problem.smallest_shape_speed
+    return most * np.sin(samples[:n]), _slowest_pace(problem) * samples[n:]
 
-    def shares(angles: np.ndarray, ways: np.ndarray) -> np.ndarray:
-        return _largest(problem, limits, angles, pace * ways)
 
-    def directions(vectors: np.ndarray) -> np.ndarray:
-        if across is not None:
-            vectors = vectors - across[:, None] * (across @ vectors)
-        return vectors / np.linalg.norm(vectors, axis=0)
+def _delta(problem: Problem, rates: np.ndarray) -> float:
+    """Regularisation speed per period."""
+    return problem.delta * (float(np.linalg.norm(rates, axis=0).mean()) if problem.gait.unit_speed else 1.0)
 
-    angles, ways = rng.uniform(-most, most, (n, _SAMPLES)), directions(rng.normal(size=(n, _SAMPLES)))
-    found = shares(angles, ways)
-    best = found.argsort()[:_KEPT]
-    angles, ways, found, step = angles[:, best], ways[:, best], found[best], _STEP
-    for _ in range(rounds):
-        nearby = np.clip(angles + step * rng.normal(size=angles.shape), -most, most)
-        turned = directions(ways + step * rng.normal(size=ways.shape))
-        values = shares(nearby, turned)
-        better = values < found
-        angles[:, better], ways[:, better], found[better] = nearby[:, better], turned[:, better], values[better]
-        step *= _SHRINK
-    return float(found.min())
+
+def _senses(limits: ActuatorLimits) -> np.ndarray:
+    """``(n_row, n_share)``: shares to what must not exceed 1; moments count in both senses."""
+    unit = np.eye(len(limits.names))
+    return np.concatenate([unit, -unit[np.isfinite(limits.least)]])
+
+
+def _shares(problem: Problem, limits: ActuatorLimits, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """In every sense that counts, ``(n_row, n)``."""
+    body, law, delta = problem.body, problem.friction, _delta(problem, rates)
+    z = body.solve(law, angles, rates, delta).z
+    return _senses(limits) @ limits.shares_in_balance(body, law, angles, rates, z, delta)
+
+
+def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
+    """The largest share where SLSQP ends that makes it small from a sample (y, direction) ``(2 n_joint,)``; what it has there.
+
+    Variables are (y, direction, s); s is what all shares are below, in units of the first value.
+    """
+    n, limits, body, law = problem.body.n_joint, problem.actuator_limits, problem.body, problem.friction
+    on_angles, on_rates = np.array(of_each(problem.joint_limit, n)), np.full(n, _slowest_pace(problem))
+
+    def room(x: np.ndarray) -> np.ndarray:
+        return x[-1] - _shares(problem, limits, *_instants(problem, x[:-1, None]))[:, 0] / value
+
+    def room_slopes(x: np.ndarray) -> np.ndarray:
+        angles, rates = _instants(problem, x[:-1, None])
+        delta = _delta(problem, rates)
+        z = body.solve(law, angles, rates, delta).z
+        slopes = _senses(limits) @ share_slopes(body, law, limits, angles, rates, z, delta)[:, :, 0] / value
+        on_x = slopes * np.concatenate([on_angles * np.cos(x[:n]), on_rates])
+        return np.concatenate([-on_x, np.ones((len(on_x), 1))], axis=1)
+
+    def on_direction(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.zeros(n), 2 * x[n:-1], [0.0]])
+
+    kept: list[dict[str, Any]] = [
+        {"type": "ineq", "fun": room, "jac": room_slopes},
+        {"type": "eq", "fun": lambda x: x[n:-1] @ x[n:-1] - 1, "jac": on_direction},
+    ]
+    search = partial(minimize, constraints=kept, method="SLSQP", options={"maxiter": _ITERATIONS, "ftol": _ACCURACY})
+    x = search(lambda x: x[-1], np.append(start, 1.0), jac=lambda x: np.eye(2 * n + 1)[-1]).x[:-1]
+    x[n:] /= np.linalg.norm(x[n:])
+    ended = float(_shares(problem, limits, *_instants(problem, x[:, None])).max())
+    return ended if ended < value else value  # also where it is not a number

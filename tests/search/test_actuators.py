@@ -210,7 +210,7 @@ def test_no_gait_needs_less_than_what_every_gait_needs(case):
         for _ in range(3):
             gait = problem.gait.fourier(rng.normal(size=problem.gait.size(problem.body.n_joint)), problem.body.n_joint)
             needed = largest_share(problem, gait.scaled(size / gait.shape_speed))
-            assert needed > 0.98 * max(least, across)  # the smallest found may lie above the smallest there is
+            assert needed > 0.99 * max(least, across)  # the smallest found may lie above the smallest there is
 
 
 def test_what_every_gait_needs_is_no_more_than_some_gaits_need():
