@@ -62,6 +62,16 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
         return _ended(INTERRUPTED, "interrupted", f"interrupted; {str(stop) or 'nothing was written.'}", as_json)
 
 
+@contextlib.contextmanager
+def said_if_interrupted(saved: Sequence[str]) -> Iterator[None]:
+    """Ctrl-C in the block ends the command by saying which files are saved already."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        what = f"{', '.join(saved)} {'are' if len(saved) > 1 else 'is'} saved." if saved else ""
+        raise KeyboardInterrupt(str(stop) or what) from None
+
+
 def _end_workers() -> None:
     """End processes of this one that are still at work; what they were at is not kept, and Python would wait for them."""
     if "multiprocessing" in sys.modules:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import h5py
 import pytest
@@ -19,7 +20,9 @@ from colloc.commands.ending import exit_code
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
 from colloc.gaits.problem_file import read_problem_file
+from colloc.results.kept import save_result
 from colloc.results.store import load, save
+from colloc.system.errors import StoreError
 from colloc.system.row_file import CACHE, put_rows
 
 QUICK = """
@@ -239,6 +242,59 @@ def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys)
     printed = capsys.readouterr()
     assert "efficiency d/W" in printed.out
     assert "no figure: cannot write" in printed.err
+
+
+@pytest.mark.parametrize("words", [[], ["--json"]])
+def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(words, quick, tmp_path, capsys, monkeypatch):
+    def full(*_):
+        raise StoreError("cannot write quick.h5: No space left on device.")
+
+    monkeypatch.setattr("colloc.results.kept.save_result", full)
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/", *words]) == 2
+    printed = capsys.readouterr()
+    if words:
+        told = json.loads(printed.out)
+        assert told["file"] is None
+        assert told["efficiency"] == told["certificate"]["efficiency"]
+    else:
+        assert "efficiency d/W" in printed.out
+        assert "saved" not in printed.out
+    assert printed.err == "colloc: the result is not saved: cannot write quick.h5: No space left on device.\n"
+    assert {p.suffix for p in tmp_path.iterdir()} == {".py", ".h5"}  # the run, from which the same command goes on
+    monkeypatch.undo()
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/", "--no-figure"]) in (0, 4)
+    assert "going on from" in capsys.readouterr().out
+
+
+def interrupt(*_, **__):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    "where", ["colloc.bounds.optimality_gap.upper_bound", "colloc.pictures.solution_figure.solution_figure"]
+)
+def test_ctrl_c_after_the_result_is_saved_says_that_it_is(where, quick, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(where, interrupt)
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/"]) == 130
+    (result,) = tmp_path.glob("*.h5")
+    assert capsys.readouterr().err == f"colloc: interrupted; {result} is saved.\n"
+    assert load(result).certificate.replayed
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_ctrl_c_while_a_result_is_saved_waits_until_all_of_it_is(three_link, tmp_path, monkeypatch):
+    """Of the gait of finite size, too, which is saved after the one that shrank."""
+
+    def saving(solution, path):
+        if solution is both:
+            signal.raise_signal(signal.SIGINT)
+        return save(solution, path)
+
+    monkeypatch.setattr("colloc.results.store.save", saving)
+    both = replace(three_link, finite=three_link)
+    with pytest.raises(KeyboardInterrupt):
+        save_result(both, tmp_path / "x.h5")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["x.finite.h5", "x.h5"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
