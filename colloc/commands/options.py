@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from colloc.commands.ending import show
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.system.errors import ProblemError
@@ -90,7 +91,7 @@ def add_verbose(parser: argparse.ArgumentParser) -> None:
 
 def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
     """What a command ends with: one JSON object of the facts if that was asked for, else lines for people."""
-    print(json.dumps(facts) if options.json else "\n".join(lines), flush=True)
+    show(json.dumps(facts) if options.json else "\n".join(lines))
 
 
 def add_bound(parser: argparse.ArgumentParser) -> None:

@@ -130,13 +130,18 @@ def summary_dict(solution: Solution, path: Path | None, reference: Reference | N
         "gait": fields(solution.gait),
         "certificate": certificate.facts() if certificate.replayed else None,
         "reference": None,
-        "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
+        "bound": bound_facts(bound),
         "versions": solution.versions,
     }
     if reference is not None:
         keys = ("efficiency", "tolerance", "source")
         result["reference"] = {key: getattr(reference, key) for key in keys}
     return result
+
+
+def bound_facts(bound: Bound | None) -> dict | None:
+    """An upper bound, if there is one, as the one JSON object states it."""
+    return None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed}
 
 
 def _relaxed_dict(solution: Solution) -> dict | None:
