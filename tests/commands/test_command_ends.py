@@ -21,16 +21,12 @@ from colloc.bounds.sampled import Domain, bound_key
 from colloc.commands.ending import exit_code, show
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
-<<<<<<< HEAD
+from colloc.gaits import gait_fields
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.chain import Chain
-=======
-from colloc.gaits import gait_fields
-from colloc.gaits.problem_file import read_problem_file
 from colloc.results.kept import save_result
->>>>>>> wb
 from colloc.results.store import load, save
 from colloc.system.errors import StoreError
 from colloc.system.row_file import CACHE, put_rows
