@@ -65,6 +65,8 @@ _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _MATH_INLINE = re.compile(r"\$`([^`\n]+)`\$")
 SHOWN = {"problems": "gallery.md", "colloc/__init__.py": "api.md", "docs/notebook.ipynb": "notebook.md"}
 """What a code host shows, and the page that shows it here."""
+_SCROLLS = '<span style="display: block; overflow-x: auto">{}</span>'
+"""On a phone a long formula, and not the page."""
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^):#\s]+)(?:#[^)]*)?\)")
 
 
@@ -97,7 +99,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
     def mark(display: str) -> Any:
         def replaced(match: re.Match[str]) -> str:
-            formulas.append(convert(match[1].strip(), display=display))
+            formula = convert(match[1].strip(), display=display)
+            formulas.append(_SCROLLS.format(formula) if display == "block" else formula)
             return f"\n\nFORMULA{len(formulas) - 1}END\n\n" if display == "block" else f"FORMULA{len(formulas) - 1}END"
 
         return replaced
