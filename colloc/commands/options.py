@@ -82,6 +82,11 @@ def add_printing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress, only the final summary")
 
 
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """``--verbose``, for commands that end in the summary of a result."""
+    parser.add_argument("--verbose", action="store_true", help="also tell the search, the gait and every check")
+
+
 def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
     """What a command ends with: one JSON object of the facts if that was asked for, else lines for people."""
     print(json.dumps(facts) if options.json else "\n".join(lines), flush=True)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
-from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
+from colloc.commands.options import add_bound, add_printing, add_problem, add_verbose, changed, new_parser, output_path
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
@@ -60,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png")
     parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
     add_printing(parser)
+    add_verbose(parser)
     return parser
 
 
@@ -116,7 +117,8 @@ def _solve(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
     else:
-        lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
+        said = summary_lines(solution, stated.reference, verbose=options.verbose)
+        lines = [*said, gap_line(problem, solution.measured.efficiency, bound)]
         print("\n".join(lines), flush=True)
 
     if not options.no_figure:

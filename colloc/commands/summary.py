@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
+from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.results.steps import PRESCRIBED, REALISED, REDUCED
 
@@ -15,13 +16,17 @@ if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
 
 
-def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
-    """What a person wants to know at the end."""
-    lines = [f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"]
+def summary_lines(solution: Solution, reference: Reference | None, *, verbose: bool = False) -> list[str]:
+    """What a person wants to know at the end: the result, whether the checks hold, and what failed; with `verbose` also the
+    search, the gait and every check."""
+    verdict = f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"
     certificate = solution.certificate
-    best = solution.problem.objective
+    lines = [verdict]
     if certificate.replayed:
-        lines += [
+        alone = solution.last.program in (PRESCRIBED, REALISED)  # what these are the best of, `_search_lines` tells
+        best = solution.problem.objective
+        lines = [
+            verdict if alone else f"{verdict} ({solution.standing[0]})",
             f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by independent replay "
             f"({certificate.instants} instants); {certificate.value_at_zero_delta:.6f} +- "
             f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
@@ -29,20 +34,40 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
             f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.last.delta:.0e}",
         ]
-        lines += [f"  search          {text}" for text in _search_lines(solution)]
-        reason = solution.problem.paced_by
-        paced = f"; run in a period of 1, as {reason}" if reason else ""
-        lines += [] if solution.problem.slope is None else [f"  ground          {solution.problem.slope.describe()}"]
-        gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
-        lines += [f"  gait            {text}" for text in gait]
-        lines += [f"  {check.line()}" for check in certificate.checks]
+        lines += _background(solution) if verbose else []
+        lines += _check_lines(certificate, verbose)
         if solution.relaxed is not None:
             lines += [f"  relaxed         {text}" for text in solution.relaxed.lines()]
-            lines += [f"  {check.line()}" for check in solution.relaxed.certificate.checks]
+            lines += _check_lines(solution.relaxed.certificate, verbose)
         if reference is not None:
             lines.append(f"  {reference.verdict(solution.tends_to.efficiency)}")
     if solution.message:
         lines.append(f"  {solution.message}")
+    return lines
+
+
+def _background(solution: Solution) -> list[str]:
+    """How the gait was found, where it moves, and the gait itself."""
+    problem = solution.problem
+    paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
+    gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
+    return [
+        *(f"  search          {text}" for text in _search_lines(solution)),
+        *([] if problem.slope is None else [f"  ground          {problem.slope.describe()}"]),
+        *(f"  gait            {text}" for text in gait),
+    ]
+
+
+def _check_lines(certificate: Certificate, verbose: bool) -> list[str]:
+    """Every check; or in one line that they hold, with the one that comes nearest to its limit, and those that fail."""
+    if verbose:
+        return [f"  {check.line()}" for check in certificate.checks]
+    held = [check for check in certificate.checks if check.passed]
+    nearest = max(held, key=lambda check: abs(check.value) / max(check.threshold, 1e-300), default=None)
+    lines = [f"  {check.line()}" for check in certificate.failures]
+    if nearest is not None:
+        largest = f"largest: {nearest.name}, {abs(nearest.value):.1e} where {nearest.threshold:.0e} is allowed"
+        lines.insert(0, f"  {len(held)} checks hold ({largest})")
     return lines
 
 
@@ -56,7 +81,7 @@ def _besides(solution: Solution) -> list[str]:
     if problem.uses("driven_work"):
         lines.append(f"  driven work W+  {found.driven_work:.6f}")
     if problem.rotation != 0:
-        lines.append(f"  net rotation    {found.rotation:.6f} rad")
+        lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines
 
 
@@ -86,10 +111,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "seconds": solution.seconds,
         "delta": solution.last.delta,
         "objective": solution.problem.objective.fields(),
-        "value": solution.value,
-        "efficiency": solution.efficiency,
-        "distance": solution.distance,
-        "work": solution.work,
+        **{name: getattr(solution.measured, name) for name in ("value", "efficiency", "distance", "work")},
         "iterations": sum(level.iterations for level in solution.levels),
         "class": solution.problem.gait.describe(),
         "program": solution.last.program,
@@ -97,7 +119,7 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "constraints": int(solution.last.lam_g.size),
         "kkt_error": solution.last.kkt_error,
         "starts": solution.starts,
-        "finite": None if solution.finite is None else solution.finite.value,
+        "finite": None if solution.finite is None else solution.finite.measured.value,
         "relaxed": _relaxed_dict(solution),
         "others": [
             {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}

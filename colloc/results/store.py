@@ -5,7 +5,8 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /problem            JSON text of all fields          /source     text of the problem file
     /gait/{mean,cos,sin}                                 /versions   JSON text
          or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
-    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
+    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
+        modes and mode_rates
     /levels/000/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, efficiency, objective (NaN: the efficiency), ...
     /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, efficiency, efficiency_error, ...
     /relaxed/{durations,directions,start}, attribute symmetry and those of `results.relaxation.Optimality`, with
@@ -29,7 +30,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.former_format import converted, is_former
-from colloc.results.motion import SAMPLES, motion_columns
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
 from colloc.results.steps import Alternative, Level
@@ -170,7 +170,7 @@ def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
     for name, value in fields(gait).items():
         if name in _GAIT_ARRAYS:
             units, dims = _GAIT_ARRAYS[name]
-            put(group, name, value, units=units, dims=dims)
+            put(group, name, value, units=units, dims=dims.replace("joint", gait.coordinate))
         else:
             put_attribute(group, name, value)
 
@@ -178,8 +178,7 @@ def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
 def _write_motion(file: h5py.File, solution: Solution) -> None:
     _write_gait(file.create_group("gait"), solution.gait)
     group = file.create_group("motion")
-    motion = solution.sample(np.linspace(0.0, 1.0, SAMPLES))
-    for name, column in motion_columns(motion, solution.power(motion)).items():
+    for name, column in solution.columns().items():
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
 
 

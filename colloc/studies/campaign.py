@@ -101,7 +101,8 @@ def run_starts(
     ----------
     problem : Problem
     starts : iterable of int
-        Start numbers; a start depends only on the problem, the sampler, the seed and its number.
+        Start numbers, each taken when a worker is free for it. A start depends only on the problem, the sampler, the seed and
+        its number.
     sampler : {"latin-hypercube", "perturbed"}
     seed : int
     workers : int
@@ -122,7 +123,6 @@ def run_starts(
     """
     if not problem.gait.free:
         raise ProblemError("a prescribed motion is the same from every start; colloc solve measures it.")
-    starts = list(starts)
     waiting = iter(starts)
 
     def ready() -> Task | None:

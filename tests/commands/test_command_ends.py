@@ -115,13 +115,13 @@ def test_a_full_disk_behind_standard_output_is_said_once(words, buffered, result
 def test_letters_that_an_encoding_lacks_are_printed_as_words(encoding, shown, three_link, monkeypatch):
     printed = io.BytesIO()
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(printed, encoding=encoding))
-    assert exit_code(lambda: print("\n".join(summary_lines(three_link, None))) or 0) == 0
+    assert exit_code(lambda: print("\n".join(summary_lines(three_link, None, verbose=True))) or 0) == 0
     assert shown in printed.getvalue().decode(encoding)
 
 
 def test_a_solve_ends_well_on_a_terminal_without_greek(quick, tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
-    done = command("solve", quick, "--no-figure", "--output", f"{tmp_path}/", env=environment)
+    done = command("solve", quick, "--no-figure", "--verbose", "--output", f"{tmp_path}/", env=environment)
     assert done.returncode in (0, 4)
     assert b"cos 2 pi t" in done.stdout
     assert done.stderr == b""
@@ -233,7 +233,8 @@ def test_a_bound_that_cannot_be_computed_costs_no_summary(quick, tmp_path, capsy
     assert colloc(["solve", quick, "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
     printed = capsys.readouterr()
     assert "quick:" in printed.out
-    assert "no bound: bounds are computed for at most five links" in printed.err
+    assert "no bound: upper bounds are computed for at most 5 links, not 6" in printed.err
+    assert "--bound" not in printed.out  # nobody is sent to ask again
 
 
 def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys):

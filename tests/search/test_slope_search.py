@@ -93,7 +93,7 @@ def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
         "from colloc import Harmonic, Problem, ellipse\n"
         "PROBLEM = Problem('up', ellipse(0, 2.8, 1.3), gait=Harmonic(1, 'bilateral'), delta=1e-2, grade=0.1)\n"
     )
-    assert solve.main([str(file), "--starts", "2", "--output", f"{tmp_path}/"]) == 0
+    assert solve.main([str(file), "--starts", "2", "--verbose", "--output", f"{tmp_path}/"]) == 0
     out = capsys.readouterr().out
     assert "slope of grade 0.1: d is the climb, W the work of the joints" in out
     assert (tmp_path / "up.png").exists()

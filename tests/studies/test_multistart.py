@@ -1,6 +1,7 @@
 """Many starts: admissible reproducible samples, gaits that are the same, archives, and runs that nothing stops."""
 
 import json
+import tracemalloc
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -29,7 +30,7 @@ from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise
 from colloc.search.optimise import is_trivial, maximise_efficiency, optimum
-from colloc.studies import campaign
+from colloc.studies import calls, campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
 from scripts.continue_delta import resolution_warning, value_at_zero_delta
@@ -193,7 +194,7 @@ def test_an_archive_comes_back_as_it_was_written(tmp_path):
     archive = open_archive(problem(), path)
     archive.add({names[4]: outcome(4, efficiency=1 / 3), names[1]: outcome(1, efficiency=np.nan, status=ERROR)})
     back = open_archive(problem(), path)
-    assert (sorted(back.outcomes), back.damaged) == (sorted(names.values()), 0)
+    assert (sorted(back.outcomes), back.damaged) == (sorted(names.values()), ())
     for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
         assert getattr(back.outcomes[names[4]], name) == getattr(archive.outcomes[names[4]], name)
     assert np.isnan(back.outcomes[names[1]].efficiency)
@@ -425,3 +426,40 @@ def test_known_gaits_take_the_place_of_samples():
     stated, near = problem(), ellipse(0.1, 1.3, 0.8)
     (found,) = campaign.run_starts(stated, [7], executor=ThreadPoolExecutor, known={7: near})
     assert phase_distance(found.guess, near) < 1e-7
+
+
+class _Enough(Exception):
+    pass
+
+
+def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(tmp_path, capsys, monkeypatch):
+    """In a pipe too: a line for every start as it ends."""
+    path = tmp_path / "quick.py"
+    path.write_text(FILE, encoding="utf-8")
+    many = 10**6  # a list of them takes 40 MB
+
+    def solved(function, ready, **settings):
+        for _ in range(3):
+            task = ready()
+            yield task, outcome(task.key, ellipse(0.2, 1.2, 0.8))
+        raise _Enough
+
+    monkeypatch.setattr(campaign, "completed", solved)
+    words = [str(path), "--starts", str(many), "--output", f"{tmp_path}/"]
+    with pytest.raises(_Enough):
+        multistart.main(words)
+    told = capsys.readouterr().out
+    assert f"0 starts done already, {many} to go" in told
+    assert told.count("  solved\n") == 3
+    with pytest.raises(_Enough):
+        multistart.main(words)
+    told = capsys.readouterr().out
+    assert f"3 starts done already, {many - 3} to go" in told
+    assert [line.split()[0] for line in told.splitlines() if line.endswith("solved")] == ["3", "4", "5"]
+    tracemalloc.start()
+    for begun in (lambda: multistart.main([*words, "--quiet"]), lambda: calls.multistart(problem(), many)):
+        with pytest.raises(_Enough):
+            begun()
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 5e6
