@@ -118,7 +118,7 @@ def _solve(options: argparse.Namespace) -> int:
         print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
     else:
         said = summary_lines(solution, stated.reference, verbose=options.verbose)
-        lines = [*said, gap_line(problem, solution.measured.efficiency, bound)]
+        lines = [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)]
         print("\n".join(lines), flush=True)
 
     if not options.no_figure:

@@ -163,33 +163,33 @@ def _write(file: h5py.File, solution: Solution) -> None:
     if solution.certificate.replayed:
         _write_certificate(file.create_group("certificate"), solution.certificate)
     if solution.relaxed is not None:
-        _write_relaxation(file.create_group("relaxed"), solution.relaxed)
+        _write_relaxation(file.create_group("relaxed"), solution.relaxed, solution.problem.body.coordinate)
 
 
-def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
+def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
     for name, value in fields(gait).items():
         if name in _GAIT_ARRAYS:
             units, dims = _GAIT_ARRAYS[name]
-            put(group, name, value, units=units, dims=dims.replace("joint", gait.coordinate))
+            put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
         else:
             put_attribute(group, name, value)
 
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
-    _write_gait(file.create_group("gait"), solution.gait)
+    _write_gait(file.create_group("gait"), solution.gait, solution.problem.body.coordinate)
     group = file.create_group("motion")
     for name, column in solution.columns().items():
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
 
 
-def _write_relaxation(group: h5py.Group, relaxed: Relaxation) -> None:
-    _write_gait(group, relaxed.gait)
+def _write_relaxation(group: h5py.Group, relaxed: Relaxation, coordinate: str) -> None:
+    _write_gait(group, relaxed.gait, coordinate)
     for field in dataclasses.fields(Optimality):
         put_attribute(group, field.name, getattr(relaxed.optimality, field.name))
     _write_certificate(group.create_group("certificate"), relaxed.certificate)
     for index, realised in enumerate(relaxed.realised):
         one = group.create_group(f"realised/{index:03d}")
-        _write_gait(one, realised.gait)
+        _write_gait(one, realised.gait, coordinate)
         for name in ("repeats", "sense"):
             put_attribute(one, name, getattr(realised, name))
         _write_certificate(one.create_group("certificate"), realised.certificate)
