@@ -174,6 +174,22 @@ def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts
     assert near.any() == counts
 
 
+@pytest.mark.parametrize(
+    ("rule", "friction", "held"),
+    [
+        ("radau-3", Friction(1.7, 1, 1.3), False),
+        ("radau-3", Friction(), True),
+        ("gauss-3", Friction(1.7, 1, 1.3), True),
+    ],
+)
+def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(rule, friction, held, monkeypatch):
+    """Schemes with nodes at the ends of an interval would have one there, and the efficiency a kink in the gait."""
+    stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
+    monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.array([kink]))
+    plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, 1e-4)
+    assert (kink in plan.edges) == held
+
+
 def test_knots_move_onto_kinks_and_keep_the_rest():
     edges = np.linspace(0, 1, 11)
     moved = moved_knots(edges, np.array([0.31, 0.55]))
