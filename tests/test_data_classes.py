@@ -11,7 +11,7 @@ import colloc
 VALUES = {
     "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FreePath", "Friction",
     "GaitClass", "Guarantee", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon", "PotentialSpace",
-    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "TensorSpline",
+    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
     "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
 }
 MUTABLE = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from collections.abc import Sequence
@@ -11,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from colloc.commands import ending
-from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
+from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run, said_if_interrupted
 from colloc.commands.options import add_bound, add_printing, add_problem, add_verbose, changed, new_parser, output_path, tell
-from colloc.commands.summary import summary_dict, summary_lines
+from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
 from colloc.gaits.problem_file import read_problem_file
-from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED
-from colloc.system.errors import CollocError, ProblemError
+from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
+from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
@@ -26,9 +25,10 @@ EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED, INTER
 _EPILOG = """\
 Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
 
-A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. What is found on the way is kept in
-NAME.run.sqlite; after Ctrl-C or a crash the same command goes on, and ends as if nothing had happened. Ctrl-C leaves the best
-gait so far in NAME.interrupted.h5.
+A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. A former result of another problem called NAME, or
+a better one of this problem, is kept as NAME.former-1.h5. What is found on the way is kept in NAME.run.sqlite; after Ctrl-C or
+a crash the same command goes on, and ends as if nothing had happened. Ctrl-C leaves the best gait so far in
+NAME.interrupted.h5.
 
   colloc solve problems/three_link.py
   colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
@@ -85,7 +85,7 @@ def _solve(options: argparse.Namespace) -> int:
     path = output_path(options.output, Path("results") / f"{problem.name}.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.studies.saved import solved_and_saved
+    from colloc.studies.saved import resumed, save_end
 
     quiet = options.quiet or options.json
     if not quiet and problem.intervals > _MANY_INTERVALS:
@@ -95,7 +95,7 @@ def _solve(options: argparse.Namespace) -> int:
     # a gait that is given on the command line is to be improved, not left for another
     starts = options.starts or (1 if options.start else stated.starts)
     with StatusLine(enabled=not quiet) as line:
-        solution, written = solved_and_saved(
+        solution = resumed(
             replace(stated, problem=problem),
             path,
             starts=starts,
@@ -104,39 +104,43 @@ def _solve(options: argparse.Namespace) -> int:
             fresh=options.fresh,
             progress=lambda news: line.say(f"{problem.name}: {news}", news.left),
         )
-    path, bound, complaints = written[0], None, list[str]()
-    saved = [str(path), *(f"{each} (the gait that shrank)" for each in written[1:])]
-    if solution.status == INTERRUPTED:
-        tell(options, summary_dict(solution, path, stated.reference, None), [*summary_lines(solution, stated.reference)])
-        print(f"colloc: saved {path}; the same command goes on from there.", file=sys.stderr)
-        return ending.INTERRUPTED
-    with StatusLine(enabled=not quiet) as line:
-        if options.bound:
-            line.say("computing an upper bound on every gait")
-        try:
-            bound = upper_bound(problem, path.parent, compute=options.bound)
-        except CollocError as error:  # what is solved is not lost for it
-            complaints.append(f"no bound: {error}")
-    if options.json:
-        print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
-    else:
-        said = summary_lines(solution, stated.reference, verbose=options.verbose)
-        lines = [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)]
-        print("\n".join(lines), flush=True)
-
-    if not options.no_figure:
-        from colloc.pictures.solution_figure import solution_figure
-        from colloc.pictures.style import save as save_figure
-
+    bound, complaints, saved, kept = None, [], [], []
+    try:
+        kept = save_end(solution, path)
+        path = kept[0].path
+        saved = [str(path), *(f"{one.path} (the gait that shrank)" for one in kept[1:])]
+    except StoreError as error:  # what was found is told all the same
+        complaints.append(f"the result is not saved: {error}")
+    with said_if_interrupted(saved):
         with StatusLine(enabled=not quiet) as line:
-            line.say("drawing")
+            if options.bound:
+                line.say("computing an upper bound on every gait")
             try:
-                figure = solution_figure(solution)
-                saved += map(str, save_figure(figure, path.with_suffix(""), ("png", "pdf")[: 1 + options.pdf]))
-            except CollocError as error:
-                complaints.append(f"no figure: {error}")
-    if not options.json:
-        print(f"  saved {', '.join(saved)}")
+                bound = upper_bound(problem, path.parent, compute=options.bound and not solution.interrupted)
+            except CollocError as error:  # what is solved is not lost for it
+                complaints.append(f"no bound: {error}")
+        facts = {**summary_dict(solution, path if saved else None, stated.reference, bound), "kept": kept_facts(kept)}
+        said = summary_lines(solution, stated.reference, verbose=options.verbose)
+        tell(options, facts, [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)])
+        if saved and not options.no_figure and not solution.interrupted:
+            with StatusLine(enabled=not quiet) as line:
+                line.say("drawing")
+                try:
+                    saved += _drawn(solution, path, pdf=options.pdf)
+                except CollocError as error:
+                    complaints.append(f"no figure: {error}")
+    if saved and not options.json:
+        print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(kept)]))
+    if solution.interrupted:
+        complaints.append("interrupted; the same command goes on from there.")
     for complaint in complaints:
         print(f"colloc: {complaint}", file=sys.stderr)
-    return BAD_PROBLEM if complaints else EXIT[solution.status]
+    return BAD_PROBLEM if complaints and not solution.interrupted else EXIT[solution.status]
+
+
+def _drawn(solution: Solution, path: Path, *, pdf: bool) -> list[str]:
+    """Draw the figure beside a result; the files."""
+    from colloc.pictures.solution_figure import solution_figure
+    from colloc.pictures.style import save as save_figure
+
+    return [str(file) for file in save_figure(solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + pdf])]

@@ -24,7 +24,7 @@ from colloc.search.solve import solve as search_solve
 from colloc.studies.campaign import run_starts
 from colloc.studies.run import Progress as StudyProgress
 from colloc.studies.run import StudyRun
-from colloc.studies.saved import solved_and_saved
+from colloc.studies.saved import resumed, save_end
 from colloc.studies.study import Study, read_study_file
 from colloc.studies.table import StudyTable, cell_text, study_table
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -95,7 +95,9 @@ def solve(
         solution = search_solve(stated.problem, starts or stated.starts, **how)  # type: ignore[arg-type]
         solution.source = stated.source
         return solution
-    return solved_and_saved(stated, Path(output), starts=starts or stated.starts, **how)[0]  # type: ignore[arg-type]
+    solution = resumed(stated, Path(output), starts=starts or stated.starts, **how)  # type: ignore[arg-type]
+    save_end(solution, Path(output))
+    return solution
 
 
 def _stated(problem: Stated) -> ProblemFile:

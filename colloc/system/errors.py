@@ -57,3 +57,7 @@ class ChangedFileWarning(UserWarning):
 
 class ReadOnlyRunWarning(UserWarning):
     """What a solve has found so far cannot be kept on the disk; it goes on."""
+
+
+class SlowWarning(UserWarning):
+    """Everything is computed, but more slowly than it could be."""

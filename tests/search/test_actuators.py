@@ -22,7 +22,6 @@ from colloc import (
     load,
     replay,
     save,
-    solve,
 )
 from colloc.commands import verify
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power_in_balance, joint_moments

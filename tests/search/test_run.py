@@ -17,8 +17,8 @@ from colloc.search.descend import descend
 from colloc.search.explore import begin_at
 from colloc.search.run import ROWS, Run
 from colloc.search.solve import solve
-from colloc.studies.saved import run_path
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
+from colloc.system.result_names import run_file
 from colloc.system.row_file import put_rows, read_rows
 
 AT = {"delta": 1e-2, "delta_start": 0.1, "intervals": 12, "mesh_tolerance": 1e-3}
@@ -85,7 +85,7 @@ def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(undisturb
     assert "best gait so far" in first.message
     assert load(path.with_suffix(".interrupted.h5")).status == "interrupted"
     assert not path.exists()
-    assert len(read_rows(run_path(path), ROWS).values) >= number
+    assert len(read_rows(run_file(path), ROWS).values) >= number
     assert colloc.solve(file, starts=4, output=path).status == "solved"
     assert contents(path) == wanted
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
@@ -149,7 +149,7 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     from colloc.commands.solve import main
 
     (tmp_path / "quick.py").write_text(FILE.replace("delta=1e-3", "delta=0.1"), encoding="utf-8")
-    run = run_path(tmp_path / "quick.h5")
+    run = run_file(tmp_path / "quick.h5")
     put_rows(run, ROWS, {"problem": "another"})
     command = [str(tmp_path / "quick.py"), "--output", f"{tmp_path}/", "--no-figure", "--starts", "1", "--quiet"]
     assert main(command) == 2
