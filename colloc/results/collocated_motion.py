@@ -66,7 +66,7 @@ class CollocatedMotion:
 
     @property
     def rotation(self) -> float:
-        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none, and a slope allows none."""
+        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none, a slope allows none."""
         problem, theta = self.problem, self.x[self.layout.theta[0]]
         turns = problem.gait.motion_symmetry == NONE and problem.slope is None
         return float(theta[-1] - theta[0]) if turns else 0.0
