@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import add_printing, new_parser
+from colloc.commands.options import add_printing, new_parser, tell
 from colloc.gaits.objective import EFFICIENCY
 from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE
 from colloc.results.solution import Solution
@@ -120,16 +120,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _compare(options: argparse.Namespace) -> int:
     a, b = load(options.first), load(options.second)
     same, sentence = verdict(a, b)
-    if options.json:
-        table = {name.strip() or "name": [x, y] for name, x, y in rows(a, b)}
-        fields = {name: [x, y] for name, x, y in changed_fields(a, b)}
-        print(json.dumps({"same": same, "verdict": sentence, "results": table, "problem": fields}))
-        return OK if same else DIFFERENT
+    table = {name.strip() or "name": [x, y] for name, x, y in rows(a, b)}
+    fields = {name: [x, y] for name, x, y in changed_fields(a, b)}
+    facts = {"same": same, "verdict": sentence, "results": table, "problem": fields}
     lines = [("", Path(options.first).name, Path(options.second).name), *rows(a, b)]
     changes = changed_fields(a, b) if not options.quiet else []
     if changes:
         lines += [("", "", ""), ("problem:", "", ""), *((f"  {name}", x, y) for name, x, y in changes)]
     widths = [max(len(line[k]) for line in lines) for k in range(2)]
-    print("\n".join(f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines))
-    print(sentence)
+    tell(options, facts, [*(f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines), sentence])
     return OK if same else DIFFERENT

@@ -1,6 +1,7 @@
 """How every command ends: an exit code, one sentence for people where something is wrong, and no traceback for it.
 
-Exit codes: 0 well; 2 bad problem, option or file; 3 not converged or none found; 4 a certificate failed; 130 interrupted.
+Exit codes: 0 well; 2 bad problem, option or file; 3 not converged or none found; 4 a certificate failed; 130 interrupted;
+141 the reader of the output left.
 Nothing heavy is imported here, so that Ctrl-C ends a command well from its first moments on.
 """
 
@@ -15,14 +16,16 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, TextIO
 
 from colloc.system.early_interruption import INTERRUPTED
-from colloc.system.errors import ChangedFileWarning, CollocError
+from colloc.system.errors import ChangedFileWarning, CollocError, SlowWarning
 from colloc.system.interruption import interruptible
 
-OK, BAD_PROBLEM, NONE_FOUND, FAILED = 0, 2, 3, 4
+OK, BAD_PROBLEM, NONE_FOUND, FAILED, UNREAD = 0, 2, 3, 4, 141  # the last as shells report SIGPIPE
 _IN_WORDS = {"π": " pi ", "δ": "delta", "μ": "mu", "±": "+-", "→": "->", "·": "*", "…": "..."}
+_page: list[TextIO] = []
+"""Standard output, while it is kept for one JSON object."""
 
 
 def run(parser: argparse.ArgumentParser, command: Callable[[argparse.Namespace], int], arguments: Sequence[str] | None) -> int:
@@ -34,14 +37,16 @@ def run(parser: argparse.ArgumentParser, command: Callable[[argparse.Namespace],
 def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
     """Run a command; errors made for people, and those of the system, become one sentence on standard error and an exit code.
 
-    A KeyboardInterrupt may carry a sentence about what was kept. With `as_json` the sentence is also one JSON object on
-    standard output.
+    A KeyboardInterrupt may carry a sentence about what was kept. With `as_json` standard output is kept for one JSON object
+    (`show`), which the sentence is too; what anything else prints goes to standard error.
     """
+    _open_closed_streams()
     _print_in_words()
     try:
         with interruptible(polled=False), _notes():
             try:
-                code = command()
+                with _kept_page(as_json):
+                    code = command()
             finally:
                 sys.stdout.flush()
         if code == INTERRUPTED:
@@ -50,8 +55,8 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
     except CollocError as error:
         return _ended(BAD_PROBLEM, "error", str(error), as_json)
     except BrokenPipeError:
-        _leave_output()  # the reader of a pipe left; results are saved
-        return BAD_PROBLEM
+        _leave_output()
+        return _ended(UNREAD, "unread", "nobody reads the output any more; what was saved before is kept.", as_json=False)
     except OSError as error:
         where = error.filename or "the output"
         if error.filename is None:
@@ -60,6 +65,46 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
     except KeyboardInterrupt as stop:
         _end_workers()
         return _ended(INTERRUPTED, "interrupted", f"interrupted; {str(stop) or 'nothing was written.'}", as_json)
+
+
+def show(text: str) -> None:
+    """Print what a command ends with, on standard output even where that is kept for it."""
+    print(text, file=_page[-1] if _page else sys.stdout, flush=True)
+
+
+@contextlib.contextmanager
+def _kept_page(as_json: bool) -> Iterator[None]:
+    if not as_json or _page:
+        yield
+        return
+    _page.append(sys.stdout)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _page.clear()
+
+
+def _open_closed_streams() -> None:
+    """Streams that the caller closed lead nowhere; else the next file that is opened would get their number, and what compiled
+    code prints would go into it."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            try:
+                os.fstat(number)
+            except OSError:
+                os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free: this one
+            setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115  as long as we run
+
+
+@contextlib.contextmanager
+def said_if_interrupted(saved: Sequence[str]) -> Iterator[None]:
+    """Ctrl-C in the block ends the command by saying which files are saved already."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        what = f"{', '.join(saved)} {'are' if len(saved) > 1 else 'is'} saved." if saved else ""
+        raise KeyboardInterrupt(str(stop) or what) from None
 
 
 def _end_workers() -> None:
@@ -72,7 +117,7 @@ def _end_workers() -> None:
 def _ended(code: int, status: str, message: str, as_json: bool) -> int:
     if as_json:
         with contextlib.suppress(OSError):
-            print(json.dumps({"status": status, "message": message, "exit_code": code}), flush=True)
+            show(json.dumps({"status": status, "message": message, "exit_code": code}))
     print(f"colloc: {message}", file=sys.stderr)
     return code
 
@@ -103,11 +148,12 @@ def _notes() -> Iterator[None]:
         before = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-            if issubclass(category, ChangedFileWarning):
+            if issubclass(category, (ChangedFileWarning, SlowWarning)):
                 print(f"colloc: {message}", file=sys.stderr)
             else:
                 before(message, category, *where, **more)
 
         warnings.simplefilter("always", ChangedFileWarning)
+        warnings.simplefilter("once", SlowWarning)
         warnings.showwarning = show
         yield

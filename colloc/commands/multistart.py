@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import time
@@ -12,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
-from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path
+from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path, tell
+from colloc.commands.summary import bound_facts
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
@@ -162,16 +162,15 @@ def _run(options: argparse.Namespace, command: str) -> int:
     save_archive(archive, command)
     outcomes = [o for k, o in archive.of_search(options.sampler, options.seed).items() if k < options.starts]
     found = basins(problem, outcomes)
-    if options.json:
-        print(json.dumps({**summary_dict(problem, outcomes, found, path), "interrupted": interrupted}))
-    else:
-        lines = summary_lines(problem, outcomes, found)
-        if found:
-            best = max(basin.best.efficiency for basin in found)
-            lines.append(gap_line(problem, best, upper_bound(problem, path.parent, compute=options.bound)))
-            which = "".join(f" --{k} {getattr(options, k)}" for k, v in _SEARCH.items() if getattr(options, k) != v)
-            lines.append(f"  colloc open {path} --start {found[0].best.start}{which}   makes a result of the best")
-        print("\n".join([*lines, *_others_lines(archive.outcomes, len(outcomes)), f"  saved {path}"]))
+    lines, bound = summary_lines(problem, outcomes, found), None
+    if found:
+        bound = upper_bound(problem, path.parent, compute=options.bound)
+        lines.append(gap_line(problem, max(basin.best.efficiency for basin in found), bound))
+        which = "".join(f" --{k} {getattr(options, k)}" for k, v in _SEARCH.items() if getattr(options, k) != v)
+        lines.append(f"  colloc open {path} --start {found[0].best.start}{which}   makes a result of the best")
+    lines += [*_others_lines(archive.outcomes, len(outcomes)), f"  saved {path}"]
+    facts = {**summary_dict(problem, outcomes, found, path), "bound": bound_facts(bound), "interrupted": interrupted}
+    tell(options, facts, lines)
     if interrupted:
         print("colloc: interrupted; run the same command again to go on.", file=sys.stderr)
         return INTERRUPTED

@@ -13,6 +13,7 @@ from colloc.commands.ending import NONE_FOUND, OK, run
 from colloc.commands.multistart import summary_dict, summary_lines
 from colloc.commands.options import add_printing, add_verbose, new_parser, output_path, tell
 from colloc.commands.solve import EXIT
+from colloc.commands.summary import kept_facts, kept_lines
 from colloc.commands.summary import summary_dict as solution_dict
 from colloc.commands.summary import summary_lines as solution_lines
 from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS
@@ -64,17 +65,14 @@ def _open(options: argparse.Namespace) -> int:
         )
     name = f"{problem.name}.start-{options.start}"
     path = output_path(options.output, Path(options.archive).with_name(f"{name}.h5"))
-    from colloc.results.store import save
+    from colloc.results.kept import save_result
     from colloc.studies.calls import reopened  # heavy imports only now: a bad option is refused at once
 
     with StatusLine(enabled=not (options.quiet or options.json)) as line:
         line.say(f"{problem.name}: start {options.start}")
         solution = reopened(problem, archive.outcomes[StartName(options.sampler, options.seed, options.start)])
-    path = path if solution.success else path.with_suffix(".failed.h5")
-    save(solution, path)
-    tell(
-        options,
-        solution_dict(solution, path, None, None),
-        [*solution_lines(solution, None, verbose=options.verbose), f"  saved {path}"],
-    )
+    saved = save_result(solution, path)
+    facts = {**solution_dict(solution, saved[0].path, None, None), "kept": kept_facts(saved)}
+    lines = solution_lines(solution, None, verbose=options.verbose)
+    tell(options, facts, [*lines, f"  saved {saved[0].path}", *kept_lines(saved)])
     return EXIT[solution.status]

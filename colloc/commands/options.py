@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from colloc.commands.ending import show
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.system.errors import ProblemError
+from colloc.system.result_names import SUFFIX, reserved_ending
 
 _LONGEST_NAME = 220
 """Bytes of the name of an output: systems allow 255, and files under way have longer names than finished ones."""
@@ -89,7 +91,7 @@ def add_verbose(parser: argparse.ArgumentParser) -> None:
 
 def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
     """What a command ends with: one JSON object of the facts if that was asked for, else lines for people."""
-    print(json.dumps(facts) if options.json else "\n".join(lines), flush=True)
+    show(json.dumps(facts) if options.json else "\n".join(lines))
 
 
 def add_bound(parser: argparse.ArgumentParser) -> None:
@@ -119,10 +121,16 @@ def _wrong_ending(output: str, wanted: str) -> ProblemError:
 
 def output_path(output: str | None, default: Path) -> Path:
     """The file to write, in a folder that exists and can be written: what the user named, a folder or a file with the suffix of
-    `default`, or else that. `ProblemError` if nothing can be written there, or it ends in another suffix."""
+    `default`, or else that. `ProblemError` if nothing can be written there, or it ends in another suffix, or like a file that
+    another command makes."""
     path = default if output is None else Path(output) / default.name if _is_folder(output) else Path(output)
     if path.suffix != default.suffix:
         raise _wrong_ending(str(path), default.suffix)
+    ending = reserved_ending(path.stem) if path.suffix == SUFFIX else ""
+    if ending and ending.partition("-")[0] != reserved_ending(default.stem).partition("-")[0]:
+        raise ProblemError(
+            f"--output {path.name} ends in .{ending}{SUFFIX}: colloc itself names files like that; choose another."
+        )
     if len(os.fsencode(path.name)) > _LONGEST_NAME:
         raise ProblemError(
             f"the file name {path.name[:30]}... is too long: choose an --output of at most {_LONGEST_NAME} bytes."

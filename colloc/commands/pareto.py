@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import FAILED, OK, run
-from colloc.commands.options import add_printing, add_problem, changed, new_parser, output_path
+from colloc.commands.ending import FAILED, OK, run, said_if_interrupted
+from colloc.commands.options import add_printing, add_problem, changed, new_parser, output_path, tell
+from colloc.commands.summary import kept_facts, kept_lines
 from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.solution import Solution
@@ -60,7 +60,7 @@ def _pareto(options: argparse.Namespace) -> int:
     first, second = (objective_from(text) for text in options.objectives)
     aims = (first, second)
     table = output_path(options.output, Path("results") / f"{problem.name}.front.csv")
-    from colloc.results.store import save
+    from colloc.results.kept import save_result
     from colloc.search.global_search import STARTS
     from colloc.studies.pareto import pareto_front
 
@@ -73,24 +73,27 @@ def _pareto(options: argparse.Namespace) -> int:
             line.say(f"{problem.name}: point {k} of {options.points - 1}: {found}")
 
         front = pareto_front(problem, first, second, options.points, starts=starts, progress=told)
-    rows = []
+    rows, kept = [], []
     for k, (point, values) in enumerate(zip(front.points, front.values.tolist(), strict=True)):
         point.source = stated.source
-        path = save(point, table.with_suffix("") / f"{k:02d}.h5")
-        rows.append([k, *values, point.measured.distance, point.measured.work, point.status, str(path)])
+        saved = save_result(point, table.with_suffix("") / f"{k:02d}.h5")
+        kept += saved
+        rows.append([k, *values, point.measured.distance, point.measured.work, point.status, str(saved[0].path)])
     names = ["point", *(aim.expression for aim in aims), "distance", "work", "status", "file"]
     with replaced_file(table) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([names, *rows])
-    saved = [table]
+    files = [table]
     if not options.no_figure:
         from colloc.pictures.style import save as save_figure
 
-        saved += save_figure(front.plot(), table.with_suffix(""), ("png",))
-    if options.json:
-        points = [dict(zip(names, row, strict=True)) for row in rows]
-        print(json.dumps({"objectives": [aim.fields() for aim in aims], "points": points}))
-    else:
-        print(f"{problem.name}: {first.name} against {second.name}, {len(rows)} points")
-        print("\n".join(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}" for k, a, b, _, _, status, _ in rows))
-        print(f"  saved {', '.join(map(str, saved))}, {table.with_suffix('')}/00.h5 ...")
+        with said_if_interrupted([f"{table}, {rows[0][-1]} ..."]):
+            files += save_figure(front.plot(), table.with_suffix(""), ("png",))
+    points = [dict(zip(names, row, strict=True)) for row in rows]
+    lines = [
+        f"{problem.name}: {first.name} against {second.name}, {len(rows)} points",
+        *(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}" for k, a, b, _, _, status, _ in rows),
+        f"  saved {', '.join(map(str, files))}, {rows[0][-1]} ...",
+        *kept_lines(kept),
+    ]
+    tell(options, {"objectives": [aim.fields() for aim in aims], "points": points, "kept": kept_facts(kept)}, lines)
     return OK if front.certified else FAILED

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
-from colloc.commands.options import add_bound, add_printing, add_problem, add_verbose, changed, new_parser, output_path
-from colloc.commands.summary import summary_dict, summary_lines
+from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run, said_if_interrupted
+from colloc.commands.options import add_bound, add_printing, add_problem, add_verbose, changed, new_parser, output_path, tell
+from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, Solution
 from colloc.results.steps import Level, SearchStep
 from colloc.system.errors import CollocError, ProblemError, StoreError
 from colloc.system.progress import StatusLine, duration
+from colloc.system.result_names import PARTIAL, beside
 
 _MANY_INTERVALS, _SECONDS_AN_INTERVAL = 1000, 0.02
 """Where to say beforehand how long it will take; measured on three links with 1,000 and 5,000 intervals."""
@@ -27,7 +27,8 @@ EXIT = {SOLVED: OK, NOT_CONVERGED: NONE_FOUND, CERTIFICATE_FAILED: FAILED}
 _EPILOG = """\
 Exit codes: 0 solved; 2 bad problem or option; 3 not converged; 4 certificate failed; 130 interrupted.
 
-A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. Levels are kept in NAME.partial.h5 as they
+A failed solve is kept as NAME.failed.h5 and never replaces a good NAME.h5. A former result of another problem called NAME, or
+a better one of this problem, is kept as NAME.former-1.h5. Levels are kept in NAME.partial.h5 as they
 end; after Ctrl-C or a crash the same command goes on from there.
 
   colloc solve problems/three_link.py
@@ -91,7 +92,7 @@ def _solve(options: argparse.Namespace) -> int:
     path = output_path(options.output, Path("results") / f"{problem.name}.h5")
     # heavy imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
-    from colloc.results.store import save
+    from colloc.results.kept import save_result
 
     quiet = options.quiet or options.json
     if not quiet and problem.intervals > _MANY_INTERVALS:
@@ -99,13 +100,10 @@ def _solve(options: argparse.Namespace) -> int:
         hint = "mesh_tolerance refines a small mesh where it has to be fine"
         print(f"colloc: {problem.intervals} intervals will take about {seconds} or more; {hint}.", file=sys.stderr)
     solution = _solved(problem, stated, path, options, quiet)
-    if solution.status != SOLVED:
-        path = path.with_suffix(".failed.h5")
-    save(solution, path)
-    _partial(path).unlink(missing_ok=True)
-    bound, saved, complaints = None, [str(path)], []
+    bound, complaints, saved, kept = None, [], [], []
     if solution.finite is not None:
         solution.finite.source = solution.source
+<<<<<<< HEAD
         saved.append(f"{save(solution.finite, path.with_suffix('.finite.h5'))} (the gait of finite size)")
     with StatusLine(enabled=not quiet) as line:
         if options.bound:
@@ -125,23 +123,51 @@ def _solve(options: argparse.Namespace) -> int:
         from colloc.pictures.solution_figure import solution_figure
         from colloc.pictures.style import save as save_figure
 
+=======
+    try:
+        kept = save_result(solution, path)
+        _partial(path).unlink(missing_ok=True)
+        path = kept[0].path
+        saved = [str(path), *(f"{one.path} (the gait of finite size)" for one in kept[1:])]
+    except StoreError as error:  # what was found is told all the same
+        complaints.append(f"the result is not saved: {error}")
+    with said_if_interrupted(saved):
+>>>>>>> wb
         with StatusLine(enabled=not quiet) as line:
-            line.say("drawing")
+            if options.bound:
+                line.say("computing an upper bound on every gait")
             try:
-                figure = solution_figure(solution)
-                saved += map(str, save_figure(figure, path.with_suffix(""), ("png", "pdf")[: 1 + options.pdf]))
-            except CollocError as error:
-                complaints.append(f"no figure: {error}")
-    if not options.json:
-        print(f"  saved {', '.join(saved)}")
+                bound = upper_bound(problem, path.parent, compute=options.bound)
+            except CollocError as error:  # what is solved is not lost for it
+                complaints.append(f"no bound: {error}")
+        facts = {**summary_dict(solution, path if saved else None, stated.reference, bound), "kept": kept_facts(kept)}
+        said = summary_lines(solution, stated.reference, verbose=options.verbose)
+        tell(options, facts, [*said, gap_line(problem, solution.measured.efficiency, bound)])
+        if saved and not options.no_figure:
+            with StatusLine(enabled=not quiet) as line:
+                line.say("drawing")
+                try:
+                    saved += _drawn(solution, path, pdf=options.pdf)
+                except CollocError as error:
+                    complaints.append(f"no figure: {error}")
+    if saved and not options.json:
+        print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(kept)]))
     for complaint in complaints:
         print(f"colloc: {complaint}", file=sys.stderr)
     return BAD_PROBLEM if complaints else EXIT[solution.status]
 
 
+def _drawn(solution: Solution, path: Path, *, pdf: bool) -> list[str]:
+    """Draw the figure beside a result; the files."""
+    from colloc.pictures.solution_figure import solution_figure
+    from colloc.pictures.style import save as save_figure
+
+    return [str(file) for file in save_figure(solution_figure(solution), path.with_suffix(""), ("png", "pdf")[: 1 + pdf])]
+
+
 def _partial(path: Path) -> Path:
     """Where the levels of a run are kept while it is under way."""
-    return path.with_name(f"{path.name.removesuffix('.h5').removesuffix('.failed')}.partial.h5")
+    return beside(path, PARTIAL)
 
 
 def _solved(problem: Problem, stated: ProblemFile, path: Path, options: argparse.Namespace, quiet: bool) -> Solution:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from colloc.results.steps import PRESCRIBED, REALISED, REDUCED
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
+    from colloc.results.kept import Saved
 
 
 def summary_lines(solution: Solution, reference: Reference | None, *, verbose: bool = False) -> list[str]:
@@ -99,14 +101,14 @@ def _search_lines(solution: Solution) -> list[str]:
     return [*lines, *solution.standing]
 
 
-def summary_dict(solution: Solution, path: Path, reference: Reference | None, bound: Bound | None) -> dict:
-    """The same as one JSON object."""
+def summary_dict(solution: Solution, path: Path | None, reference: Reference | None, bound: Bound | None) -> dict:
+    """The same as one JSON object; without a path nothing is saved."""
     certificate = solution.certificate
     result: dict = {
         "name": solution.problem.name,
         "status": solution.status,
         "message": solution.message,
-        "file": str(path),
+        "file": None if path is None else str(path),
         "problem_hash": solution.problem.hash,
         "seconds": solution.seconds,
         "delta": solution.last.delta,
@@ -128,13 +130,18 @@ def summary_dict(solution: Solution, path: Path, reference: Reference | None, bo
         "gait": fields(solution.gait),
         "certificate": certificate.facts() if certificate.replayed else None,
         "reference": None,
-        "bound": None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed},
+        "bound": bound_facts(bound),
         "versions": solution.versions,
     }
     if reference is not None:
         keys = ("efficiency", "tolerance", "source")
         result["reference"] = {key: getattr(reference, key) for key in keys}
     return result
+
+
+def bound_facts(bound: Bound | None) -> dict | None:
+    """An upper bound, if there is one, as the one JSON object states it."""
+    return None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed}
 
 
 def _relaxed_dict(solution: Solution) -> dict | None:
@@ -148,3 +155,13 @@ def _relaxed_dict(solution: Solution) -> dict | None:
         for r in solution.relaxed.realised
     ]
     return {**{key: getattr(found, key) for key in keys}, "realised": finite}
+
+
+def kept_lines(saved: Sequence[Saved]) -> list[str]:
+    """What became of former results, for people."""
+    return [f"  {one.why} is kept as {one.former}" for one in saved if one.former is not None]
+
+
+def kept_facts(saved: Sequence[Saved]) -> list[str]:
+    """Where former results are now, as the one JSON object lists them."""
+    return [str(one.former) for one in saved if one.former is not None]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -14,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from colloc.commands.ending import INTERRUPTED, NONE_FOUND, OK, run
-from colloc.commands.options import add_printing, new_parser
+from colloc.commands.options import add_printing, new_parser, tell
 from colloc.studies.study import Study, read_study_file
 from colloc.system.errors import CollocError, ProblemError, StoreError
 
@@ -87,10 +86,7 @@ def _run(study: Study, source: str, command: str, options: argparse.Namespace) -
             _save(run, out, source, command)
             raise
         path = _save(run, out, source, command)
-    if options.json:
-        print(json.dumps(_summary(run, path)))
-    else:
-        print("\n".join(_summary_lines(run, path)))
+    tell(options, _summary(run, path), _summary_lines(run, path))
     if interrupted:
         print("colloc: interrupted; what is done is kept, and the same command goes on from there.", file=sys.stderr)
         return INTERRUPTED

@@ -7,12 +7,11 @@ the solver recorded, since it takes derivatives of the whole program.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 
 from colloc.commands.ending import FAILED, OK, run
-from colloc.commands.options import add_printing, add_result, new_parser
+from colloc.commands.options import add_printing, add_result, new_parser, tell
 from colloc.results.certificate import certify
 from colloc.results.checks import Certificate
 from colloc.results.realisation import recertified
@@ -96,31 +95,29 @@ def _verify(options: argparse.Namespace) -> int:
     certificate, gaits = again.certificate, _besides(solution, again)
     complaint = disagreement(solution.certificate, certificate)
     good = certificate.passed and not complaint and solution.success and not any(gait["complaint"] for gait in gaits)
-    if options.json:
-        facts = {
-            "file": options.result, "objective": solution.problem.objective.name, "name": solution.problem.name,
-            "certified": good, "complaint": complaint, "changed": solution.changed, "gaits": gaits,
-        }  # fmt: skip
-        print(json.dumps({**facts, **certificate.facts()}))
-        return OK if good else FAILED
-    print(f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}")
-    print(
+    facts = {
+        "file": options.result, "objective": solution.problem.objective.name, "name": solution.problem.name,
+        "certified": good, "complaint": complaint, "changed": solution.changed, "gaits": gaits,
+    }  # fmt: skip
+    lines = [
+        f"{solution.problem.name}: {'certified' if good else 'NOT CERTIFIED'}",
         f"  {solution.problem.objective.label:<15s} {certificate.value:.8f} +- {certificate.value_error:.0e} by replay "
-        f"({certificate.instants} instants)"
-    )
+        f"({certificate.instants} instants)",
+    ]
     if solution.certificate.replayed:
         recorded = solution.certificate
-        print(f"  in the file     {recorded.value:.8f} +- {recorded.value_error:.0e} ({recorded.instants} instants)")
+        lines.append(f"  in the file     {recorded.value:.8f} +- {recorded.value_error:.0e} ({recorded.instants} instants)")
     if not options.quiet:
-        print("\n".join(f"  {check.line()}" for check in certificate.checks))
+        lines += [f"  {check.line()}" for check in certificate.checks]
     for gait in gaits:
         failed = "" if gait["passed"] else "   a check fails"
         words = f"{gait['gait']:<14s}  {gait['efficiency']:.8f} +- {gait['efficiency_error']:.0e}{failed}  {gait['complaint']}"
-        print(f"  {words}".rstrip())
+        lines.append(f"  {words}".rstrip())
     if solution.changed:
-        print("  the file was changed after colloc wrote it; what is said here is of the file as it is now")
+        lines.append("  the file was changed after colloc wrote it; what is said here is of the file as it is now")
     if complaint:
-        print(f"  {complaint}")
+        lines.append(f"  {complaint}")
     if solution.status != "solved" and certificate.passed:
-        print(f"  the solve itself ended as: {solution.status}. {solution.message}")
+        lines.append(f"  the solve itself ended as: {solution.status}. {solution.message}")
+    tell(options, {**facts, **certificate.facts()}, lines)
     return OK if good else FAILED

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +24,10 @@ from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import check_finite, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
+from colloc.system.result_names import check_name
 
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
-_NAME, LONGEST_NAME = re.compile(r"[A-Za-z0-9_.-]+"), 200
-"""File systems allow 255 bytes, and results of a problem add endings to its name."""
 
 
 @named_arguments
@@ -40,7 +38,8 @@ class Problem:
     Parameters
     ----------
     name : str
-        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200.
+        Used for file names: letters, digits, ``_``, ``-`` and ``.``, at most 200, and no ending that colloc itself
+        gives to files (`colloc.system.result_names`).
     guess : Fourier, ArcPath or Corners, optional
         An admissible gait to start from, of any class; it is projected onto the class `gait`. By default a travelling wave
         (`colloc.gaits.guesses`).
@@ -159,12 +158,7 @@ class Problem:
                 object.__setattr__(self, name, value)
 
     def _check_parts(self) -> None:
-        if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
-            raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
-        if len(self.name) > LONGEST_NAME:
-            raise ProblemError(
-                f"name has {len(self.name)} characters; files are named after it, and {LONGEST_NAME} are allowed."
-            )
+        check_name(self.name)
         check_kind("friction", self.friction, gait_fields.LAWS, Law)
         check_kind("gait", self.gait, gait_fields.CLASSES)
         if self.gait.free == bool(self.body.schedule):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import pprint
+import sys
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +14,7 @@ from pathlib import Path
 from colloc.gaits.problem import Problem
 from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
+from colloc.system.sealed_file import LONGEST_TEXT
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -58,7 +62,7 @@ class ProblemFile:
 
 def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
     """Execute a problem file. `ProblemError` if there is no such file, it cannot be read, it fails (with the line), or states
-    no ``PROBLEM``."""
+    no ``PROBLEM``, or more than results can keep."""
     path, names, source = stated_names(path, "problem")
     problem, reference = names.get("PROBLEM"), names.get("REFERENCE")
     if problem is None:
@@ -67,6 +71,9 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
         raise ProblemError(f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}.")
     if reference is not None and not isinstance(reference, Reference):
         raise ProblemError(f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}.")
+    length = len(json.dumps(problem.to_dict()).encode())
+    if length > LONGEST_TEXT:
+        raise ProblemError(f"{path}: {_too_long('the description of PROBLEM', length)}")
     starts = names.get("STARTS")
     if starts is not None and not is_whole(starts, 1):
         raise ProblemError(f"{path}: STARTS must be a whole number of at least 1, not {starts!r}.")
@@ -103,14 +110,24 @@ def problem_file_text(problem: Problem) -> str:
     return f"from colloc import Problem\n\nPROBLEM = Problem.from_dict(\n{stated}\n)\n"
 
 
+def _too_long(what: str, size: int) -> str:
+    return (
+        f"{what} has {size} bytes, and results keep at most {LONGEST_TEXT}: let the file read large data from another "
+        "file, or state a guess of fewer numbers."
+    )
+
+
 def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
-    """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is for the messages.
+    """Execute a file; its path, the names it leaves and its text. `kind` ("problem", "study") is for the messages. What the
+    file prints goes to standard error.
     `ProblemError` as for `read_problem_file`."""
     path = Path(path)
     if not os.path.isfile(path):  # Path.is_file raises for a name that is too long
         raise ProblemError(f"there is no {kind} file {path}.")
     try:
-        content = path.read_bytes()
+        size = path.stat().st_size
+        with open(path, "rb") as file:
+            content = file.read(LONGEST_TEXT)
     except OSError as error:
         raise ProblemError(f"cannot read {path}: {error.strerror or error}.") from None
     if content.startswith(_HDF5):
@@ -118,16 +135,21 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
             f"{path} is a results file (HDF5), not a {kind} file in Python; colloc report or verify reads it, and colloc solve "
             f"MINE.py --start {path} begins with its gait."
         )
+    if size > LONGEST_TEXT:
+        raise ProblemError(_too_long(str(path), size))
     try:
         source = content.decode("utf-8")
     except UnicodeDecodeError as error:
         raise ProblemError(f"{path} is no text in UTF-8 (byte {error.start}), so no {kind} file.") from None
     names: dict[str, object] = {"__name__": f"colloc_{kind}", "__file__": str(path)}
     try:
-        exec(compile(source, str(path), "exec"), names)
+        with contextlib.redirect_stdout(sys.stderr):  # standard output is for results
+            exec(compile(source, str(path), "exec"), names)
     except SyntaxError as error:
         raise ProblemError(f"{path}, line {error.lineno}: {error.msg}.") from None
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
         where = f", line {lines[-1]}" if lines else ""
         what = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: {error}"

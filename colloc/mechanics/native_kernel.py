@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import multiprocessing
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -24,8 +26,8 @@ from colloc.mechanics.damped_newton import METHODS
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import Links
-from colloc.numerics.c_compiler import kept_library
-from colloc.system.errors import StoreError
+from colloc.numerics.c_compiler import kept_library, lack
+from colloc.system.errors import SlowWarning, StoreError
 from colloc.system.processors import available_threads
 
 _FLAGS: tuple[str, ...] = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
@@ -67,14 +69,19 @@ def numpy_instead() -> Iterator[None]:
 
 @cache
 def library(own_law: str = "") -> ctypes.CDLL | None:
-    """The kernel, loaded, and compiled before if need be, by itself or with a law's own C; None if that cannot be."""
+    """The kernel, loaded, and compiled before if need be, by itself or with a law's own C; None if that cannot be, with a
+    `SlowWarning` unless nobody wants it."""
     flags, headers = ((*_FLAGS, "-DOWN_LAW"), {"own_law.h": own_law}) if own_law else (_FLAGS, {})
     try:
         with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
             file = kept_library("kernel", sources, _MAIN, flags, headers)
-            return None if file is None else _loaded(file)
-    except (OSError, StoreError):
-        return None
+            why = "" if file else lack()
+            found = None if file is None else _loaded(file)
+    except (OSError, StoreError) as error:
+        why, found = str(error).rstrip("."), None
+    if why and multiprocessing.parent_process() is None:  # workers leave it to their parent
+        warnings.warn(f"the balance is solved by NumPy, 10 to 60 times more slowly: {why}.", SlowWarning, stacklevel=2)
+    return found
 
 
 def _loaded(file: Path) -> ctypes.CDLL:

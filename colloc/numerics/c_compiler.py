@@ -49,6 +49,18 @@ def c_compiler() -> str | None:
     return next((found for name in names if name and (found := shutil.which(name))), None)
 
 
+def lack() -> str:
+    """What is missing to compile and keep code, in words; "" if nothing is, or nobody wants it (COLLOC_CODE is "off")."""
+    folder = cache_folder()
+    if os.environ.get(FOLDER) == OFF:
+        return ""
+    if folder is None:
+        return f"there is no folder to keep compiled code in (set {FOLDER} to one)"
+    if c_compiler() is None:
+        return "there is no C compiler (cc, gcc or clang, or $CC)"
+    return "" if os.access(folder, os.W_OK) else f"compiled code cannot be kept in {folder} (set {FOLDER} to another folder)"
+
+
 def kept_library(kind: str, sources: Path, main: str, flags: Sequence[str], headers: Mapping[str, str]) -> Path | None:
     """A shared library in the cache folder, compiled if it is not there; None without a compiler, or where nothing can be kept.
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.results.checks import Certificate
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
@@ -123,6 +124,7 @@ def run_starts(
     """
     if not problem.gait.free:
         raise ProblemError("a prescribed motion is the same from every start; colloc solve measures it.")
+    native_kernel()  # compiled before the workers begin, or missed once for all of them
     waiting = iter(starts)
 
     def ready() -> Task | None:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from colloc.gaits.problem import Problem
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.results.outcome import CRASHED, RETRIED
 from colloc.studies.cell import BETTER, Attempt, Work, best_attempt, failed_visit, run_chunk, start_key
 from colloc.studies.journal import Record, append_records, read_journal
@@ -124,6 +125,7 @@ class StudyRun:
 
         Arguments are those of `colloc.system.task_pool.completed`; `ahead` is a quarter of the workers, and one, by default.
         """
+        native_kernel()  # compiled before the workers begin, or missed once for all of them
         ahead = 1 + workers // 4 if ahead is None else ahead
         number, chunks = 0, self._first_chunks()
         while number == 0 or chunks:

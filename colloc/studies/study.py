@@ -19,6 +19,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import stated_names
 from colloc.system.arguments import is_whole
 from colloc.system.errors import ProblemError
+from colloc.system.result_names import check_name
 
 Index = tuple[int, ...]
 MOST_CELLS = 1_000_000
@@ -118,8 +119,7 @@ class Study:
             raise ProblemError("a study needs at least one Axis.")
         if len({axis.name for axis in self.axes}) != len(self.axes):
             raise ProblemError("two axes of a study have the same name.")
-        if not self.name or not self.name.replace("-", "_").replace(".", "_").replace("_", "a").isalnum():
-            raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {self.name!r}.")
+        check_name(self.name)
         if not callable(self.problem):
             raise ProblemError("problem must be a function from coordinates to a Problem.")
         for field, least in (("cold_starts", 0), ("warm_starts", 1), ("chunk", 1), ("seed", 0)):

@@ -53,3 +53,7 @@ class StoreError(CollocError, OSError):
 
 class ChangedFileWarning(UserWarning):
     """A results file is not as colloc wrote it, and was read all the same."""
+
+
+class SlowWarning(UserWarning):
+    """Everything is computed, but more slowly than it could be."""

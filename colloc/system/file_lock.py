@@ -13,8 +13,14 @@ from filelock import FileLock, SoftFileLock, Timeout
 
 from colloc.system.errors import StoreError
 
+try:
+    import fcntl
+except ImportError:  # Windows, where folders are not locked
+    fcntl = None  # type: ignore[assignment]
+
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
 """What a file system without locks says: results are still replaced whole, but two runs are not kept apart."""
+_INSTEAD = ".colloc.lock"
 
 
 @contextlib.contextmanager
@@ -47,3 +53,31 @@ def locked(path: Path, *, wait: bool = False) -> Iterator[None]:
             if error.errno not in NO_LOCKS:
                 raise StoreError(f"cannot write {path}: {error.strerror or error}; choose another --output.") from None
         yield
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Hold a folder while the block runs; others wait. Where folders cannot be locked a hidden file in it is, and stays.
+    `StoreError` if the folder cannot be made or read."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = None if fcntl is None else os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise StoreError(f"cannot use the folder {folder}: {error.strerror or error}; choose another --output.") from None
+    try:
+        if handle is None or not _is_locked(handle):
+            with locked(folder / _INSTEAD, wait=True):
+                yield
+        else:
+            yield
+    finally:
+        if handle is not None:
+            os.close(handle)  # which lets go
+
+
+def _is_locked(handle: int) -> bool:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+    except OSError:  # network file systems want a file that is open to write
+        return False
+    return True

@@ -17,6 +17,8 @@ from colloc.system.errors import StoreError
 MAGIC = b"colloc-sha256\n"
 SEAL_SIZE = len(MAGIC) + 32
 _BLOCK = 2**20
+LONGEST_TEXT = 2**20
+"""Bytes of one text in a results file, such as the description of a problem, or the file that states it."""
 
 
 def _digest(file: BinaryIO, size: int) -> bytes:

@@ -30,12 +30,11 @@ from h5py import h5d, h5s, h5t
 
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.replaced_file import replaced_file
-from colloc.system.sealed_file import check_seal, is_sealed, write_sealed
+from colloc.system.sealed_file import LONGEST_TEXT, check_seal, is_sealed, write_sealed
 
 LARGEST_FILE = 2**28
 LARGEST_ARRAY = 2**27
-LONGEST_TEXT = 2**20
-"""Bytes of a file, of one array when it is in memory, and of one text, such as the description of a problem."""
+"""Bytes of a file, and of one array when it is in memory."""
 LONGEST_IN_ARRAY = 2000
 """Characters of a text in an array, where each takes the room of the longest. The rest is left out, and an ellipsis says so."""
 

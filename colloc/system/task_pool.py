@@ -56,8 +56,10 @@ def one_thread_each() -> Iterator[None]:
 
 
 def _started() -> None:
-    """A worker leaves interrupts to its parent, and does not outlive it."""
+    """A worker leaves interrupts and standard output to its parent, and does not outlive it."""
     signal(SIGINT, SIG_IGN)
+    with contextlib.suppress(OSError):
+        os.dup2(2, 1)
     parent = multiprocessing.parent_process()
     assert parent is not None
 

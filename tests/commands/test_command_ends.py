@@ -4,10 +4,13 @@ import io
 import json
 import multiprocessing
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import h5py
 import pytest
@@ -15,14 +18,21 @@ import pytest
 from colloc.bounds.optimality_gap import upper_bound
 from colloc.bounds.sampled import QUICK as BUDGET
 from colloc.bounds.sampled import Domain, bound_key
-from colloc.commands.ending import exit_code
+from colloc.commands.ending import exit_code, show
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
+<<<<<<< HEAD
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.chain import Chain
+=======
+from colloc.gaits import gait_fields
+from colloc.gaits.problem_file import read_problem_file
+from colloc.results.kept import save_result
+>>>>>>> wb
 from colloc.results.store import load, save
+from colloc.system.errors import StoreError
 from colloc.system.row_file import CACHE, put_rows
 
 QUICK = """
@@ -246,6 +256,59 @@ def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys)
     assert "no figure: cannot write" in printed.err
 
 
+@pytest.mark.parametrize("words", [[], ["--json"]])
+def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(words, quick, tmp_path, capsys, monkeypatch):
+    def full(*_):
+        raise StoreError("cannot write quick.h5: No space left on device.")
+
+    monkeypatch.setattr("colloc.results.kept.save_result", full)
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/", *words]) == 2
+    printed = capsys.readouterr()
+    if words:
+        told = json.loads(printed.out)
+        assert told["file"] is None
+        assert told["efficiency"] == told["certificate"]["efficiency"]
+    else:
+        assert "efficiency d/W" in printed.out
+        assert "saved" not in printed.out
+    assert printed.err == "colloc: the result is not saved: cannot write quick.h5: No space left on device.\n"
+    assert {p.suffix for p in tmp_path.iterdir()} == {".py", ".h5"}  # the run, from which the same command goes on
+    monkeypatch.undo()
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/", "--no-figure"]) in (0, 4)
+    assert "going on from" in capsys.readouterr().out
+
+
+def interrupt(*_, **__):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    "where", ["colloc.bounds.optimality_gap.upper_bound", "colloc.pictures.solution_figure.solution_figure"]
+)
+def test_ctrl_c_after_the_result_is_saved_says_that_it_is(where, quick, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(where, interrupt)
+    assert colloc(["solve", quick, "--output", f"{tmp_path}/"]) == 130
+    (result,) = tmp_path.glob("*.h5")
+    assert capsys.readouterr().err == f"colloc: interrupted; {result} is saved.\n"
+    assert load(result).certificate.replayed
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_ctrl_c_while_a_result_is_saved_waits_until_all_of_it_is(three_link, tmp_path, monkeypatch):
+    """Of the gait of finite size, too, which is saved after the one that shrank."""
+
+    def saving(solution, path):
+        if solution is both:
+            signal.raise_signal(signal.SIGINT)
+        return save(solution, path)
+
+    monkeypatch.setattr("colloc.results.store.save", saving)
+    both = replace(three_link, finite=three_link)
+    with pytest.raises(KeyboardInterrupt):
+        save_result(both, tmp_path / "x.h5")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["x.finite.h5", "x.h5"]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
 @pytest.mark.parametrize("mask", [0o022, 0o027, 0o077, 0o002])
 def test_files_have_the_permissions_that_the_user_asked_for(mask, three_link, tmp_path):
@@ -349,3 +412,111 @@ def test_an_interrupted_command_leaves_no_workers_behind():
     assert exit_code(interrupted) == 130
     working.join(timeout=30)
     assert working.exitcode is not None
+
+
+def stated(folder, text):
+    (folder / "p.py").write_text(text, encoding="utf-8")
+    return str(folder / "p.py")
+
+
+@pytest.mark.parametrize("large", ["file", "description"])
+def test_what_results_could_not_keep_is_refused_before_the_search(large, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("colloc.commands.solve._solved", lambda *_: pytest.fail("searched"))
+    text = QUICK + "# " + "x" * 2**20 + "\n"
+    if large == "description":
+        text = "from colloc import *\nimport numpy as np\nt = np.arange(30000) / 30000 * 2 * np.pi\n"
+        text += "PROBLEM = Problem('wide', Corners(np.array([np.cos(t), np.sin(t)]), 'none'), gait=Polygon(8, 'none'))\n"
+    assert colloc(["solve", stated(tmp_path, text), "--output", f"{tmp_path}/"]) == 2
+    assert re.search(r"p\.py.* has \d{7} bytes, and results keep at most 1048576", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    "raised", ["GeneratorExit", "type('Own', (BaseException,), {})('no')", "BaseExceptionGroup('x', [GeneratorExit()])"]
+)
+def test_whatever_a_problem_file_raises_is_a_sentence(raised, tmp_path, capsys):
+    assert colloc(["solve", stated(tmp_path, f"x = 1\nraise {raised}\n")]) == 2
+    printed = capsys.readouterr()
+    assert "p.py, line 2: " in printed.err
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+
+
+PRINTING = """
+print("hello from the file")
+from colloc import *
+class Talkative(Chain):
+    def describe(self):
+        print("hello from the body")
+        return super().describe()
+"""
+
+
+def test_what_a_problem_file_and_its_parts_print_does_not_spoil_the_one_object(tmp_path, capsys):
+    own = "gait_fields.BODIES.append(Talkative)\nfrom colloc.gaits import gait_fields\n"
+    text = (
+        PRINTING
+        + "\n".join(reversed(own.splitlines()))
+        + QUICK.replace("from colloc import *", "").replace('"quick", ', '"quick", body=Talkative(), guess=')
+    )
+    file = stated(tmp_path, text)
+    try:
+        assert colloc(["solve", file, "--output", f"{tmp_path}/", "--json"]) in (0, 4)
+    finally:
+        gait_fields.BODIES[:] = [kind for kind in gait_fields.BODIES if kind.__name__ != "Talkative"]
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["name"] == "quick"
+    assert "hello from the file" in printed.err
+
+
+def test_what_is_printed_while_one_object_is_asked_for_goes_to_standard_error(capsys):
+    def command():
+        print("on the way")
+        show('{"a": 1}')
+        return 0
+
+    assert exit_code(lambda: exit_code(command, as_json=True), as_json=True) == 0
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err) == ('{"a": 1}\n', "on the way\n")
+
+
+def shell(line, folder):
+    """A line of a shell with colloc as a function; its exit code (of the first of a pipe), output and errors."""
+    program = f'colloc() {{ "{sys.executable}" -m colloc "$@"; }}; set -o pipefail; {line}'
+    done = subprocess.run(["bash", "-c", program], capture_output=True, text=True, check=False, cwd=folder)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+@pytest.mark.parametrize("closed", [">&-", ">&- 2>&-", "<&- >&- 2>&-"])
+def test_closed_streams_change_nothing_but_what_is_printed(closed, quick, tmp_path):
+    code, out, complaint = shell(f"colloc solve {quick} --no-figure --output {tmp_path}/ {closed}", tmp_path)
+    assert code in (0, 4)
+    assert (out, complaint) == ("", "")
+    (result,) = tmp_path.glob("*.h5")
+    assert load(result).certificate.replayed
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_a_pipe_that_is_closed_early_is_one_sentence_and_a_code_of_its_own(result, tmp_path):
+    code, _, complaint = shell(f"colloc verify {result} | :", tmp_path)
+    assert code == 141
+    assert complaint == "colloc: nobody reads the output any more; what was saved before is kept.\n"
+
+
+@pytest.mark.parametrize(
+    ("environment", "why"),
+    [
+        ({"CC": "", "PATH": ""}, "there is no C compiler (cc, gcc or clang, or $CC)"),
+        ({"CC": "", "PATH": "", "COLLOC_CODE": "off"}, ""),
+        ({"CC": "/bin/false"}, "the C compiler /bin/false failed (no message)"),
+    ],
+)
+def test_without_compiled_code_it_is_said_once_that_all_is_slower(environment, why, quick, tmp_path):
+    environment = {**os.environ, "COLLOC_CODE": str(tmp_path / "code"), **environment}
+    done = command(
+        "multistart", quick, "--starts", "2", "--workers", "2", "--quiet", "--output", f"{tmp_path}/", env=environment
+    )
+    assert done.returncode in (0, 3)
+    said = done.stderr.decode()
+    assert said.count("\n") == bool(why)
+    assert said.startswith(f"colloc: the balance is solved by NumPy, 10 to 60 times more slowly: {why}" if why else "")

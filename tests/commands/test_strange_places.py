@@ -44,7 +44,8 @@ def solved_and_verified(place, words, without, environment):
     assert load(result).source == QUICK
     checked = run(["verify", result], without, **environment)
     assert checked.returncode == done.returncode
-    assert checked.stderr == b""
+    slowly = b"colloc: the balance is solved by NumPy, 10 to 60 times more slowly: "
+    assert checked.stderr == b"" or (checked.stderr.startswith(slowly) and checked.stderr.count(b"\n") == 1)
 
 
 def test_a_solve_needs_nothing_of_the_user(place):

@@ -1,0 +1,153 @@
+"""Results take their place without loss: what another problem, or a better answer, left there before is kept beside it."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from colloc.results import store
+from colloc.results.solution import Solution
+from colloc.system.errors import ChangedFileWarning, StoreError
+from colloc.system.file_lock import alone_in
+from colloc.system.interruption import interruptible
+from colloc.system.result_names import FAILED, FINITE, beside, former
+
+_HOW = ("guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_start")
+"""Fields of a problem that say how it is solved: results that differ in these alone answer the same question."""
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A result that was saved, and what became of the one that was there.
+
+    Attributes
+    ----------
+    path : Path
+        Of the result.
+    former : Path, optional
+        Where the former one is kept now; None if there was none, or none worth it.
+    why : str
+        What the former one is, in words.
+    """
+
+    path: Path
+    former: Path | None = None
+    why: str = ""
+
+
+def save_result(solution: Solution, path: Path) -> list[Saved]:
+    """Save a solution at `path` (NAME.h5), or beside it (NAME.failed.h5) if it failed; and its gait of finite size, if there is
+    one, as NAME.finite.h5.
+
+    A result that is there already is replaced only by an answer to the same question that is as good. Else it is kept, with
+    its figures, under the first free name of NAME.former-1.h5, NAME.former-2.h5, ... Ctrl-C waits until all is saved.
+
+    Returns
+    -------
+    list of Saved
+        The solution first.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be written; what was there is left as it was.
+    """
+    path = path if solution.success else beside(path, FAILED)
+    with interruptible(), alone_in(path.parent):
+        saved = [_saved(solution, path)]
+        if solution.finite is not None:
+            saved.append(_saved(solution.finite, beside(path, FINITE)))
+    return saved
+
+
+def _saved(solution: Solution, path: Path) -> Saved:
+    there = _solution_at(path)
+    why = _worth(there, solution, path)
+    if not why:
+        return Saved(store.save(solution, path))
+    place = next(place for k in itertools.count(1) if _may_go(there, place := former(path, k)))
+    with _moved(path, place):
+        store.save(solution, path)
+    return Saved(path, place, why)
+
+
+def _solution_at(path: Path) -> Solution | None:
+    """The result in a file; None if there is none that can be read."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ChangedFileWarning)
+            return store.load(path)
+    except StoreError:
+        return None
+
+
+def _question(solution: Solution) -> dict:
+    """What was asked, without how it was to be found."""
+    return {name: value for name, value in solution.problem.to_dict().items() if name not in _HOW}
+
+
+def _worth(there: Solution | None, new: Solution, path: Path) -> str:
+    """What there is at a path that the new solution must not replace, in words; "" if there is no such thing."""
+    if there is None:
+        return "what was there and cannot be read" if path.exists() else ""
+    if there.changed:
+        return "the former result, which another program had changed,"
+    if _question(there) != _question(new):
+        return f"the former result, of another problem called {there.problem.name},"
+    if there.success and not (new.success and _is_as_good(new, there)):
+        return f"the former result, which is better ({there.certificate.value:.6g}, best of {there.starts} starts),"
+    return ""
+
+
+def _is_as_good(a: Solution, b: Solution) -> bool:
+    """Whether the certified value of `a` is no less than that of `b`, as far as both are known."""
+    return a.certificate.value + a.certificate.value_error >= b.certificate.value - b.certificate.value_error
+
+
+def _may_go(there: Solution | None, place: Path) -> bool:
+    """Whether a result may be kept at a place: a free one, or one whose result it could replace."""
+    return not place.exists() or (there is not None and not _worth(_solution_at(place), there, place))
+
+
+@contextmanager
+def _moved(path: Path, place: Path) -> Iterator[None]:
+    """Keep a result under another name, with its figures and its gait of finite size; back again if the block fails.
+
+    The block replaces the result itself: under its own name there is always the former one or the new one.
+    """
+    pairs = [(path.with_suffix(kind), place.with_suffix(kind)) for kind in (".png", ".pdf")]
+    pairs.append((beside(path, FINITE), beside(place, FINITE)))
+    try:
+        _give_name(path, place)
+        for old, new in pairs:
+            if old.exists():
+                os.replace(old, new)
+        yield
+    except BaseException as error:
+        for old, new in [(path, place), *pairs]:
+            _take_back(old, new)
+        if isinstance(error, OSError) and not isinstance(error, StoreError):
+            raise StoreError(f"cannot keep {path} as {place}: {error.strerror or error}.") from None
+        raise
+
+
+def _give_name(path: Path, place: Path) -> None:
+    """Another name for a file, which keeps its own too where the file system can do that."""
+    place.unlink(missing_ok=True)
+    try:
+        os.link(path, place)
+    except OSError:
+        os.replace(path, place)
+
+
+def _take_back(old: Path, new: Path) -> None:
+    with suppress(FileNotFoundError):
+        if not old.exists():
+            os.replace(new, old)
+        elif old.samefile(new):
+            new.unlink()

@@ -1,0 +1,62 @@
+"""Where results lie: which files are named after a problem, and which names a problem cannot have for that.
+
+The result of the problem NAME is NAME.h5. What else colloc makes of it is told apart by an ending of its own before the suffix:
+NAME.failed.h5, NAME.finite.h5, NAME.starts.h5. So no problem's own name may end like that.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from colloc.system.errors import ProblemError
+
+SUFFIX = ".h5"
+FAILED, FINITE, PARTIAL, STARTS, FRONT = "failed", "finite", "partial", "starts", "front"
+"""A solve that failed; the best gait of finite size beside one that shrank; a run under way; an archive of starts; a front of
+two objectives."""
+_OTHERS = ("run", "shrunk")
+"""Other runs under way, and gaits that shrank beside the best one of finite size."""
+_NUMBERED = ("start", "former")
+"""One start of an archive; a result that another one took the place of."""
+_ENDING = re.compile(
+    rf"\.({'|'.join((FAILED, FINITE, PARTIAL, STARTS, FRONT, *_OTHERS))}|(?:{'|'.join(_NUMBERED)})-\d+)$", re.IGNORECASE
+)
+_NAME, LONGEST_NAME = re.compile(r"[A-Za-z0-9_.-]+"), 200
+"""File systems allow 255 bytes, and results of a problem add endings to its name."""
+
+
+def reserved_ending(name: str) -> str:
+    """The ending of a name, without its dot, that files which colloc makes beside results have; "" if it has none."""
+    found = _ENDING.search(name)
+    return found[1] if found else ""
+
+
+def check_name(name: object) -> None:
+    """A `ProblemError` for a name that files cannot be named after.
+
+    Examples
+    --------
+    >>> check_name("mine.2")
+    >>> check_name("mine.failed")
+    Traceback (most recent call last):
+    colloc.system.errors.ProblemError: name must not end in '.failed': colloc itself names files like that; not 'mine.failed'.
+    """
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise ProblemError(f"name must be letters, digits, '_', '-' or '.', not {name!r}.")
+    if name[0] in ".-":
+        raise ProblemError(f"name must begin with a letter, a digit or '_', not with '{name[0]}': {name!r}.")
+    if ending := reserved_ending(name):
+        raise ProblemError(f"name must not end in '.{ending}': colloc itself names files like that; not {name!r}.")
+    if len(name) > LONGEST_NAME:
+        raise ProblemError(f"name has {len(name)} characters; files are named after it, and {LONGEST_NAME} are allowed.")
+
+
+def beside(path: Path, ending: str) -> Path:
+    """The file beside a result, of the same kind, with an ending: ``x.finite.h5`` beside ``x.h5``."""
+    return path.with_name(f"{path.stem}.{ending}{path.suffix}")
+
+
+def former(path: Path, number: int) -> Path:
+    """Where a result is kept that another one took the place of."""
+    return beside(path, f"former-{number}")
