@@ -75,8 +75,8 @@ larger one too. *60 corners*: the best certified polygon with at most 60. *Relax
 to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
 there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled
 one, with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value,
-if climbs still found more than is tolerated above. *Guaranteed*: up to rounding,
-without samples, for delta -> 0 ([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for
+if climbs still found more than is tolerated above. *Guaranteed*: up to rounding, without samples, for delta -> 0
+([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for
 the row, relative; 1 over the smallest coefficient is one for every body. CPU seconds of rows made at different times,
 on different machines. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty
 place has not been computed. What was found is a lower end: other starts may find better gaits. What a row of width 0

@@ -11,13 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from colloc.commands.main import SUBCOMMANDS
-from colloc.gaits.harmonic import ellipse
+from colloc.results.store import save
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXTS = [*PAGES, ROOT / "CHANGELOG.md", *sorted((ROOT / "results").rglob("*.md"))]
+NOTEBOOK = ROOT / "docs/notebook.ipynb"
 SOURCES = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "colloc").rglob("*.py"))
 
 
@@ -153,25 +155,15 @@ def anchors(path):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_links_lead_somewhere(page):
-    generated = {"notebook.md", "gallery.md", "commands.md", "api.md", "modules.md", "changelog.md"}  # see scripts/docs_site.py
+@pytest.mark.parametrize("page", [*TEXTS, NOTEBOOK], ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_files_of_the_repository(page):
+    """As a code host follows them; the site has pages in place of some (`scripts.docs_site`), which its strict build checks."""
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if "://" in target:
             continue
         name, _, anchor = target.partition("#")
-        generated = {
-            "notebook.md",
-            "gallery.md",
-            "commands.md",
-            "api.md",
-            "modules.md",
-            "changelog.md",
-        }  # see scripts/docs_site.py
         path = (page.parent / name).resolve() if name else page
-        if path.parent == ROOT / "docs" and path.name in generated:
-            continue
         assert path.exists(), (page.name, target)
         assert not anchor or anchor in anchors(path), (page.name, target)
 
@@ -248,29 +240,45 @@ def test_the_table_of_classes_is_that_of_the_curated_tables():
     assert checked == 48
 
 
-@pytest.mark.slow
-def test_the_example_of_the_readme_prints_what_the_readme_says(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    program, printed = (blocks(ROOT / "README.md", language)[0] for language in ("python", "text"))
-    exec(compile(program, "mine.py", "exec"), {"__name__": "__main__"})
-    said = capsys.readouterr().out
-    for mine, theirs in zip(numbers(printed), numbers(said), strict=True):
-        assert mine == pytest.approx(theirs, rel=1e-3, abs=2e-3)
-    assert (tmp_path / "mine.html").stat().st_size > 1e5
-    assert (tmp_path / "mine.gif").stat().st_size > 1e4
+RUN_ELSEWHERE = {"own_body.md", "own_gait_class.md"}
+"""Pages that `tests/test_own_parts.py` runs."""
+LONG = {"README.md", "scripts.md"}
+WITH_PYTHON = [page for page in PAGES if blocks(page, "python") and page.name not in RUN_ELSEWHERE]
 
 
-@pytest.mark.slow
-def test_the_scripts_page_runs_from_top_to_bottom(tmp_path, monkeypatch):
-    """Every block in one namespace; what the text leaves to the reader (shapes, rates, a path) is given here."""
+@pytest.fixture
+def results_of_a_reader(three_link, tmp_path, monkeypatch):
+    """The files that pages speak of, in a folder of their own; the commands before a snippet would have made them."""
+    from colloc.commands.export import main
+
     monkeypatch.chdir(tmp_path)
-    t = np.linspace(0.0, 1.0, 50)
-    gait = ellipse(0.0, 2.0, 1.0)
-    names = {"angles": gait.angles(t), "rates": gait.rates(t), "path": lambda t: (gait.angles(t), gait.rates(t))}
-    for block in blocks(ROOT / "docs/howto/scripts.md", "python"):
-        exec(compile(block, "scripts.md", "exec"), names)
-    assert names["solution"].status == "solved"
-    assert names["z"].shape == (3, 50)
-    assert names["measured"].efficiency > 0.1
-    assert [s.problem.friction.mu_t for s in names["solutions"]] == [1.7, 2, 3, 5]
-    assert (tmp_path / "results/mine.h5").exists()
+    save(three_link, "results/mine.h5")
+    assert main(["results/mine.h5", "--period", "4"]) == 0
+    sides, symmetries = {"mu_t": [0.5, 1.0], "mu_b": [1.0, 2.0]}, ["bilateral", "none"]
+    values = xarray.DataArray(np.ones((2, 2, 2)), sides | {"symmetry": symmetries}, ("mu_t", "mu_b", "symmetry"))
+    values.to_dataset(name="efficiency").to_netcdf("results/friction_plane.nc", engine="h5netcdf")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, id=page.stem, marks=[pytest.mark.slow] * (page.name in LONG)) for page in WITH_PYTHON]
+)
+def test_the_python_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_says(page, results_of_a_reader, capsys):
+    """In one namespace, with no name that the page does not define: as a reader types it."""
+    capsys.readouterr()
+    names = {"__name__": "__main__"}
+    text = page.read_text(encoding="utf-8")
+    for match in re.finditer(r"^```python[^\n]*\n(.*?)^```(?:\s+```text\n(.*?)^```)?", text, re.MULTILINE | re.DOTALL):
+        program, quoted = match.groups()
+        for module in re.findall(r"^(?:import|from) (pandas|xarray|dask_jobqueue)", program, re.MULTILINE):
+            pytest.importorskip(module)
+        exec(compile(program, page.name, "exec"), names)
+        said = capsys.readouterr().out
+        assert not quoted or len(numbers(said)) == len(numbers(quoted)), (said, quoted)
+        for mine, theirs in zip(numbers(quoted or ""), numbers(said), strict=False):
+            assert theirs == pytest.approx(mine, rel=1e-3, abs=2e-3)
+
+
+def test_every_page_with_python_is_run():
+    pages = {page.name for page in PAGES if "```python" in page.read_text(encoding="utf-8")}
+    assert {page.name for page in WITH_PYTHON} | RUN_ELSEWHERE == pages

@@ -103,27 +103,6 @@ def _solve(options: argparse.Namespace) -> int:
     bound, complaints, saved, kept = None, [], [], []
     if solution.finite is not None:
         solution.finite.source = solution.source
-<<<<<<< HEAD
-        saved.append(f"{save(solution.finite, path.with_suffix('.finite.h5'))} (the gait of finite size)")
-    with StatusLine(enabled=not quiet) as line:
-        if options.bound:
-            line.say("computing an upper bound on every gait")
-        try:
-            bound = upper_bound(problem, path.parent, compute=options.bound)
-        except CollocError as error:  # what is solved is not lost for it
-            complaints.append(f"no bound: {error}")
-    if options.json:
-        print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
-    else:
-        said = summary_lines(solution, stated.reference, verbose=options.verbose)
-        lines = [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)]
-        print("\n".join(lines), flush=True)
-
-    if not options.no_figure:
-        from colloc.pictures.solution_figure import solution_figure
-        from colloc.pictures.style import save as save_figure
-
-=======
     try:
         kept = save_result(solution, path)
         _partial(path).unlink(missing_ok=True)
@@ -132,7 +111,6 @@ def _solve(options: argparse.Namespace) -> int:
     except StoreError as error:  # what was found is told all the same
         complaints.append(f"the result is not saved: {error}")
     with said_if_interrupted(saved):
->>>>>>> wb
         with StatusLine(enabled=not quiet) as line:
             if options.bound:
                 line.say("computing an upper bound on every gait")
@@ -142,7 +120,7 @@ def _solve(options: argparse.Namespace) -> int:
                 complaints.append(f"no bound: {error}")
         facts = {**summary_dict(solution, path if saved else None, stated.reference, bound), "kept": kept_facts(kept)}
         said = summary_lines(solution, stated.reference, verbose=options.verbose)
-        tell(options, facts, [*said, gap_line(problem, solution.measured.efficiency, bound)])
+        tell(options, facts, [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)])
         if saved and not options.no_figure:
             with StatusLine(enabled=not quiet) as line:
                 line.say("drawing")

@@ -113,6 +113,12 @@ def test_splitting_pieces_changes_no_motion():
     assert np.allclose(finer.angles(t), gait.angles(t), atol=1e-12)
 
 
+def test_what_takes_longest_is_split_and_again_where_a_part_still_does():
+    gait = Mixture([[3.0], [2.0], [0.0]], [[[1.0, 0.0]], [[0.0, 1.0]], [[1.0, 0.0]]], [0.0, 0.0])
+    np.testing.assert_allclose(gait.split(5).durations[:, 0], np.ones(5))
+    np.testing.assert_allclose(gait.split(6).durations[:, 0], [0.75] * 4 + [1.0] * 2)
+
+
 def test_gaits_and_classes_survive_being_written_down():
     gait, kind = mixture("both"), Relaxed(2, "antipodal")
     assert class_from(fields(kind)) == kind

@@ -110,6 +110,14 @@ def test_the_replay_is_that_of_a_program_of_its_own():
     assert ours.rotation == pytest.approx(theirs.rotation, rel=1e-4)
 
 
+@pytest.mark.parametrize("off", [1e-3, -1e-3, 1e-10])
+def test_lengths_and_weights_are_parts_of_one_body(off):
+    for name in ("lengths", "weights"):
+        with pytest.raises(ProblemError, match=f"body.{name} must add up to .* 1, not "):
+            Chain(**{name: (0.3, 0.3, 0.4 + off)})
+    assert Chain((0.1,) * 10).n_link == 10  # whose sum is 1 less a rounding
+
+
 def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
     problem = Problem("heavy_ends", body=Chain(weights=(0.4, 0.2, 0.4)), gait=Harmonic(1, "bilateral"))
     found = maximise_efficiency(problem)

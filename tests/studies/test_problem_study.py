@@ -292,6 +292,21 @@ def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path
         assert again == {a.key for a in first.attempts} - {attempt.key}
 
 
+def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
+    append_records(tmp_path, [Record("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})])
+    (kept,) = read_journal(tmp_path).records
+    assert kept.scores == {"known": 0.2}
+
+
+def test_a_gait_that_promises_more_than_was_found_is_measured_as_finely_as_a_certificate_does(monkeypatch):
+    """So that a cell is not marked for what a coarse replay has seen too large."""
+    stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
+    monkeypatch.setattr(study_cell, "run_guess", lambda s, start, number, limit: outcome(number, start(), start(), 0.01))
+    monkeypatch.setattr(study_cell, "value_as_it_is", lambda p, g, *grid: 0.2 if grid else 0.21)
+    work = Work((0,), stated, True, (), (elsewhere,), (), 0.0, frozenset(), 1, 1e-2, 300.0, 1)
+    assert list(study_cell.visit(work, {}).scores.values()) == [0.2]
+
+
 def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeypatch):
     from colloc.studies import run as study_run
     from colloc.system.task_pool import Lost

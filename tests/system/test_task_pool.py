@@ -155,6 +155,15 @@ def test_workers_do_not_outlive_a_parent_that_is_killed():
     assert gone
 
 
+def test_what_the_environment_says_of_threads_is_the_same_after_a_run(monkeypatch):
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    before = dict(os.environ)
+    for _ in completed(doubled, listed([Task(1, (1,))]), workers=1, executor=ThreadPoolExecutor):
+        assert os.environ["MKL_NUM_THREADS"] == os.environ["OMP_NUM_THREADS"] == "1"
+    assert dict(os.environ) == before
+
+
 @pytest.fixture
 def cluster():
     """A Dask cluster in this process, without workers; its port is one that is free."""

@@ -57,6 +57,14 @@ def test_stated_errors_cover_a_kink_wherever_it_lies(share):
     assert np.median(np.array(stated) / true) < 8
 
 
+def test_what_smooth_motion_would_leave_is_stated_even_where_nothing_changes_by_accident():
+    """A rule of fourth order leaves a fifteenth of a sixteenth of the change on the panel twice as wide, on both halves; and a
+    kink a quarter of each change."""
+    nothing, wide = np.zeros((1, 5)), np.ones((1, 5))
+    assert left_over(nothing, nothing, wide).min() >= 1 / (2 * 16 * 15)
+    np.testing.assert_allclose(left_over(wide, wide, wide), 1 / 3)
+
+
 def test_corners_are_not_taken_for_kinks():
     """On both sides of a jump the power is linear: nothing is left, though the instants beside it do not fit."""
     assert stated_work(panels_of(lambda t: np.where(t < 0.5, 1 + t, 3 - t), corner=0.5)) < 1e-14
