@@ -40,7 +40,7 @@ from colloc.results.distinct_optima import basins
 from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import process_pool, run_starts
-from colloc.system.versions import versions
+from colloc.system.late_binding import versions
 from colloc.verification.replay import replay
 
 Laws = tuple[tuple[float, float, float], ...]
