@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
+from colloc.commands.verify import check_trusted
 from colloc.gaits.gait_fields import law_fields
 from colloc.results.solution import Solution
 from colloc.results.store import load
@@ -110,6 +111,7 @@ def _export(options: argparse.Namespace) -> int:
     solution = load(source)
     if not solution.problem.gait.free:
         raise ProblemError(f"{source} holds a prescribed motion of a smooth body: it has no joints to export.")
+    check_trusted(solution, options.result)
     kind = output_kind(options, ("csv", "json"))
     path = output_path(options.output, source.with_suffix(f".{kind}"))
     limits = options.max_speed
