@@ -4,7 +4,8 @@
 - Generated: the notebook with what it showed, the gallery (problems/ with results/curated/gallery.json), the commands (what
   --help says), the API.
 - Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
-- Links to files of the repository outside docs/ become their names; pictures and tables of results/curated are copied.
+- Links to what a generated page shows, such as problems/, lead to that page (`SHOWN`). Links to other files of the repository
+  outside docs/ become their names; pictures and tables of results/curated are copied.
 
 `python -m scripts.docs_site PAGE` prints a generated page, to read without building the site.
 """
@@ -18,6 +19,7 @@ import importlib
 import io
 import json
 import os
+import posixpath
 import re
 import sys
 from pathlib import Path
@@ -61,7 +63,11 @@ PICTURES = (".png", ".gif")
 KEPT = (*PICTURES, ".md")
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _MATH_INLINE = re.compile(r"\$`([^`\n]+)`\$")
-_OUTSIDE = re.compile(r"(!?)\[([^\]]*)\]\(((?:\.\./)+)([^)#\s]+)(#[^)]*)?\)")
+SHOWN = {"problems": "gallery.md", "colloc/__init__.py": "api.md", "docs/notebook.ipynb": "notebook.md"}
+"""What a code host shows, and the page that shows it here."""
+_SCROLLS = '<span style="display: block; overflow-x: auto">{}</span>'
+"""On a phone a long formula, and not the page."""
+_LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^):#\s]+)(?:#[^)]*)?\)")
 
 
 def on_config(config: Any) -> Any:
@@ -93,25 +99,29 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
     def mark(display: str) -> Any:
         def replaced(match: re.Match[str]) -> str:
-            formulas.append(convert(match[1].strip(), display=display))
+            formula = convert(match[1].strip(), display=display)
+            formulas.append(_SCROLLS.format(formula) if display == "block" else formula)
             return f"\n\nFORMULA{len(formulas) - 1}END\n\n" if display == "block" else f"FORMULA{len(formulas) - 1}END"
 
         return replaced
 
-    depth = page.file.src_uri.count("/")
     markdown = _MATH_INLINE.sub(mark("inline"), _MATH_BLOCK.sub(mark("block"), markdown))
     page.meta["formulas"] = formulas
-    return _OUTSIDE.sub(lambda match: outside(match, depth), markdown)
+    return _LINK.sub(lambda match: site_link(match, page.file.src_uri), markdown)
 
 
-def outside(match: re.Match[str], depth: int) -> str:
-    """A link to a file outside docs/: pictures and tables of results/curated stay, others become the file's name."""
-    picture, text, up, target = match[1], match[2], match[3], match[4]
-    if up.count("../") <= depth:
+def site_link(match: re.Match[str], page: str) -> str:
+    """A link on a page as the site has it: pictures and tables of results/curated stay, other files outside docs/ become the
+    page that shows them, or else their name."""
+    picture, text, target = match.groups()
+    file, back = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), target)), "../" * page.count("/")
+    if SHOWN.get(file, page) != page:
+        return f"[{text}]({back}{SHOWN[file]})"
+    if file.startswith("docs/"):
         return match[0]
-    if target.startswith("results/curated/") and target.endswith(KEPT):
-        return f"{picture}[{text}]({'../' * depth}curated/{target.removeprefix('results/curated/')})"
-    return f"`{target}`" if text.strip("`") in (target, Path(target).name) else f"{text} (`{target}`)"
+    if file.startswith("results/curated/") and file.endswith(KEPT):
+        return f"{picture}[{text}]({back}curated/{file.removeprefix('results/curated/')})"
+    return f"`{file}`" if text.strip("`") in (file, Path(file).name) else f"{text} (`{file}`)"
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
@@ -174,15 +184,10 @@ def commands_page() -> str:
 
 def api_page() -> str:
     """The public names, each from its module's docstrings."""
-    source = ast.parse((ROOT / "colloc/__init__.py").read_text(encoding="utf-8"))
-    home = next(
-        ast.literal_eval(node.value)
-        for node in source.body
-        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "_HOME"
-    )
+    import colloc
+
     parts = ["# Programming interface", "All of these are names of the package: `import colloc`, then `colloc.Problem`, ..."]
-    for module, names in home.items():
-        parts += [f"::: colloc.{module}.{name}" for name in names]
+    parts += [f"::: {module}.{name}" for name, module in colloc._HOME.items()]
     return "\n\n".join(parts) + "\n"
 
 

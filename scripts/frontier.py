@@ -75,7 +75,7 @@ larger one too. *60 corners*: the best certified polygon with at most 60. *Relax
 to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
 there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled
 one, with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value,
-if climbs still found more than is tolerated above. *Proved*: a bound without samples, for delta -> 0
+if climbs still found more than is tolerated above. *Guaranteed*: up to rounding, without samples, for delta -> 0
 ([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for
 the row, relative; 1 over the smallest coefficient is one for every body. CPU seconds of rows made at different times,
 on different machines. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty
@@ -86,7 +86,7 @@ its bound holds for any width: rows of other widths are those where something ch
 """
 COLUMNS = (
     "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "apart", "60 corners", "relaxed",
-    "small gait", "its apart", "small loop", "bound", "unknowns", "proved", "gap", "CPU s",
+    "small gait", "its apart", "small loop", "bound", "unknowns", "guaranteed", "gap", "CPU s",
 )  # fmt: skip
 
 
@@ -237,7 +237,7 @@ def line(row: Row, known: dict) -> str:
 
     refused = " (not certified)"
     ends = [travels.get("relaxed", -np.inf), still.get("efficiency", -np.inf)]
-    least, proved = smallest_bound(row, known), guaranteed_bound(row)
+    least, guaranteed = smallest_bound(row, known), guaranteed_bound(row)
     apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) else ""
     program = "" if above.get("converged", True) else f" ({above['floor']:.4f})"
     cells = [
@@ -248,7 +248,7 @@ def line(row: Row, known: dict) -> str:
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
         f"{room(row, still)[1]:.3f}" if still else "", value(loops, "efficiency", mark="" if loops.get("passed") else refused),
         value(above, "sampled", mark=program), value(above, "unknowns", "d"),
-        f"{proved:g}" if np.isfinite(proved) else "", apart,
+        f"{guaranteed:g}" if np.isfinite(guaranteed) else "", apart,
         f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
     ]  # fmt: skip
     return f"| {' | '.join(cells)} |"

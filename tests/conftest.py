@@ -1,12 +1,19 @@
-"""Shared results: each problem file is solved once per test run."""
+"""Shared results: each problem file is solved once per test run, whatever the number of workers."""
 
+import os
+
+# before NumPy is loaded: the workers use all processors already, and threads of theirs would only wait for each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import pickle
 import signal
-from functools import cache
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
+from filelock import FileLock
 
 matplotlib.use("Agg")
 # a run in the background of a shell script ignores Ctrl-C, and so would the programs that the tests interrupt
@@ -15,22 +22,47 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 ROOT = Path(__file__).resolve().parents[1]
 
 
-@cache
-def solved_problem(name):
-    from colloc.gaits.problem_file import read_problem_file
-    from colloc.search.global_search import STARTS
-    from colloc.search.optimise import best_gait
+@pytest.fixture(scope="session")
+def once(tmp_path_factory):
+    """A function from (name, make) to what `make()` returns: the first worker that asks makes it, the others read its file."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "once"
+    folder.mkdir(exist_ok=True)
+    known = {}
 
-    stated = read_problem_file(ROOT / "problems" / f"{name}.py")
-    solution = best_gait(stated.problem, stated.starts or STARTS)
-    solution.source = stated.source
-    return solution, stated.reference
+    def made(name, make):
+        if name not in known:
+            file = folder / f"{name}.pickle"
+            with FileLock(f"{file}.lock"):
+                if file.exists():
+                    known[name] = pickle.loads(file.read_bytes())
+                else:
+                    known[name] = make()
+                    file.write_bytes(pickle.dumps(known[name]))
+        return known[name]
+
+    return made
 
 
 @pytest.fixture(scope="session")
-def solved():
+def solved(once):
     """A function from the name of a problem file to (solution, reference)."""
-    return solved_problem
+
+    def result(name):
+        from colloc.gaits.problem_file import read_problem_file
+        from colloc.search.global_search import STARTS
+        from colloc.search.optimise import best_gait
+
+        stated = read_problem_file(ROOT / "problems" / f"{name}.py")
+
+        def solve():
+            solution = best_gait(stated.problem, stated.starts or STARTS)
+            solution.source = stated.source
+            return solution
+
+        return once(name, solve), stated.reference
+
+    return result
 
 
 @pytest.fixture(scope="session")

@@ -11,13 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from colloc.commands.main import SUBCOMMANDS
-from colloc.gaits.harmonic import ellipse
+from colloc.results.store import save
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXTS = [*PAGES, ROOT / "CHANGELOG.md", *sorted((ROOT / "results").rglob("*.md"))]
+NOTEBOOK = ROOT / "docs/notebook.ipynb"
 SOURCES = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "colloc").rglob("*.py"))
 
 
@@ -117,6 +119,28 @@ def test_messages_quoted_in_troubleshooting_are_the_programs_own():
             assert piece in known or plain in known, (message, piece)
 
 
+def test_the_manifest_of_the_curated_results_names_files_and_programs_that_are_there():
+    manifest = json.loads((ROOT / "results/curated/manifest.json").read_text(encoding="utf-8"))
+    assert len(manifest) > 30
+    for name, entry in manifest.items():
+        assert (ROOT / "results/curated" / name).exists(), name
+        programs = re.findall(r"python -m ([\w.]+)", entry["command"])
+        assert programs or "colloc " in entry["command"], (name, entry["command"])
+        for program in programs:
+            path = ROOT / program.replace(".", "/")
+            assert path.with_suffix(".py").exists() or (path / "__main__.py").exists(), (name, program)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_bound_without_samples_is_called_guaranteed_up_to_rounding_and_never_proved(page):
+    """Rounding is allowed for and not counted: until it is, that is one thing, and it has one name."""
+    text = " ".join(page.read_text(encoding="utf-8").split())
+    for place in re.finditer(r"0\.47\b", text):
+        assert not re.search(r"\bprove[nd]?\b|\btheorem\b", text[max(0, place.start() - 40) : place.end() + 40])
+    if page.stem in ("README", "known", "limits", "bound"):
+        assert re.search(r"0\.47 (is )?guaranteed up to rounding|[Gg]uaranteed up to rounding, for delta (→|->) 0", text)
+
+
 def test_readme_and_tutorial_name_every_documented_command():
     tutorial, readme = ((ROOT / name).read_text(encoding="utf-8") for name in ("docs/tutorial.md", "README.md"))
     for name in ("init", "solve", "report", "animate", "verify", "multistart", "open", "export", "compare"):
@@ -131,25 +155,15 @@ def anchors(path):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_links_lead_somewhere(page):
-    generated = {"notebook.md", "gallery.md", "commands.md", "api.md", "modules.md", "changelog.md"}  # see scripts/docs_site.py
+@pytest.mark.parametrize("page", [*TEXTS, NOTEBOOK], ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_files_of_the_repository(page):
+    """As a code host follows them; the site has pages in place of some (`scripts.docs_site`), which its strict build checks."""
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if "://" in target:
             continue
         name, _, anchor = target.partition("#")
-        generated = {
-            "notebook.md",
-            "gallery.md",
-            "commands.md",
-            "api.md",
-            "modules.md",
-            "changelog.md",
-        }  # see scripts/docs_site.py
         path = (page.parent / name).resolve() if name else page
-        if path.parent == ROOT / "docs" and path.name in generated:
-            continue
         assert path.exists(), (page.name, target)
         assert not anchor or anchor in anchors(path), (page.name, target)
 
@@ -226,29 +240,45 @@ def test_the_table_of_classes_is_that_of_the_curated_tables():
     assert checked == 48
 
 
-@pytest.mark.slow
-def test_the_example_of_the_readme_prints_what_the_readme_says(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    program, printed = (blocks(ROOT / "README.md", language)[0] for language in ("python", "text"))
-    exec(compile(program, "mine.py", "exec"), {"__name__": "__main__"})
-    said = capsys.readouterr().out
-    for mine, theirs in zip(numbers(printed), numbers(said), strict=True):
-        assert mine == pytest.approx(theirs, rel=1e-3, abs=2e-3)
-    assert (tmp_path / "mine.html").stat().st_size > 1e5
-    assert (tmp_path / "mine.gif").stat().st_size > 1e4
+RUN_ELSEWHERE = {"own_body.md", "own_gait_class.md"}
+"""Pages that `tests/test_own_parts.py` runs."""
+LONG = {"README.md", "scripts.md"}
+WITH_PYTHON = [page for page in PAGES if blocks(page, "python") and page.name not in RUN_ELSEWHERE]
 
 
-@pytest.mark.slow
-def test_the_scripts_page_runs_from_top_to_bottom(tmp_path, monkeypatch):
-    """Every block in one namespace; what the text leaves to the reader (shapes, rates, a path) is given here."""
+@pytest.fixture
+def results_of_a_reader(three_link, tmp_path, monkeypatch):
+    """The files that pages speak of, in a folder of their own; the commands before a snippet would have made them."""
+    from colloc.commands.export import main
+
     monkeypatch.chdir(tmp_path)
-    t = np.linspace(0.0, 1.0, 50)
-    gait = ellipse(0.0, 2.0, 1.0)
-    names = {"angles": gait.angles(t), "rates": gait.rates(t), "path": lambda t: (gait.angles(t), gait.rates(t))}
-    for block in blocks(ROOT / "docs/howto/scripts.md", "python"):
-        exec(compile(block, "scripts.md", "exec"), names)
-    assert names["solution"].status == "solved"
-    assert names["z"].shape == (3, 50)
-    assert names["measured"].efficiency > 0.1
-    assert [s.problem.friction.mu_t for s in names["solutions"]] == [1.7, 2, 3, 5]
-    assert (tmp_path / "results/mine.h5").exists()
+    save(three_link, "results/mine.h5")
+    assert main(["results/mine.h5", "--period", "4"]) == 0
+    sides, symmetries = {"mu_t": [0.5, 1.0], "mu_b": [1.0, 2.0]}, ["bilateral", "none"]
+    values = xarray.DataArray(np.ones((2, 2, 2)), sides | {"symmetry": symmetries}, ("mu_t", "mu_b", "symmetry"))
+    values.to_dataset(name="efficiency").to_netcdf("results/friction_plane.nc", engine="h5netcdf")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, id=page.stem, marks=[pytest.mark.slow] * (page.name in LONG)) for page in WITH_PYTHON]
+)
+def test_the_python_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_says(page, results_of_a_reader, capsys):
+    """In one namespace, with no name that the page does not define: as a reader types it."""
+    capsys.readouterr()
+    names = {"__name__": "__main__"}
+    text = page.read_text(encoding="utf-8")
+    for match in re.finditer(r"^```python[^\n]*\n(.*?)^```(?:\s+```text\n(.*?)^```)?", text, re.MULTILINE | re.DOTALL):
+        program, quoted = match.groups()
+        for module in re.findall(r"^(?:import|from) (pandas|xarray|dask_jobqueue)", program, re.MULTILINE):
+            pytest.importorskip(module)
+        exec(compile(program, page.name, "exec"), names)
+        said = capsys.readouterr().out
+        assert not quoted or len(numbers(said)) == len(numbers(quoted)), (said, quoted)
+        for mine, theirs in zip(numbers(quoted or ""), numbers(said), strict=False):
+            assert theirs == pytest.approx(mine, rel=1e-3, abs=2e-3)
+
+
+def test_every_page_with_python_is_run():
+    pages = {page.name for page in PAGES if "```python" in page.read_text(encoding="utf-8")}
+    assert {page.name for page in WITH_PYTHON} | RUN_ELSEWHERE == pages

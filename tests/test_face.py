@@ -4,10 +4,12 @@ import doctest
 import importlib
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import colloc
 from colloc.results.steps import SearchStep
@@ -22,15 +24,22 @@ def test_importing_colloc_loads_nothing_heavy_and_shows_every_public_name():
 
 
 def test_every_public_name_has_one_home():
-    named = [name for names in colloc._HOME.values() for name in names]
-    assert sorted(named) == sorted(colloc.__all__)
-    assert all(getattr(colloc, name) is not None for name in named)
+    assert sorted(colloc._HOME) == list(colloc.__all__)
+    assert all(getattr(colloc, name) is not None for name in colloc.__all__)
+
+
+def test_completion_offers_the_public_names_and_nothing_else():
+    offered = {name for name in dir(colloc) if not name.startswith("__")}
+    assert offered == set(colloc.__all__)
+    assert "__version__" in dir(colloc)
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert colloc.__version__ == stated
 
 
 @pytest.mark.parametrize("name", colloc.__all__)
 def test_every_public_docstring_has_an_example(name):
-    home = next(module for module, names in colloc._HOME.items() if name in names)  # colloc.solve may be the module by now
-    assert ">>> " in (getattr(importlib.import_module(f"colloc.{home}"), name).__doc__ or "")
+    home = importlib.import_module(colloc._HOME[name])  # colloc.solve may be the module by now
+    assert ">>> " in (getattr(home, name).__doc__ or "")
 
 
 WITH_EXAMPLES = [
@@ -49,7 +58,7 @@ def test_the_examples_of_the_docstrings_run(module, monkeypatch):
 
 
 def test_the_examples_of_all_public_names_are_among_those_that_run():
-    assert {f"colloc.{module}" for module in colloc._HOME} <= set(WITH_EXAMPLES)
+    assert set(colloc._HOME.values()) <= set(WITH_EXAMPLES)
 
 
 def test_the_module_behind_python_m_is_also_the_function():
@@ -81,7 +90,8 @@ def test_a_wrong_argument_is_named_with_what_is_right(made, said):
 
 def test_what_is_printed_of_a_result_is_short(three_link):
     shown = (three_link, three_link.problem, three_link.certificate, three_link.last, three_link.gait, three_link.sample(0.0))
-    for thing in shown:
+    problem = three_link.problem
+    for thing in (*shown, colloc.replay(problem.body, problem.friction, three_link.gait, 1e-2, instants=200)):
         assert "\n" not in repr(thing)
         assert len(repr(thing)) < 160
     assert str(three_link.gait).count("\n") == 1
@@ -97,6 +107,9 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     assert len(three_link.plot().axes) == 5
     assert three_link.plot()._repr_png_().startswith(b"\x89PNG")  # by which a notebook shows it
     assert three_link.report(tmp_path / "x.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    axes = Figure().add_subplot()
+    assert three_link.plot(ax=axes) is axes
+    assert axes.collections  # the path
     assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
     with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):
         three_link.animate(tmp_path / "x.avi")
@@ -108,6 +121,23 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     np.testing.assert_array_equal(frame.tail_velocity_omega, motion.z[2])
     assert dataset.power.attrs["units"] == "weight length/period"
     assert dataset.attrs["efficiency"] == three_link.certificate.efficiency
+
+
+def test_a_gait_is_exported_from_python_as_by_the_command(three_link, tmp_path, capsys):
+    from colloc.commands.main import main
+
+    colloc.save(three_link, tmp_path / "x.h5")
+    for name, settings in (("x.csv", {"period": 4}), ("x.json", {"max_speed": [2, 1], "rate": 20})):
+        stated = three_link.export(tmp_path / name, **settings)
+        assert stated["period_s"] * stated["rate_hz"] == stated["samples_per_period"]
+        by_hand = (tmp_path / name).read_text(encoding="utf-8")
+        words = [f"--{key.replace('_', '-')} {' '.join(map(str, np.ravel(value)))}" for key, value in settings.items()]
+        assert main(["export", str(tmp_path / "x.h5"), "--output", str(tmp_path / name), *" ".join(words).split()]) == 0
+        assert (tmp_path / name).read_text(encoding="utf-8") == by_hand
+    with pytest.raises(colloc.ProblemError, match=r"should end in \.csv or \.json"):
+        three_link.export(tmp_path / "x.txt", period=4)
+    with pytest.raises(colloc.ProblemError, match="periods must be at least 1"):
+        three_link.export(tmp_path / "x.csv", period=4, periods=0)
 
 
 def test_a_missing_library_is_named(three_link, monkeypatch):

@@ -58,12 +58,13 @@ def _bounded(problem: Problem) -> bool:
     return on_level and problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.friction)
 
 
-def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
-    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq. lambdaupper)."""
+def gap_line(problem: Problem, efficiency: float, bound: Bound | None, *, asked: bool = False) -> str:
+    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq. lambdaupper). Whoever has asked for
+    a bound in vain is not told to ask for one."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
     if not _bounded(problem):
         return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.friction.smallest
-    tighter = "" if refusal(problem) else "; --bound computes a tighter one"
+    tighter = "" if asked or refusal(problem) else "; --bound computes a tighter one"
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

@@ -120,7 +120,7 @@ def _solve(options: argparse.Namespace) -> int:
                 complaints.append(f"no bound: {error}")
         facts = {**summary_dict(solution, path if saved else None, stated.reference, bound), "kept": kept_facts(kept)}
         said = summary_lines(solution, stated.reference, verbose=options.verbose)
-        tell(options, facts, [*said, gap_line(problem, solution.measured.efficiency, bound)])
+        tell(options, facts, [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)])
         if saved and not options.no_figure:
             with StatusLine(enabled=not quiet) as line:
                 line.say("drawing")

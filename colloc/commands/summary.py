@@ -52,7 +52,7 @@ def _background(solution: Solution) -> list[str]:
     """How the gait was found, where it moves, and the gait itself."""
     problem = solution.problem
     paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
-    gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines(problem.body.coordinate)]
+    gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
     return [
         *(f"  search          {text}" for text in _search_lines(solution)),
         *([] if problem.slope is None else [f"  ground          {problem.slope.describe()}"]),
@@ -83,7 +83,7 @@ def _besides(solution: Solution) -> list[str]:
     if problem.uses("driven_work"):
         lines.append(f"  driven work W+  {found.driven_work:.6f}")
     if problem.rotation != 0:
-        lines.append(f"  net rotation    {found.rotation:.6f} rad")
+        lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines
 
 

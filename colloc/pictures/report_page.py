@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from io import StringIO
 from pathlib import Path
@@ -48,6 +49,8 @@ PLAIN = {
     "curvature": "The path bends no more sharply than it may.",
 }
 """What a check means for a reader who knows nothing of optimisation, by its name."""
+TURNING = {"net rotation": "It ends the cycle turned by the angle that was asked for: it crawls in a circle."}
+"""The same for gaits that are asked to turn."""
 
 
 class Drawn(NamedTuple):
@@ -108,8 +111,9 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             gap=gap.strip(),
             reference=_comparison(solution, reference),
             relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
-            plain=PLAIN,
+            plain=PLAIN | TURNING if solution.problem.rotation else PLAIN,
             policy=_POLICY,
+            degrees=math.degrees,
             fields={name: json.dumps(value) for name, value in solution.problem.to_dict().items()},
             commands=_commands(solution),
             source=solution.source or problem_file_text(solution.problem),
@@ -135,8 +139,9 @@ def _headline(solution: Solution) -> str:
     measured = solution.measured
     best = solution.problem.objective
     other = "" if best == EFFICIENCY else f"; {best.name} {measured.value:.3g}"
-    moves = f"moves {measured.distance:.2g} body lengths a cycle; {measured.efficiency:.2g} body lengths per unit of work"
-    return moves + other
+    turns = f" and {solution.turning}" if solution.turning else ""
+    moves = f"moves {measured.distance:.2g} body lengths a cycle{turns}"
+    return f"{moves}; {measured.efficiency:.2g} body lengths per unit of work{other}"
 
 
 def _comparison(solution: Solution, reference: Reference | None) -> str:
@@ -188,7 +193,7 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
         "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
-        "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": shown.arrow_scale,
-        "grid": grid,
+        "before": [np.array([np.exp(1j * b.rotation), b.shift]).view(float).round(6).tolist() for b in shown.before],
+        "arrowScale": shown.arrow_scale, "grid": grid,
         "shape": float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 1.2, 4.0)),
     }  # fmt: skip

@@ -40,6 +40,7 @@ def _facts(solution: Solution) -> list[tuple[str, str]]:
         *own,
         ("distance d", f"{certificate.distance:.5f}"),
         ("work W", f"{certificate.work:.5f}"),
+        *([("course", solution.turning)] if solution.turning else []),
         ("δ", f"{solution.last.delta:.0e}"),
         ("search", solution.standing[0]),
     ]

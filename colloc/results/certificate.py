@@ -195,7 +195,7 @@ def _motion(
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     checks = [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
-        Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),
+        Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, f"{body.quantity}s after one period [rad]"),
         *_rotation(problem, fine),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),

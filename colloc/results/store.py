@@ -5,7 +5,8 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /problem            JSON text of all fields          /source     text of the problem file
     /gait/{mean,cos,sin}                                 /versions   JSON text
          or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
-    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
+    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
+        modes and mode_rates
     /levels/000/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, efficiency, objective (NaN: the efficiency), ...
     /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, efficiency, efficiency_error, ...
     /relaxed/{durations,directions,start}, attribute symmetry and those of `results.relaxation.Optimality`, with
@@ -29,7 +30,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.former_format import converted, is_former
-from colloc.results.motion import SAMPLES, motion_columns
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
 from colloc.results.steps import Alternative, Level
@@ -163,34 +163,33 @@ def _write(file: h5py.File, solution: Solution) -> None:
     if solution.certificate.replayed:
         _write_certificate(file.create_group("certificate"), solution.certificate)
     if solution.relaxed is not None:
-        _write_relaxation(file.create_group("relaxed"), solution.relaxed)
+        _write_relaxation(file.create_group("relaxed"), solution.relaxed, solution.problem.body.coordinate)
 
 
-def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
+def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
     for name, value in fields(gait).items():
         if name in _GAIT_ARRAYS:
             units, dims = _GAIT_ARRAYS[name]
-            put(group, name, value, units=units, dims=dims)
+            put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
         else:
             put_attribute(group, name, value)
 
 
 def _write_motion(file: h5py.File, solution: Solution) -> None:
-    _write_gait(file.create_group("gait"), solution.gait)
+    _write_gait(file.create_group("gait"), solution.gait, solution.problem.body.coordinate)
     group = file.create_group("motion")
-    motion = solution.sample(np.linspace(0.0, 1.0, SAMPLES))
-    for name, column in motion_columns(motion, solution.power(motion)).items():
+    for name, column in solution.columns().items():
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
 
 
-def _write_relaxation(group: h5py.Group, relaxed: Relaxation) -> None:
-    _write_gait(group, relaxed.gait)
+def _write_relaxation(group: h5py.Group, relaxed: Relaxation, coordinate: str) -> None:
+    _write_gait(group, relaxed.gait, coordinate)
     for field in dataclasses.fields(Optimality):
         put_attribute(group, field.name, getattr(relaxed.optimality, field.name))
     _write_certificate(group.create_group("certificate"), relaxed.certificate)
     for index, realised in enumerate(relaxed.realised):
         one = group.create_group(f"realised/{index:03d}")
-        _write_gait(one, realised.gait)
+        _write_gait(one, realised.gait, coordinate)
         for name in ("repeats", "sense"):
             put_attribute(one, name, getattr(realised, name))
         _write_certificate(one.create_group("certificate"), realised.certificate)

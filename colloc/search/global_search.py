@@ -20,7 +20,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.harmonic import Fourier, ellipse, harmonics_within
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
@@ -109,7 +109,7 @@ def same_gait(problem: Problem, a: Found, b: Found) -> bool:
     """Whether two gaits are one, modulo start phase and the symmetries of body and friction."""
     if abs(a.objective - b.objective) > _SAME_EFFICIENCY * max(abs(a.objective), abs(b.objective)):
         return False
-    one, other = (fourier_through(f.gait, Harmonic(_HARMONICS, problem.gait.symmetry)) for f in (a, b))
+    one, other = (fourier_through(f.gait, harmonics_within(_HARMONICS, problem.gait.symmetry)) for f in (a, b))
     return distance(one, other, problem.body, problem.friction) < _SAME_GAIT
 
 

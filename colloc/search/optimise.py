@@ -12,6 +12,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.gaits.symmetry import NONE
+from colloc.reduced.actuator_demand import check_actuators_suffice
 from colloc.reduced.spaces import space_near
 from colloc.results.certificate import certify
 from colloc.results.solution import SOLVED, Solution
@@ -225,6 +226,7 @@ def best_gait(
         ``solution.finite`` is the best gait that did not, if there is one. A class of relaxed gaits is answered by the best
         finite gait near its optimum, which is ``solution.relaxed``.
     """
+    check_actuators_suffice(problem)
     if problem.gait.mixes:
         solution = best_relaxed_gait(problem, starts or RELAXED_STARTS, seconds=seconds, report=watch)
         if on_level is not None:

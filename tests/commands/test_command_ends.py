@@ -22,10 +22,13 @@ from colloc.commands.ending import exit_code, show
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
 from colloc.gaits import gait_fields
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
+from colloc.mechanics.chain import Chain
 from colloc.results.kept import save_result
 from colloc.results.store import load, save
-from colloc.system.errors import StoreError
+from colloc.system.errors import ProblemError, StoreError
 from colloc.system.row_file import CACHE, put_rows
 
 QUICK = """
@@ -226,16 +229,15 @@ def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(quick, tmp_path, c
     assert printed.err.count("No bound is taken from it") == 1
 
 
-def test_a_bound_that_cannot_be_computed_costs_no_summary(quick, tmp_path, capsys):
-    text = QUICK.replace(
-        "ellipse(0.0, 1.4, 0.8)", "Fourier([0] * 5, [[0.6], [0.3], [0], [-0.3], [-0.6]], [[0.6], [0.3], [0.2], [0.3], [0.6]])"
-    )
-    (tmp_path / "p.py").write_text(text.replace('"quick",', '"quick", body=Chain((1 / 6,) * 6), guess='))
+def test_a_bound_that_cannot_be_computed_costs_no_summary(tmp_path, capsys):
+    (tmp_path / "p.py").write_text(QUICK.replace("delta=0.3,", 'delta=0.3, objective="speed",'))
     assert colloc(["solve", str(tmp_path / "p.py"), "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
     printed = capsys.readouterr()
     assert "quick:" in printed.out
-    assert "no bound: upper bounds are computed for at most 5 links, not 6" in printed.err
+    assert "no bound: upper bounds are of the efficiency, on the level, of gaits that do not turn" in printed.err
     assert "--bound" not in printed.out  # nobody is sent to ask again
+    with pytest.raises(ProblemError, match="at most 5 links, not 6"):
+        upper_bound(Problem("six", body=Chain((1 / 6,) * 6), gait=Harmonic(1, "antipodal")), tmp_path, compute=True)
 
 
 def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys):

@@ -119,6 +119,11 @@ def test_path_distance_of_circles_and_insensitivity_to_start_pacing_and_directio
     assert compare.path_distance(circle(1.0, t), other) < 1e-4
 
 
+def test_a_path_that_lies_on_a_part_of_another_is_not_the_same_whichever_is_named_first():
+    short, long = (np.array([[0.0, reach], [0.0, 0.0]]) for reach in (1.0, 3.0))
+    assert compare.path_distance(short, long) == compare.path_distance(long, short) == pytest.approx(2.0)
+
+
 def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_path, capsys):
     offset = solved("three_link_offset")[0]
     a, b = save(three_link, tmp_path / "a.h5"), save(offset, tmp_path / "b.h5")

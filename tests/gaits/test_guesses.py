@@ -4,9 +4,24 @@ import numpy as np
 import pytest
 
 from colloc.gaits.guesses import SAFE, largest_factor
+from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
+from colloc.system.errors import ProblemError
 
 STRAIGHT = np.zeros((2, 1))
+
+
+@pytest.mark.parametrize(("share", "moves"), [(1.01, True), (0.995, True), (0.98, False)])
+def test_a_guess_on_the_bound_of_the_shape_speed_counts_as_moving(share, moves):
+    """Sampling cuts the corners of an optimum that lies there, and makes it a little slower."""
+    guess = ellipse(0.0, 0.3, 0.2)
+    slowest = guess.shape_speed / share
+    if moves:
+        assert Problem("small", guess, gait=Harmonic(1, "bilateral"), smallest_shape_speed=slowest).guess is guess
+    else:
+        with pytest.raises(ProblemError, match="guess hardly moves"):
+            Problem("small", guess, gait=Harmonic(1, "bilateral"), smallest_shape_speed=slowest)
 
 
 def test_a_straight_body_may_be_enlarged_without_end():

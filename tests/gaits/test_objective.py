@@ -100,3 +100,9 @@ def test_a_problem_with_an_objective_comes_back_from_its_statement():
 def test_what_cannot_be_asked_for_is_refused(changes, words):
     with pytest.raises(ProblemError, match=words):
         Problem("x", **changes)
+
+
+@pytest.mark.parametrize("expression", ["work", "-work", "1 / work", "rotation / work"])
+def test_the_error_of_a_value_is_relative_to_its_magnitude_whatever_its_sign(expression):
+    period = {"distance": 0.4, "work": 2.0, "rotation": -0.3, "length": 7.0, "driven_work": 2.0}
+    assert Objective(expression).relative_error(period, {"work": 0.1}) == pytest.approx(0.05)

@@ -57,6 +57,7 @@ def test_a_stated_law_moves_a_body_as_the_built_in_one_does(own, built_in):
     [
         ("vs/speed", "-vn/speed", "does not oppose the motion"),
         ("-vs/speed", "-vn/speed + 0.1*vn/speed*exp(speed)", "does not oppose the motion"),
+        ("-vs/speed", "0.1*vn/(1 + speed)", "does not oppose the motion"),
         ("-vs/speed - 0.5*vn/speed", "-vn/speed", "left and right"),
         ("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn", "rest"),
         ("-vs/(speed - speed)", "-vn", "no finite value"),

@@ -5,7 +5,7 @@ import pytest
 
 from colloc import Chain, Harmonic, Problem, ProblemError, ellipse, maximise_efficiency
 from colloc.bounds.coulomb_motion import admissible
-from colloc.mechanics.contact import crossing_depth, ends_and_links, gap, overlap, square_distance
+from colloc.mechanics.contact import crossing_depth, ends_and_links, excess, gap, overlap, square_distance
 
 
 def nearest(body, angles, first, second, points=301):
@@ -35,6 +35,18 @@ def test_the_distance_that_a_search_sees_is_that_of_the_points_of_a_link():
         points = ends[:, link, :, None] * (1 - part) + ends[:, link + 1, :, None] * part
         naive = np.hypot(*(points - ends[:, end, :, None])).min(axis=1)
         assert np.sqrt(square_distance(body, angles, end, link)[0]) == pytest.approx(naive, abs=0.35 / 2000)
+
+
+def test_what_a_search_bounds_is_to_first_order_the_width_that_is_lacking():
+    body = Chain((0.2, 0.35, 0.15, 0.3), width=0.05)
+    angles = np.random.default_rng(7).uniform(-np.pi, np.pi, (3, 4000))
+    checked = 0
+    for end, link in ends_and_links(body):
+        lacks = body.width - np.sqrt(square_distance(body, angles, end, link)[0])
+        near = np.abs(lacks) < 2e-3
+        np.testing.assert_allclose(excess(body, angles, end, link)[0, near], lacks[near], atol=2e-3**2 / 0.05)
+        checked += near.sum()
+    assert checked > 50
 
 
 @pytest.mark.parametrize("width", [0.01, 0.03, 0.2])

@@ -59,6 +59,35 @@ def test_a_ridge_has_the_same_gradients_and_is_no_minimum():
     assert stationarity_around(ridge, ZERO, at, 1e-6) is at
 
 
+def test_a_kink_from_which_one_way_leads_down_is_no_minimum_either():
+    """Up by twice as much as down: the gradients of the four sides cancel all the same."""
+
+    class Saddle(Pieces):
+        def objective(self, v):
+            return float(abs(v[0]) - 0.5 * abs(v[1]))
+
+        def gradient(self, v):
+            return np.array([1.0, -0.5]) * np.where(v < 0, -1.0, 1.0)
+
+    at = stationarity(saddle := Saddle([(1, 0)]), ZERO)
+    assert stationarity_around(saddle, ZERO, at, 1e-6, points=16) is at
+
+
+def test_no_gradient_is_asked_for_beyond_the_bounds():
+    """As of a square root at 0: there is nothing on the other side."""
+
+    class Root(Pieces):
+        def objective(self, v):
+            assert (v >= self.lower).all()
+            return float(np.sqrt(v[0] + 1.0) + abs(v[1]))
+
+        def gradient(self, v):
+            assert (v >= self.lower).all()
+            return np.array([1.0, 1.0 if v[1] >= 0 else -1.0])
+
+    assert around(Root([(1, 0)]), np.array([-1.0, 0.0]), points=16).kkt_error < 2e-6
+
+
 def test_a_kink_farther_away_than_the_radius_does_not_count():
     beside = np.array([1e-3, 0.0])
     assert around(Pieces([(1, 0), (-1, 0)]), beside).kkt_error > 0.9

@@ -21,10 +21,11 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.motion_frames import frames
+from colloc.pictures.motion_frames import frames, lab_outline
 from colloc.pictures.report_page import PLAIN, environment, report_page
 from colloc.pictures.style import INK
 from colloc.results import certificate
+from colloc.results.certificate import certify
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
 from colloc.results.store import save
@@ -205,7 +206,57 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     # points only, between them z is interpolated: hence the loose bound on a mesh of eight intervals
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
-    np.testing.assert_allclose(shown.step, shown.centre[:, -1] - shown.centre[:, 0])
+
+
+@pytest.fixture(scope="module")
+def turning(unsolved):
+    """A gait that turns, asked for the angle by which it does, with a replay; not an optimum."""
+    guess = Fourier(mean=[0.5, 0.9], cos=[[1.0], [0.2]], sin=[[0.0], [1.1]])
+    free = unsolved(crawler(3, rotation=None, guess=guess, intervals=40, mesh_tolerance=0))
+    assert abs(free.rotation) > 0.1
+    asked = replace(free, problem=free.problem.with_(rotation=free.rotation))
+    return replace(asked, certificate=certify(asked))
+
+
+def test_periods_of_a_turning_gait_are_drawn_one_after_the_other_as_it_turns(turning):
+    shown = frames(turning, count=25, periods=4)
+    for period, before in enumerate(shown.before):
+        motion = turning.sample(period + shown.t)
+        outline = lab_outline(turning.problem.body, motion.angles, motion.theta, motion.tail)
+        np.testing.assert_allclose(before.of(shown.ends), outline, atol=1e-12)
+        np.testing.assert_allclose(before.of(shown.centre), motion.centre, atol=1e-12)
+
+
+def test_the_page_of_a_turning_gait_states_angle_and_radius_and_claims_no_straight_way(turning):
+    text = re.sub(r"\s+", " ", " ".join(outline(report_page(turning)).text))
+    words = f"turns {abs(np.degrees(turning.rotation)):.4g}° "
+    assert f"{np.degrees(turning.rotation):+.2f}° turned a cycle" in text
+    assert f"{turning.turning_radius:.4g} radius of the circle it crawls" in text
+    assert words in text
+    assert "turned by the angle that was asked for" in text
+    assert "straight" not in text
+    assert words in " ".join(outline(turning._repr_html_()).text)
+    assert turning.to_xarray().attrs["turning_radius"] == turning.turning_radius
+
+
+@needs_browser
+def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path):
+    tell = """<script>
+      const seen = [], arc = CanvasRenderingContext2D.prototype.arc, slider = document.getElementById("phase");
+      CanvasRenderingContext2D.prototype.arc = function (x, y, ...rest) { seen.push([x, y]); arc.call(this, x, y, ...rest); };
+      for (const place of [100, 500, 900]) { slider.value = place; slider.dispatchEvent(new Event("input")); }
+      document.documentElement.dataset.seen = JSON.stringify(seen);
+    </script></body>"""
+    result = browsed(report_page(turning).replace("</body>", tell), tmp_path)
+    seen = np.array(json.loads(unescape(re.search('data-seen="([^"]*)"', result.stdout).group(1))))
+    motion = turning.sample(np.array([0.3, 1.5, 2.7]))
+    joints = lab_outline(turning.problem.body, motion.angles, motion.theta, motion.tail)[:, 1:]  # hinges, then the head
+    x, y = np.concatenate([joints, motion.centre[:, None]], axis=1).transpose(0, 2, 1).reshape(2, -1)
+    one, none = np.ones_like(x), np.zeros_like(x)
+    rows = np.concatenate([np.stack([x, one, none]), np.stack([-y, none, one])], axis=1).T
+    pixels = seen.T.ravel()
+    fitted = rows @ np.linalg.lstsq(rows, pixels, rcond=None)[0]  # a scale and a shift of the canvas, the same for all
+    np.testing.assert_allclose(pixels, fitted, atol=1.0)
 
 
 def test_the_dot_of_a_plane_is_placed_in_the_coordinates_of_its_picture(unsolved):
@@ -233,24 +284,29 @@ def test_the_command_writes_the_page_beside_the_result(three_link, tmp_path, cap
     assert main([str(tmp_path / "none.h5")]) == 2
 
 
-@needs_browser
-def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
-    page = tmp_path / "page.html"
-    # frames by the clock: a browser without a screen may draw none before it is done
-    clock = "<script>window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 16);</script></head>"
-    page.write_text(report_page(three_link).replace("</head>", clock), encoding="utf-8")
+def browsed(page, folder):
+    """What a browser makes of a page: its document as standard output, its complaints as standard error."""
+    file = folder / "page.html"
+    file.write_text(page, encoding="utf-8")
     options = "headless no-sandbox disable-gpu disable-quic no-first-run disable-background-networking disable-component-update"
     command = [
         BROWSER,
         *(f"--{option}" for option in options.split()),
         "--disable-sync",
-        f"--user-data-dir={tmp_path / 'profile'}",
+        f"--user-data-dir={folder / 'profile'}",
         "--enable-logging=stderr",
         "--virtual-time-budget=1500",
         "--dump-dom",
-        f"file://{page}",
+        f"file://{file}",
     ]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+
+
+@needs_browser
+def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
+    # frames by the clock: a browser without a screen may draw none before it is done
+    clock = "<script>window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 16);</script></head>"
+    result = browsed(report_page(three_link).replace("</head>", clock), tmp_path)
     assert "CONSOLE" not in result.stderr, [line for line in result.stderr.splitlines() if "CONSOLE" in line]
     assert 'data-ready="yes"' in result.stdout
     phase = float(re.search(r"t = ([0-9.]+)</output>", result.stdout).group(1))

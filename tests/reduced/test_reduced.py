@@ -49,6 +49,13 @@ def near_start(case, shake=1e-2):
     return space, v, ReducedProgram(space, DELTA)
 
 
+def test_least_values_and_the_rotation_are_asked_for_as_they_are_stated():
+    stated = Problem("p", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.3, at_least={"distance": 0.21, "-work": -0.4})
+    program = ReducedProgram(space_near(stated, stated.guess)[0], DELTA)
+    np.testing.assert_array_equal(program.row_lower[:3], [0.3, 0.21, -0.4])
+    np.testing.assert_array_equal(program.row_upper[:3], [0.3, np.inf, np.inf])
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_gradients_are_those_of_differences(case):
     space, v, program = near_start(case)

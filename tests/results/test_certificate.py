@@ -8,19 +8,22 @@ import pytest
 
 from colloc.commands.verify import main as recheck
 from colloc.gaits.free_path import ArcPath, FreePath
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.problem import Problem
+from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.reduced import second_order
 from colloc.reduced.second_order import Curvature
 from colloc.results import certificate as verify
 from colloc.results import measured
-from colloc.results.certificate import _one_motion, certify
+from colloc.results.certificate import _one_motion, certify, gait_certificate
 from colloc.results.checks import Check
 from colloc.results.measured import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.verification.replay import replay
+from colloc.verification.slope import slope_motion
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05
 
@@ -117,10 +120,11 @@ def test_collocated_against_replayed_efficiency(failures, three_link, replays, s
     judged("replay gap", run)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("joint", [0, 1])
-def test_closure(failures, three_link, monkeypatch, joint):
-    """One joint that does not come back is enough."""
-    path, astray = Fourier.__call__, np.eye(2)[:, [joint]]
+def test_closure(failures, three_link, monkeypatch, joint, sign):
+    """One joint that does not come back is enough, to whichever side it drifts."""
+    path, astray = Fourier.__call__, sign * np.eye(2)[:, [joint]]
 
     def run(f):
         def drifting(gait, t):
@@ -140,6 +144,31 @@ def test_joint_limits_are_those_of_the_problem(failures, three_link):
         return failures(Solution(three_link.problem.with_(joint_limit=largest - f * 1e-6), three_link.levels))
 
     judged("joint limits", run)
+
+
+def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(failures, three_link, replays):
+    """The replay's distance counts: a problem that asks for as much has it, and one that asks for more does not."""
+    there = replays[max(replays)].distance
+
+    def run(f):
+        asked = three_link.problem.with_(at_least={"distance": there / (1 - f * 1e-4)})
+        return failures(Solution(asked, three_link.levels))
+
+    judged("least distance", run)
+    assert run(-1.0) == run(0.0) == set()
+
+
+@pytest.mark.parametrize(("part", "passes"), [(-1.15, False), (0.85, True), (1.15, False)])
+def test_a_way_on_a_slope_may_lead_off_by_a_thousandth_of_a_radian(part, passes):
+    """Where the gait goes is known from another integration; it is asked to go beside that."""
+    gait = PointedSeries(*(getattr(ellipse(0, 2.8, 1.3), name) for name in ("mean", "cos", "sin")), 0.7)
+    ran = slope_motion(Chain(), Friction(), gait, 1e-2, 0.1, tolerance=1e-3)
+    goes = np.arctan2(ran.aside[0], ran.climb[0])
+    asked = {"delta": 1e-2, "grade": 0.1, "towards": goes + part * 1e-3}
+    found = gait_certificate(Problem("aside", gait=Harmonic(1), **asked), gait, 1e-2, np.empty(0), tolerance=1e-3)
+    (check,) = (check for check in found.checks if check.name == "direction")
+    assert check.passed == passes
+    assert check.value == pytest.approx(-part * 1e-3, abs=1e-4)
 
 
 @pytest.mark.parametrize("depth", ["crossing_depth", "passing_depth"])
@@ -230,6 +259,9 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
     found = extrapolated_limit(linear, [0.0, 0.0, 0.0])
     assert found.value == pytest.approx(0.25, abs=1e-15)
     assert found.error == pytest.approx(3e-4, rel=1e-9)
+    # other parts may hide the linear one in the last change, never by chance in both: what it leaves there is allowed for
+    hidden = extrapolated_limit([0.25 + 3.0 * 1e-2, 0.25 + 3.0 * 1e-3, 0.25 + 3.0 * 1e-3], [0.0, 0.0, 0.0])
+    assert hidden.error == pytest.approx(3.0 * 1e-4, rel=1e-9)
     # the last value is moved by a ninth of the last change: so is what it may be wrong by
     errors = [7e-3, 9e-4, 2e-4]
     assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12)
@@ -256,6 +288,8 @@ def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch
     known, fine = certify(three_link), replays[max(replays)]
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
+    # a point at the end of the longest lever goes by so much less or more
+    assert known.distance_error == pytest.approx(fine.distance_error + 3e-5 * fine.lever, rel=1e-9)
 
 
 def test_files_without_an_error_of_the_limit_are_read(three_link, tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Harmonic, ellipse
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
 from colloc.mechanics.balance import instant
@@ -84,6 +84,50 @@ def test_headings_a_turn_further_are_those_of_the_same_motion(unsolved):
     np.testing.assert_allclose(after.theta, before.theta + 2 * np.pi, atol=1e-12)
     np.testing.assert_allclose(after.centre, before.centre, atol=1e-12)
     np.testing.assert_allclose(after.tail, before.tail, atol=1e-12)
+
+
+@pytest.fixture
+def turning(unsolved):
+    """A gait that turns the body, in balance; not an optimum."""
+    guess = Fourier(mean=[0.5, 0.9], cos=[[1.0], [0.2]], sin=[[0.0], [1.1]])
+    return unsolved(Problem("circle", guess, gait=Harmonic(1), rotation=None, delta=0.3, delta_start=0.3, intervals=80))
+
+
+def test_a_gait_that_turns_moves_on_from_where_a_period_left_it(turning):
+    assert abs(turning.rotation) > 0.1
+    # what the tail velocity says adds up to the pose across the ends of periods, also of those before the first
+    t = np.linspace(-1.3, 2.4, 3701)
+    motion, dt = turning.sample(t), t[1] - t[0]
+    along, across, omega = motion.z
+    c, s = np.cos(motion.theta), np.sin(motion.theta)
+    for pose, rate in (
+        (motion.theta, omega),
+        (motion.tail[0], c * along - s * across),
+        (motion.tail[1], s * along + c * across),
+    ):
+        travelled = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
+        np.testing.assert_allclose(pose - pose[0], travelled, atol=3e-5)
+    assert motion.theta[2300] - motion.theta[1300] == pytest.approx(turning.rotation, abs=1e-12)
+
+
+def test_the_centre_of_mass_goes_round_a_circle_of_the_radius_that_is_stated(turning):
+    ends = turning.sample(np.arange(60.0)).centre
+    middle = _centre_of_circle(*ends[:, :3].T)
+    np.testing.assert_allclose(np.hypot(*(ends - middle[:, None])), turning.turning_radius, rtol=1e-7)
+    np.testing.assert_allclose(np.hypot(*np.diff(ends)), turning.distance, rtol=1e-6)
+    assert f"turns {abs(np.degrees(turning.rotation)):.4g}°" in turning.turning
+
+
+def test_a_gait_that_is_asked_to_crawl_straight_does(three_link):
+    assert three_link.turning_radius == np.inf
+    assert three_link.turning == ""
+    assert abs(three_link.rotation) < 1e-6
+
+
+def _centre_of_circle(a, b, c):
+    """The point as far from a as from b and c."""
+    rows = 2 * np.array([b - a, c - a])
+    return np.linalg.solve(rows, [b @ b - a @ a, c @ c - a @ a])
 
 
 def _smooth(symmetry):

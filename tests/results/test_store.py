@@ -19,6 +19,8 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
     assert again.certificate == three_link.certificate
     assert again.source == three_link.source
     assert len(again.levels) == len(three_link.levels)
+    assert again.starts == three_link.starts > 1
+    assert [other.value for other in again.others] == [other.value for other in three_link.others]
     np.testing.assert_array_equal(again.last.x, three_link.last.x)
     t = np.linspace(0, 2, 11)
     np.testing.assert_array_equal(again.sample(t).tail, three_link.sample(t).tail)

@@ -131,7 +131,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     assert (tmp_path / "paper.csv").read_text().count("coordinate_3_rad") == 2
     assert "the same optimum" in capsys.readouterr().out
     dataset = solution.to_xarray()
-    assert dict(dataset.sizes) == {"t": 401, "joint": 3, "velocity": 3, "axis": 2}
+    assert dict(dataset.sizes) == {"t": 401, "coordinate": 3, "velocity": 3, "axis": 2}
     ahead = dataset.centre.isel(t=-1) - dataset.centre.isel(t=0)
     assert float(ahead.sel(axis="x")) == pytest.approx(solution.distance, rel=1e-9)
 

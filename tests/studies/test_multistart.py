@@ -322,6 +322,9 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert summary["starts"] == 4
     assert sum(summary["counts"].values()) == 4
     assert summary["optima"][0]["efficiency"] >= 0.2 - 1e-12
+    # of fewer starts than are there so many count as were asked for
+    assert multistart.main([str(path), "--starts", "3", "--output", str(out)]) == 0
+    assert "3 starts done already, 0 to go" in capsys.readouterr().out
     # another seed joins the same archive, and says what else is there
     assert multistart.main([str(path), "--starts", "2", "--seed", "1", "--output", str(out / "quick.starts.h5")]) == 0
     assert asked == [2, 3, 0, 1]

@@ -159,6 +159,20 @@ def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
         pass
 
 
+def test_a_lock_keeps_other_processes_out_until_its_holder_lets_go(tmp_path):
+    def attempt():
+        try:
+            with locked(tmp_path / "lock"):
+                return 20
+        except StoreError as refused:
+            return 10 if f"in use by process {os.getppid()} on" in str(refused) else 0
+
+    with locked(tmp_path / "lock"):
+        assert in_child(attempt) == 10
+    assert in_child(attempt) == 20
+    assert [path.name for path in tmp_path.iterdir()] == ["lock"]
+
+
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="two users need the superuser")
 def test_two_users_go_on_from_each_other_in_a_folder_of_their_group(tmp_path, tmp_path_factory):
     folder, group = tmp_path / "shared", 60_000

@@ -8,6 +8,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.verification.followed_motion import BACKWARDS, FORWARDS, followed_motion
 from colloc.verification.replay import replay
 
@@ -41,6 +42,15 @@ def test_equal_coefficients_leave_nothing_open():
     forwards, backwards = (replay(BODY, Friction(), random_path(1), 1e-4, sense=s) for s in (FORWARDS, BACKWARDS))
     assert forwards == backwards
     assert forwards.several == forwards.ambiguity == 0
+
+
+def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
+    """Panels count as at the worse of their ends, so a little more; and never more than all of it."""
+    friction, path, t = Friction(100, 1, 1), random_path(3), (np.arange(2000) + 0.5) / 2000
+    several = (all_balanced_velocities(BODY, friction, *path(t), 1e-4).number > 1).mean()
+    found = replay(BODY, friction, path, 1e-4, instants=1600, most_instants=1600)
+    assert 0.02 < several <= found.several + 1e-3
+    assert found.several < several + 0.005
 
 
 @pytest.mark.parametrize("sense", [FORWARDS, BACKWARDS])

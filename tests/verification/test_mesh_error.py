@@ -11,6 +11,7 @@ from colloc.collocation.layout import problem_mesh
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
@@ -142,6 +143,51 @@ def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     z = solve_balance(stated.body, friction, angles, rates, DELTA).z
     slow = np.abs(instant(stated.body, friction, angles, rates, z, DELTA).velocity.vs).min(axis=0)
     assert (slow < 30 * DELTA).all()
+
+
+def test_a_kink_is_found_where_the_body_comes_to_rest():
+    """One joint that swings to and fro: everything rests where it turns back."""
+    body, friction, turns = Chain((0.4, 0.6)), Friction(1, 1, 3), np.array([0.1234, 0.6234])
+
+    def swinging(t):
+        phase = 2 * np.pi * (t - turns[0])
+        return 1.2 + 0.8 * np.cos(phase)[None], -1.6 * np.pi * np.sin(phase)[None]
+
+    fine = fine_motion(body, friction, swinging, 1e-4, np.linspace(0, 1, 41), 1e-6)
+    np.testing.assert_allclose(kink_phases(body, friction, swinging, 1e-4, fine), turns, atol=1e-6)
+
+
+@pytest.mark.parametrize(("least", "counts"), [(2.0, True), (5.0, False)])
+def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts):
+    """One joint that slows down to a rate at which some point of the links moves at 17 delta, or at 43."""
+    body, friction, delta = Chain((0.4, 0.6)), Friction(), 1e-3
+
+    def slowing(t):
+        late = t - 0.25
+        return (0.3 + least * late + 2000 * late**3 / 3)[None], (least + 2000 * late**2)[None]
+
+    at = slowing(np.array([0.25]))
+    slow = body.slowness(friction, *at, delta, body.solve(friction, *at, delta).z).min() / delta
+    assert slow == pytest.approx(8.55 * least, rel=0.01)
+    fine = fine_motion(body, friction, slowing, delta, np.linspace(0, 0.5, 21), 1e-6)
+    near = np.abs(kink_phases(body, friction, slowing, delta, fine) - 0.25) < 0.01
+    assert near.any() == counts
+
+
+@pytest.mark.parametrize(
+    ("rule", "friction", "held"),
+    [
+        ("radau-3", Friction(1.7, 1, 1.3), False),
+        ("radau-3", Friction(), True),
+        ("gauss-3", Friction(1.7, 1, 1.3), True),
+    ],
+)
+def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(rule, friction, held, monkeypatch):
+    """Schemes with nodes at the ends of an interval would have one there, and the efficiency a kink in the gait."""
+    stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
+    monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.array([kink]))
+    plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, 1e-4)
+    assert (kink in plan.edges) == held
 
 
 def test_knots_move_onto_kinks_and_keep_the_rest():

@@ -54,6 +54,21 @@ def test_the_stated_error_holds_against_another_quadrature(seed):
         assert result.rotation == pytest.approx(fine.theta[-1], abs=result.error)
 
 
+class Roughly(Chain):
+    """Three links whose balance is known to leave nine tenths of what a replay is allowed."""
+
+    def replayed(self, *arguments):
+        motion, left = super().replayed(*arguments)
+        return motion, left + 0.9e-4
+
+
+def test_what_the_balance_leaves_over_is_part_of_the_error_that_is_asked_for():
+    gait = ellipse(0.0, 2.8, 1.3)
+    found = replay(Roughly(), Friction(), gait, 1e-3, instants=40, tolerance=1e-4)
+    assert 0.9e-4 < found.error <= 1e-4
+    assert found.instants > replay(Chain(), Friction(), gait, 1e-3, instants=40, tolerance=1e-4).instants
+
+
 def test_panels_gather_at_kinks():
     body, friction, path = random_path(0)
     loose, tight = (replay(body, friction, path, 1e-4, instants=400, tolerance=tol) for tol in (1e-4, 1e-8))

@@ -57,6 +57,14 @@ def test_stated_errors_cover_a_kink_wherever_it_lies(share):
     assert np.median(np.array(stated) / true) < 8
 
 
+def test_what_smooth_motion_would_leave_is_stated_even_where_nothing_changes_by_accident():
+    """A rule of fourth order leaves a fifteenth of a sixteenth of the change on the panel twice as wide, on both halves; and a
+    kink a quarter of each change."""
+    nothing, wide = np.zeros((1, 5)), np.ones((1, 5))
+    assert left_over(nothing, nothing, wide).min() >= 1 / (2 * 16 * 15)
+    np.testing.assert_allclose(left_over(wide, wide, wide), 1 / 3)
+
+
 def test_corners_are_not_taken_for_kinks():
     """On both sides of a jump the power is linear: nothing is left, though the instants beside it do not fit."""
     assert stated_work(panels_of(lambda t: np.where(t < 0.5, 1 + t, 3 - t), corner=0.5)) < 1e-14
@@ -79,10 +87,12 @@ def test_halves_carry_on_and_know_what_halving_their_panel_changed():
     np.testing.assert_allclose(changed[:, WORK].sum(), 15 * abs(increments(WHOLE, panels, 1)[2].sum() - np.e + 1), rtol=0.01)
 
 
-def test_changes_are_those_of_the_distance_when_one_panel_is_halved():
-    """The rest of the path turns with the panel."""
+@pytest.mark.parametrize("steady", [False, True])
+def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
+    """The rest of the path turns with the panel, which is all that changes where a panel goes straight on at one speed."""
     rng, n = np.random.default_rng(3), 8
     z, centre = rng.normal(size=(n, 5, 3)), rng.normal(size=(n, 5)) + 1j * rng.normal(size=(n, 5))
+    centre[:] = centre[:, :1] if steady else centre
     z[..., 2] *= 1e-3  # to first order in the turn
     values = [rng.uniform(1, 2, (n, 5)) for _ in range(6)]
     panels = Panels(
@@ -97,7 +107,7 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved():
         turn, move = twice[0].copy(), twice[1].copy()
         turn[k], move[k] = once[0][k], once[1][k]
         change = abs(distance(turn, move) - distance(*twice[:2]))
-        assert changes(panels)[0][k, 1] == pytest.approx(change, rel=1e-3, abs=1e-9)
+        assert changes(panels)[0][k, 1] == pytest.approx(change, rel=3e-2 if steady else 1e-3, abs=1e-9)
 
 
 OPTIMA = {

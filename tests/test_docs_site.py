@@ -1,0 +1,55 @@
+"""The site of the documentation: what its hooks make of a page."""
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("mkdocs")
+pytest.importorskip("latex2mathml")
+from scripts import docs_site
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def shown(markdown, page="tutorial.md"):
+    """A page after both of its hooks."""
+    stated = SimpleNamespace(file=SimpleNamespace(src_uri=page), meta={})
+    return docs_site.on_page_content(docs_site.on_page_markdown(markdown, stated, None, None), stated, None, None)
+
+
+@pytest.mark.parametrize(
+    ("link", "page", "becomes"),
+    [
+        ("[a](notebook.ipynb)", "tutorial.md", "[a](notebook.md)"),
+        ("[a](notebook.ipynb)", "notebook.md", "[a](notebook.ipynb)"),
+        ("[a](../problems)", "index.md", "[a](gallery.md)"),
+        ("[a](../../colloc/__init__.py)", "howto/scripts.md", "[a](../api.md)"),
+        ("[a](../limits.md#files)", "howto/check.md", "[a](../limits.md#files)"),
+        ("![a](../../results/curated/x.png)", "howto/report.md", "![a](../curated/x.png)"),
+        ("[a](../results/curated/gallery.json)", "known.md", "a (`results/curated/gallery.json`)"),
+        ("[`kernel.c`](../colloc/mechanics/native/kernel.c)", "known.md", "`colloc/mechanics/native/kernel.c`"),
+        ("[a](https://example.org/x)", "known.md", "[a](https://example.org/x)"),
+        ("[a](#files)", "limits.md", "[a](#files)"),
+    ],
+)
+def test_a_link_of_the_repository_leads_to_the_page_that_shows_it(link, page, becomes):
+    assert shown(link, page) == becomes
+
+
+def test_what_stands_for_files_are_pages_that_are_made():
+    assert set(docs_site.SHOWN.values()) <= set(docs_site.GENERATED)
+    assert all((ROOT / file).exists() for file in docs_site.SHOWN)
+
+
+def test_a_long_formula_scrolls_in_its_own_line_and_one_in_a_text_stays_there():
+    alone, inside = shown("```math\nx_1 + y_1\n```"), shown("so $`x_1`$ is")
+    assert re.search(r'<span style="display: block; overflow-x: auto"><math [^>]*display="block".*</math></span>', alone)
+    assert "overflow" not in inside
+    assert inside.startswith("so <math")
+
+
+def test_the_site_is_dark_where_the_reader_s_system_is():
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert re.search(r"prefers-color-scheme: dark\)\"\n\s+scheme: slate", text)
