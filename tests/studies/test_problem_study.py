@@ -160,6 +160,9 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     # the cell that never converges is walked around
     assert np.isnan(final[2, 1])
     assert np.sum(final > 0.3) == 11
+    tried, certified = (study_table(run).variables[name] for name in ("starts", "starts_certified"))
+    assert certified[2, 1] == 0 < tried[2, 1]
+    assert (np.delete(certified.ravel(), 7) == np.delete(tried.ravel(), 7)).all()
     assert not study_table(run).variables["below_neighbour"].any()
 
 
