@@ -98,6 +98,11 @@ def test_gaits_are_compared_modulo_mirror_and_the_end_that_is_named_first():
     assert compare.gait_distance(found(Chain(), *parts), found(uneven, *parts)) is None
 
 
+def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three_link):
+    fast = replace(three_link, problem=three_link.problem.with_(objective="speed"))
+    assert compare.verdict(three_link, fast) == (False, "other objectives: efficiency and speed.")
+
+
 def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_path, capsys):
     offset = solved("three_link_offset")[0]
     a, b = save(three_link, tmp_path / "a.h5"), save(offset, tmp_path / "b.h5")
