@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -13,6 +14,8 @@ import pytest
 from colloc.commands import compare, export
 from colloc.commands import verify as recheck
 from colloc.commands.main import SUBCOMMANDS, main
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.chain import Chain
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
@@ -122,6 +125,27 @@ def test_path_distance_of_circles_and_insensitivity_to_start_pacing_and_directio
 def test_a_path_that_lies_on_a_part_of_another_is_not_the_same_whichever_is_named_first():
     short, long = (np.array([[0.0, reach], [0.0, 0.0]]) for reach in (1.0, 3.0))
     assert compare.path_distance(short, long) == compare.path_distance(long, short) == pytest.approx(2.0)
+
+
+def test_gaits_are_compared_modulo_mirror_and_the_end_that_is_named_first():
+    gait, uneven = Fourier([0.3, -0.1], [[1.0], [0.2]], [[0.1], [0.8]]), Chain((0.2, 0.5, 0.3))
+
+    def found(body, *parts):
+        return SimpleNamespace(problem=SimpleNamespace(body=body), gait=Fourier(*parts))
+
+    parts = gait.mean, gait.cos, gait.sin
+    for sign in (1, -1):
+        for order in (1, -1):
+            image = [sign * part[::order] for part in parts]
+            assert compare.gait_distance(found(Chain(), *parts), found(Chain(), *image)) < 1e-4
+            apart = compare.gait_distance(found(uneven, *parts), found(uneven, *image))
+            assert (apart < 1e-4) == (order == 1)
+    assert compare.gait_distance(found(Chain(), *parts), found(uneven, *parts)) is None
+
+
+def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three_link):
+    fast = replace(three_link, problem=three_link.problem.with_(objective="speed"))
+    assert compare.verdict(three_link, fast) == (False, "other objectives: efficiency and speed.")
 
 
 def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_path, capsys):
