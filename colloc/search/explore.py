@@ -28,8 +28,7 @@ from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_about, space_near
 from colloc.results.answer import Alternative
-from colloc.results.distinct_optima import fourier_series
-from colloc.results.equivalence import SAME_VALUE, are_one
+from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, as_it_is, converged
 from colloc.search.descend import FACTOR, descend, is_viscous, levels
 from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum

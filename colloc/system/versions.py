@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import platform
-from importlib import metadata
 
 
 def version_of(library: str) -> str:
     """Version of an installed library, or that it is a source tree which nobody installed."""
+    from importlib import metadata  # takes longer than all of the face
+
     try:
         return metadata.version(library)
     except metadata.PackageNotFoundError:

@@ -1,16 +1,22 @@
 """Results are rechecked without CasADi and compared as paths; tampering and differences show."""
 
+import dataclasses
 import json
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
-from colloc.commands import compare
+from colloc.commands import compare, export
 from colloc.commands import verify as recheck
 from colloc.commands.main import SUBCOMMANDS, main
+from colloc.gaits.harmonic import Fourier
+from colloc.mechanics.chain import Chain
+from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 
@@ -55,6 +61,48 @@ def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp
     assert "NOT CERTIFIED" in capsys.readouterr().out
 
 
+NUMBERS = [f.name for f in dataclasses.fields(Certificate) if f.name not in ("checks", "instants", "driven_work")]
+
+
+def by_another_program(path, change):
+    """Change the certificate of a result as anybody can."""
+    with h5py.File(path, "r+") as file:
+        change(file["certificate"])
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_every_number_of_a_certificate_is_held_against_a_new_one(name, three_link, tmp_path, capsys):
+    path = save(three_link, tmp_path / "x.h5")
+    by_another_program(path, lambda group: group.attrs.modify(name, 0.01 + 1.01 * group.attrs[name]))
+    assert recheck.main([str(path), "--json"]) == 4
+    told = json.loads(capsys.readouterr().out)
+    assert told["complaint"].startswith("the file certifies ")
+    assert export.main([str(path), "--period", "4"]) == 2
+    assert f"cannot be trusted: {told['complaint']}" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
+
+
+def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_path, capsys):
+    checks = three_link.certificate.checks
+    lax = tuple(replace(check, threshold=1.0) if check.name == "second order" else check for check in checks)
+    for other, said in ((lax, "allows 1e+00 for the check 'second order'"), (checks[:-1], "has not the checks of a new one")):
+        file = save(changed(three_link, certificate=replace(three_link.certificate, checks=other)), tmp_path / "x.h5")
+        assert recheck.main([str(file), "--json"]) == 4
+        assert said in json.loads(capsys.readouterr().out)["complaint"]
+
+
+def test_a_result_that_was_only_opened_is_still_exported(three_link, tmp_path, capsys):
+    path = save(three_link, tmp_path / "x.h5")
+    by_another_program(path, lambda group: None)
+    assert export.main([str(path), "--period", "4"]) == 0
+    assert (tmp_path / "x.csv").exists()
+
+
+def test_an_absurd_number_of_instants_in_a_file_costs_no_memory(three_link):
+    boast = replace(three_link.certificate, instants=10**12)
+    assert recheck.rechecked(changed(three_link, certificate=boast)).certificate.instants < 10**6
+
+
 def test_verify_refuses_what_is_no_result(tmp_path, capsys):
     (tmp_path / "x.h5").write_text("nothing")
     assert recheck.main([str(tmp_path / "x.h5")]) == 2
@@ -76,6 +124,27 @@ def test_path_distance_of_circles_and_insensitivity_to_start_pacing_and_directio
 def test_a_path_that_lies_on_a_part_of_another_is_not_the_same_whichever_is_named_first():
     short, long = (np.array([[0.0, reach], [0.0, 0.0]]) for reach in (1.0, 3.0))
     assert compare.path_distance(short, long) == compare.path_distance(long, short) == pytest.approx(2.0)
+
+
+def test_gaits_are_compared_modulo_mirror_and_the_end_that_is_named_first():
+    gait, uneven = Fourier([0.3, -0.1], [[1.0], [0.2]], [[0.1], [0.8]]), Chain((0.2, 0.5, 0.3))
+
+    def found(body, *parts):
+        return SimpleNamespace(problem=SimpleNamespace(body=body), gait=Fourier(*parts))
+
+    parts = gait.mean, gait.cos, gait.sin
+    for sign in (1, -1):
+        for order in (1, -1):
+            image = [sign * part[::order] for part in parts]
+            assert compare.gait_distance(found(Chain(), *parts), found(Chain(), *image)) < 1e-4
+            apart = compare.gait_distance(found(uneven, *parts), found(uneven, *image))
+            assert (apart < 1e-4) == (order == 1)
+    assert compare.gait_distance(found(Chain(), *parts), found(uneven, *parts)) is None
+
+
+def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three_link):
+    fast = replace(three_link, problem=three_link.problem.with_(objective="speed"))
+    assert compare.verdict(three_link, fast) == (False, "other objectives: efficiency and speed.")
 
 
 def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_path, capsys):

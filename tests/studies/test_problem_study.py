@@ -160,6 +160,9 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     # the cell that never converges is walked around
     assert np.isnan(final[2, 1])
     assert np.sum(final > 0.3) == 11
+    tried, certified = (study_table(run).variables[name] for name in ("starts", "starts_certified"))
+    assert certified[2, 1] == 0 < tried[2, 1]
+    assert (np.delete(certified.ravel(), 7) == np.delete(tried.ravel(), 7)).all()
     assert not study_table(run).variables["below_neighbour"].any()
 
 
@@ -215,6 +218,11 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     assert abs(exact.rotation) > 0.01
     sure = (exact.distance - 0.5 * abs(exact.rotation)) / exact.work
     assert study_cell.value_as_it_is(stated, gait) == pytest.approx(max(sure, 0.0), abs=1e-3 * exact.efficiency)
+    # where it could add all of it nothing counts, not even by the square of what is less than nothing
+    turning = Fourier([0.6, 0.6], [[0.5], [-0.3]], [[0.1], [0.5]])
+    turned = replay(stated.body, stated.friction, turning, stated.delta, instants=200, tolerance=1e-3)
+    assert 0.5 * abs(turned.rotation) > turned.distance > 0.01
+    assert study_cell.value_as_it_is(stated.with_(objective="towing"), turning) == 0.0
     closed = study_cell.member(stated, gait)
     again = replay(stated.body, stated.friction, lambda t: (closed.angles(t), closed.rates(t)), stated.delta)
     assert abs(again.rotation) < 1e-4

@@ -33,6 +33,7 @@ def test_the_line_says_what_and_how_long_and_vanishes():
     printed = stream.getvalue()
     assert "solving   0 s, about 20 s left" in printed
     assert "drawing   0 s" in printed
+    assert printed.count(" left") == printed.count("about 20 s left")  # nothing is foretold of the drawing
     assert printed.endswith(WIPED)
 
 
