@@ -55,12 +55,12 @@ def solved(once):
 
         stated = read_problem_file(ROOT / "problems" / f"{name}.py")
 
-        def solve():
+        def make():
             solution = solve(stated.problem, stated.starts or STARTS)
             solution.source = stated.source
             return solution
 
-        return once(name, solve), stated.reference
+        return once(name, make), stated.reference
 
     return result
 
@@ -72,22 +72,14 @@ def three_link(solved):
 
 @pytest.fixture(scope="session")
 def unsolved():
-    """A function from a problem to a solution whose one level is the guess, in balance but not optimal."""
+    """A function from a problem to a solution whose answer is the guess, in balance but not optimal."""
     return guess_in_balance
 
 
 def guess_in_balance(problem):
-    from colloc.collocation.transcription import transcribe
-    from colloc.collocation.warm_start import feasible_point
-    from colloc.results.answer import Level
+    from colloc.reduced.spaces import space_about
     from colloc.results.solution import Solution
-    from colloc.verification.replay import replay
+    from colloc.search.confirm import unconfirmed
+    from colloc.search.converge import as_it_is
 
-    transcription = transcribe(problem)
-    x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
-    gait = problem.guess
-    fine = replay(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta, instants=200)
-    zero = np.zeros(transcription.assembly.m)
-    edges, measured = transcription.mesh.edges, (fine.efficiency, fine.distance, fine.work)
-    level = Level(problem.delta, edges, x, 0 * x, zero, *measured, 1.0, 1.0, 0.0, "guess", False, 0, 0.0, 0.0)
-    return Solution(problem, [level], message="only a guess.")
+    return Solution(problem, unconfirmed(as_it_is(*space_about(problem, problem.guess), problem.delta)), message="only a guess.")

@@ -28,7 +28,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import heading, space_near, transcribed
 from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
-from colloc.search.converge import NOT_STATIONARY, STATIONARY
+from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
 from colloc.search.ipopt import NlpResult, Solver
 from colloc.search.optimum import Optimum
@@ -88,19 +88,20 @@ def confirm(optimum: Optimum) -> Answer:
     begin = time.perf_counter()
 
     def compute() -> Answer:
-        reduced = optimum.program()
-        conditions = stationarity(reduced, optimum.v)
-        outcome = _outcome(optimum, reduced, conditions)
+        found = with_kink(optimum)
+        reduced = found.program()
+        conditions = stationarity(reduced, found.v)
+        outcome = _outcome(found, reduced, conditions)
         program, result, confirmed = outcome.program, outcome.result, outcome.verdict is Verdict.CONFIRMED
-        answer = answer_of(optimum.problem, program, result, optimum.delta, reduced.unit)
+        answer = answer_of(found.problem, program, result, found.delta, reduced.unit)
         answer = replace(
             answer,
-            program=optimum.problem.formulation if confirmed else REDUCED,
+            program=found.problem.formulation if confirmed else REDUCED,
             seconds=time.perf_counter() - begin,
-            message=" ".join(part for part in (_sentence(optimum, outcome), optimum.lacks) if part),
+            message=" ".join(part for part in (_sentence(found, outcome), found.lacks) if part),
         )
         answer = replace(answer, second_order=second_order(answer))
-        return replace(answer, history=(*optimum.history, answer.step))
+        return replace(answer, history=(*found.history, answer.step))
 
     this_run().told("confirm", 0, 1, optimum)
     return this_run().kept("confirm", (optimum,), compute)
