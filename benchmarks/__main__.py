@@ -17,7 +17,7 @@ from pathlib import Path
 
 import casadi
 
-from colloc.results.solution import versions
+from colloc.system.versions import versions
 
 PARTS = {
     "link_integrals": "Friction on a link",

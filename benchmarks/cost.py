@@ -14,8 +14,6 @@ from pathlib import Path
 
 from benchmarks.tables import markdown_table
 from colloc.gaits.problem_file import read_problem_file
-from colloc.results.answer import Level
-from colloc.search.converge import Found
 
 PROBLEMS = ("three_link", "three_link_offset", "three_link_folded")
 MODULES = (
@@ -46,25 +44,18 @@ def anatomy(name: str) -> dict[str, float]:
     from colloc.results.solution import Solution
     from colloc.results.store import save
     from colloc.search.certify import certify
-    from colloc.search.confirm import answer, level_found
-    from colloc.search.converge import searched
+    from colloc.search.confirm import confirm
+    from colloc.search.descend import descend
+    from colloc.search.explore import begin_at
+    from colloc.search.refine import refine
 
     lap("imports")
     problem = read_problem_file(Path("problems") / f"{name}.py").problem
     folder = Path(tempfile.mkdtemp())
-    levels: list[Level] = []
-    iterations = evaluations = 0
-
-    def report(found: Found) -> None:
-        nonlocal iterations, evaluations
-        levels.append(level_found(found))
-        iterations, evaluations = iterations + found.iterations, evaluations + found.evaluations
-
-    found, _ = searched(problem, problem.guess, report)
+    found = refine(descend(begin_at(problem, problem.guess)))
     lap("search in the reduced space")
-    level, _ = answer(found)
+    solution = Solution(problem, confirm(found))
     lap("full program by IPOPT")
-    solution = Solution(problem, [*levels, level])
     solution.certificate = certify(solution.answer)
     lap("certificate")
     save(solution, folder / "x.h5")
@@ -72,9 +63,8 @@ def anatomy(name: str) -> dict[str, float]:
     save_figure(solution_figure(solution), folder / "x", ("png",))
     lap("figure")
     counts = {
-        "(iterations of the search)": iterations,
-        "(its evaluations)": evaluations,
-        "(IPOPT's iterations)": level.iterations,
+        "(iterations of the search)": sum(step.iterations for step in found.history),
+        "(IPOPT's iterations)": solution.answer.iterations,
     }
     return seconds | {what: float(count) for what, count in counts.items()}
 

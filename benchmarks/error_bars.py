@@ -22,9 +22,12 @@ import numpy as np
 
 from benchmarks.independent_replay import Crawler, played
 from benchmarks.zoo import zoo_problem
-from colloc import Chain, Friction, Harmonic
+from colloc import Chain, Friction
+from colloc.gaits.harmonic import harmonics_within
 from colloc.results.measured import Measured, measured
-from colloc.search.solve import optimum
+from colloc.results.solution import Solution
+from colloc.search.explore import begin_at
+from colloc.search.solve import confirmed
 from colloc.system.errors import NotConvergedError
 from colloc.verification.replay import Path as GaitPath
 from colloc.verification.replay import replay
@@ -50,7 +53,7 @@ def random_gait(number: int) -> tuple[Chain, Friction, GaitPath]:
     body = Chain((*lengths[:-1], 1.0 - lengths[:-1].sum()))
     isotropic = rng.random() < 0.3
     mu_t, mu_b = (1.0, 1.0) if isotropic else (float(np.exp(rng.uniform(np.log(0.1), np.log(30)))), float(rng.choice([1, 3])))
-    kind = Harmonic(int(rng.integers(1, 5)), symmetry)
+    kind = harmonics_within(int(rng.integers(1, 5)), symmetry)
     size = kind.size(body.n_joint)
     gait = kind.fourier(rng.normal(0, rng.uniform(0.2, 1.0), size) / np.sqrt(size / 3), body.n_joint)
     return body, Friction(mu_t, 1.0, mu_b), gait
@@ -96,7 +99,7 @@ def measured_again(entry: dict) -> dict:
 def solved_gait(number: int, own: bool) -> dict[str, list[float]] | None:
     """The same for the gait that the zoo's problem is solved by; None if the search fails."""
     problem = zoo_problem(number)
-    solution = optimum(problem)
+    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
     if not solution.history or not solution.answer.optimal:
         return None
     breaks, body = solution.gait.corner_phases, problem.body

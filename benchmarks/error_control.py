@@ -21,7 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
-from colloc.search.solve import optimum
+from colloc.results.solution import Solution
+from colloc.search.explore import begin_at
+from colloc.search.solve import confirmed
 from colloc.system.row_file import cached
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replay
@@ -97,7 +99,7 @@ def case_problem(index: int) -> Problem:
 def outcome(problem: Problem) -> dict:
     """Estimate and true errors of one case; ``optimal`` is False if there is nothing to judge."""
     begin = time.process_time()
-    solution = optimum(problem)
+    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
     if not solution.answer.optimal or solution.answer.delta != problem.delta:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
@@ -107,7 +109,7 @@ def outcome(problem: Problem) -> dict:
     finer = problem.with_(
         guess=gait, delta_start=delta, scheme="gauss-5", intervals=max(problem.intervals, 24), mesh_tolerance=1e-7
     )
-    reference = optimum(finer)
+    reference = Solution(finer, confirmed(begin_at(finer, finer.guess)))
     certificate = certify(reference.answer, tolerance=1e-8) if reference.answer.optimal else None
     if certificate is not None and certificate.efficiency < (1.0 - FLOOR) * fine.efficiency:
         certificate = None  # below the gait it started from: an optimum of another basin, not the reference of this one

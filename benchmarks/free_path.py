@@ -9,8 +9,10 @@ import time
 
 from colloc import FreePath, Problem, ellipse
 from colloc.reduced.spaces import transcribed
+from colloc.results.solution import Solution
+from colloc.search.explore import begin_at
 from colloc.search.ipopt import Solver
-from colloc.search.solve import optimum
+from colloc.search.solve import confirmed
 
 
 def main() -> None:
@@ -27,7 +29,7 @@ def main() -> None:
             print(f"{intervals:9d} {built:10.2f}")
             continue
         begin = time.process_time()
-        solution = optimum(problem)
+        solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
         spent = time.process_time() - begin
         iterations = sum(level.iterations for level in solution.history)
         found = f"{solution.answer.efficiency:.6f}" if solution.answer.optimal else solution.answer.status

@@ -11,7 +11,9 @@ from pathlib import Path
 from benchmarks.tables import markdown_table
 from colloc import Harmonic, Problem, certify, ellipse
 from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, save, styled, subplots
-from colloc.search.solve import optimum
+from colloc.results.solution import Solution
+from colloc.search.explore import begin_at
+from colloc.search.solve import confirmed
 
 SCHEMES = ("trapezoid", "hermite-simpson", "gauss-2", "gauss-3", "gauss-5", "radau-3")
 COLOURS = dict(zip(SCHEMES, ("#999999", SKY, GREEN, BLUE, PURPLE, ORANGE), strict=True))
@@ -30,7 +32,7 @@ def solved(name: str, tolerance: float) -> list[object]:
         mesh_tolerance=tolerance,
     )
     begin = time.process_time()
-    solution = optimum(problem)
+    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
     seconds = time.process_time() - begin
     error = solution.efficiency / certify(solution.answer, tolerance=1e-8, instants=6400).efficiency - 1
     effort = sum(level.iterations for level in solution.history)

@@ -33,13 +33,14 @@ import numpy as np
 
 from colloc import Chain, FreePath, Friction, Harmonic, Problem
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.harmonic import Fourier, shifted
+from colloc.gaits.harmonic import Fourier, harmonics_within, shifted
 from colloc.gaits.starts import LATIN_HYPERCUBE, on_speed_floor
 from colloc.results.archive import Archive, StartName, open_archive, save_archive
 from colloc.results.distinct_optima import basins
 from colloc.results.outcome import Outcome, counts
-from colloc.results.solution import SOLVED, versions
+from colloc.results.solution import SOLVED
 from colloc.studies.campaign import process_pool, run_starts
+from colloc.system.versions import versions
 from colloc.verification.replay import replay
 
 Laws = tuple[tuple[float, float, float], ...]
@@ -63,7 +64,7 @@ class Table(NamedTuple):
 
     def gait_class(self, symmetry: str) -> Harmonic | FreePath:
         """Free paths where a curvature is given."""
-        return Harmonic(self.harmonics, symmetry) if self.curvature is None else FreePath(self.curvature, symmetry)
+        return harmonics_within(self.harmonics, symmetry) if self.curvature is None else FreePath(self.curvature, symmetry)
 
     @property
     def words(self) -> str:

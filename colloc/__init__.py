@@ -20,140 +20,44 @@ The paper: S. Alben, "Efficient sliding locomotion with isotropic friction" (201
 
 from __future__ import annotations
 
+import ast
 import importlib
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from colloc.system.late_binding import bind
 
-if TYPE_CHECKING:
-    from colloc.gaits.free_path import ArcPath, FreePath
-    from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-    from colloc.gaits.objective import Objective
-    from colloc.gaits.polygon import Corners, Polygon
-    from colloc.gaits.problem import Problem
-    from colloc.gaits.problem_file import Reference, load_problem
-    from colloc.gaits.relaxed import Relaxed
-    from colloc.laws.elliptic import Elliptic
-    from colloc.laws.own_law import OwnLaw
-    from colloc.laws.power_law import PowerLaw
-    from colloc.laws.viscous import Viscous
-    from colloc.mechanics.actuators import ActuatorLimits
-    from colloc.mechanics.chain import Chain
-    from colloc.mechanics.fixed_point import solve_balance
-    from colloc.mechanics.friction import Friction
-    from colloc.results.solution import Solution
-    from colloc.results.store import load, save
-    from colloc.search.certify import certify
-    from colloc.smooth.concertina import Concertina
-    from colloc.smooth.crawler_body import CrawlerBody
-    from colloc.smooth.modal_body import ModalBody
-    from colloc.smooth.prescribed_body import Wave
-    from colloc.studies.calls import Starts, multistart, solve, sweep
-    from colloc.studies.pareto import pareto_front
-    from colloc.studies.study import Axis, Study
-    from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
-    from colloc.verification.heading_map import heading_map
-    from colloc.verification.replay import replay
-    from colloc.verification.slope import slope_motion
-
 _HOME = {
-    "gaits.problem": ("Problem",),
-    "gaits.problem_file": ("Reference", "load_problem"),
-    "gaits.objective": ("Objective",),
-    "mechanics.chain": ("Chain",),
-    "mechanics.actuators": ("ActuatorLimits",),
-    "smooth.modal_body": ("ModalBody",),
-    "smooth.concertina": ("Concertina",),
-    "smooth.crawler_body": ("CrawlerBody",),
-    "smooth.prescribed_body": ("Wave",),
-    "mechanics.friction": ("Friction",),
-    "laws.elliptic": ("Elliptic",),
-    "laws.viscous": ("Viscous",),
-    "laws.power_law": ("PowerLaw",),
-    "laws.own_law": ("OwnLaw",),
-    "gaits.harmonic": ("Harmonic", "Fourier", "ellipse"),
-    "gaits.free_path": ("FreePath", "ArcPath"),
-    "gaits.polygon": ("Polygon", "Corners"),
-    "gaits.relaxed": ("Relaxed",),
-    "studies.calls": ("solve", "multistart", "Starts", "sweep"),
-    "studies.study": ("Study", "Axis"),
-    "studies.pareto": ("pareto_front",),
-    "results.solution": ("Solution",),
-    "results.store": ("load", "save"),
-    "search.certify": ("certify",),
-    "verification.replay": ("replay",),
-    "verification.slope": ("slope_motion",),
-    "verification.heading_map": ("heading_map",),
-    "mechanics.fixed_point": ("solve_balance",),
-    "system.errors": ("CollocError", "NotConvergedError", "ProblemError", "StoreError"),
+    alias.name: node.module
+    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
+    if isinstance(node, ast.ImportFrom) and node.module
+    for alias in node.names
 }
-"""Where the public names live, in the order of use; each is imported when it is first used."""
-
-__all__ = [
-    "ActuatorLimits",
-    "ArcPath",
-    "Axis",
-    "Chain",
-    "CollocError",
-    "Concertina",
-    "Corners",
-    "CrawlerBody",
-    "Elliptic",
-    "Fourier",
-    "FreePath",
-    "Friction",
-    "Harmonic",
-    "ModalBody",
-    "NotConvergedError",
-    "Objective",
-    "OwnLaw",
-    "Polygon",
-    "PowerLaw",
-    "Problem",
-    "ProblemError",
-    "Reference",
-    "Relaxed",
-    "Solution",
-    "Starts",
-    "StoreError",
-    "Study",
-    "Viscous",
-    "Wave",
-    "certify",
-    "ellipse",
-    "heading_map",
-    "load",
-    "load_problem",
-    "multistart",
-    "pareto_front",
-    "replay",
-    "save",
-    "slope_motion",
-    "solve",
-    "solve_balance",
-    "sweep",
-]
+"""Public name to the module where it lives, as the stub beside this file states it."""
+__all__ = sorted(_HOME)
 
 # what a solution offers and packages above it do
 bind(
     {
         "card": "colloc.pictures.solution_card:solution_card",
         "plot": "colloc.pictures.solution_figure:solution_figure",
+        "plot_gait": "colloc.pictures.solution_figure:draw_gait",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
+        "export": "colloc.results.export:write_export",
         "plot_front": "colloc.pictures.front_figure:front_figure",
     }
 )
 
 
 def __dir__() -> list[str]:
-    """Also the public names that nobody has used yet."""
-    return sorted({*globals(), *__all__})
+    """The public names, also those that nobody has used yet, and no others but those with two underscores."""
+    return sorted({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
 
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used, so that the NumPy part never loads CasADi."""
-    for module, names in _HOME.items():
-        if name in names:
-            return getattr(importlib.import_module(f"colloc.{module}"), name)
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    if name == "__version__":
+        return importlib.import_module("colloc.system.versions").version_of("colloc")
     raise AttributeError(f"module 'colloc' has no attribute {name!r}")

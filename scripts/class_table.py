@@ -57,13 +57,13 @@ def attempt(row: Row, links: int, friction: Friction, guess: AnyGait, known: flo
         start = laid_into(row.gait_class, guess, body)
         stated = Problem("class", start, body, friction, row.gait_class, delta, FAR * delta, intervals=row.intervals)
         if known is None:
-            solution = solve(stated, watch, 1)
+            solution = solve(stated, 1, progress=watch)
         else:
-            solution = solve(prolonged(stated, guess, row.gait_class), watch, 1)
+            solution = solve(prolonged(stated, guess, row.gait_class), 1, progress=watch)
         for unit in (DELTA, SMALLER * DELTA):
             less, at = delta_in(row.gait_class, solution.gait, unit), solution.problem.delta
             if less < 0.5 * at and delta_matters(solution):
-                solution = solve(stated.with_(guess=solution.gait, delta=less, delta_start=at), watch, 1)
+                solution = solve(stated.with_(guess=solution.gait, delta=less, delta_start=at), 1, progress=watch)
     except TooLong:
         pass
     except CollocError as error:

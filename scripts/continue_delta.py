@@ -7,10 +7,11 @@ import numpy as np
 
 from colloc import Harmonic, Problem, ellipse
 from colloc.pictures.publication import mesh_errors
-from colloc.results.answer import Level
+from colloc.results.answer import Step
 from colloc.results.measured import Limit
 from colloc.results.solution import Solution
-from colloc.search.solve import optimum
+from colloc.search.explore import begin_at
+from colloc.search.solve import confirmed
 
 RESOLVED = 1e-4
 """Largest relative error of the objective, of the mesh, at which delta counts as resolved: the certificate's replay gap."""
@@ -28,7 +29,7 @@ def value_at_zero_delta(solution: Solution) -> Limit:
     ValueError
         If fewer than two deltas converged.
     """
-    first: dict[float, Level] = {}
+    first: dict[float, Step] = {}
     for level in solution.history:
         if level.optimal:
             first.setdefault(level.delta, level)
@@ -65,7 +66,8 @@ def resolution_warning(solution: Solution) -> str | None:
 
 if __name__ == "__main__":
     problem = Problem("three_link", gait=Harmonic(1, "bilateral"), guess=ellipse(0.1, 2.6, 1.2), delta=1e-5, delta_start=1e-2)
-    solution = optimum(problem, lambda level: print(f"{level.delta:.1e} {level.efficiency:.6f} {level.optimal}"))
+    solution = Solution(problem, confirmed(begin_at(problem, problem.guess)))
+    print("\n".join(f"{step.delta:.1e} {step.value:.6f} {step.optimal}" for step in solution.history))
     limit = value_at_zero_delta(solution)
     print(f"delta -> 0: {limit.value:.6f} +- {limit.error:.0e}")
     print(resolution_warning(solution) or f"delta is resolved by {solution.mesh.n} intervals")

@@ -174,15 +174,10 @@ def commands_page() -> str:
 
 def api_page() -> str:
     """The public names, each from its module's docstrings."""
-    source = ast.parse((ROOT / "colloc/__init__.py").read_text(encoding="utf-8"))
-    home = next(
-        ast.literal_eval(node.value)
-        for node in source.body
-        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "_HOME"
-    )
+    import colloc
+
     parts = ["# Programming interface", "All of these are names of the package: `import colloc`, then `colloc.Problem`, ..."]
-    for module, names in home.items():
-        parts += [f"::: colloc.{module}.{name}" for name in names]
+    parts += [f"::: {module}.{name}" for name, module in colloc._HOME.items()]
     return "\n\n".join(parts) + "\n"
 
 

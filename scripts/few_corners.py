@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,9 @@ from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
-from colloc.search.converge import NEXT_RADIUS, ROUGH, Found, settled_apart
-from colloc.search.relaxed import certified
+from colloc.search.converge import NEXT_RADIUS, converged
+from colloc.search.optimum import ROUGH, Optimum
+from colloc.search.relaxed import realised_solution
 
 _IDLE = 1e-9
 _AT_ONCE = 0.12
@@ -45,12 +47,12 @@ class _Step(NamedTuple):
 def polygon_near(problem: Problem, gait: Mixture, corners: int, report: Callable[[str], object] = lambda _: None) -> Solution:
     """The polygon of `few_corners`, certified: a relaxed gait of one direction, which is realised as it is."""
     begin = time.perf_counter()
-    solution = certified(few_corners(problem, gait, corners, report), report=report)
+    solution = realised_solution(few_corners(problem, gait, corners, report), (1,))
     solution.seconds = time.perf_counter() - begin
     return solution
 
 
-def few_corners(problem: Problem, gait: Mixture, corners: int, report: Callable[[str], object] = lambda _: None) -> Found:
+def few_corners(problem: Problem, gait: Mixture, corners: int, report: Callable[[str], object] = lambda _: None) -> Optimum:
     """A polygon with at most so many corners over the period near a relaxed gait, a local optimum among these.
 
     Parameters
@@ -77,7 +79,7 @@ def few_corners(problem: Problem, gait: Mixture, corners: int, report: Callable[
         loops, found = _optimised(stated, gait, loops, sense)
         gait = found.gait
     # the last steps decide how many loops are left: some are tried to the end
-    ends: list[Found] = []
+    ends: list[Optimum] = []
     for first in range(_TRIED):
         few = loops
         if _sides(few) > least:
@@ -90,11 +92,11 @@ def few_corners(problem: Problem, gait: Mixture, corners: int, report: Callable[
     return min(ends, key=lambda found: found.objective)
 
 
-def _optimised(problem: Problem, like: Mixture, loops: list[np.ndarray], sense: int) -> tuple[list[np.ndarray], Found]:
+def _optimised(problem: Problem, like: Mixture, loops: list[np.ndarray], sense: int) -> tuple[list[np.ndarray], Optimum]:
     """The polygon with all its corners free; its loops and itself."""
     start = _polygon(loops, like, sense)
     space = MixtureSpace(problem, len(start.durations))
-    found = settled_apart(space, space.parameters(start), problem.delta, NEXT_RADIUS, ROUGH, rounds=_ROUNDS)
+    found = converged(space, space.parameters(start), problem.delta, NEXT_RADIUS, replace(ROUGH, rounds=_ROUNDS))
     gait, ends = found.gait, np.cumsum([len(loop) for loop in loops])[:-1]
     return _used(np.split(gait.durations * gait.directions[:, 0], ends)), found
 

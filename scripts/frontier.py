@@ -40,7 +40,7 @@ from colloc.mechanics.friction import Friction
 from colloc.results.relaxation import Relaxation
 from colloc.results.solution import SOLVED, Solution
 from colloc.results.store import load, save
-from colloc.search.relaxed import certified, relaxed_gaits
+from colloc.search.relaxed import explore_relaxed, realised_solution
 from colloc.search.solve import solve
 from colloc.system.errors import CollocError, NotConvergedError
 from scripts.check_potential import potentials
@@ -75,8 +75,8 @@ larger one too. *60 corners*: the best certified polygon with at most 60. *Relax
 to, for delta -> 0. *Small gait*: the best gait of no size at one shape, for delta -> 0, and how far links are apart
 there. *Small loop*: the best certified polygon near it, of a path of 0.126 rad, at delta = 2e-5. *Bound*: a sampled
 one, with the number of its unknowns: it holds but for what lies between the samples; in brackets the program's value,
-if climbs still found more than is tolerated above. *Proved*: a bound without samples, for delta -> 0
-([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for
+if climbs still found more than is tolerated above. *Guaranteed*: up to rounding,
+without samples, for delta -> 0 ([how](../../docs/bound.md)). *Gap*: from the better of relaxed and small gait to the smallest bound that is valid for
 the row, relative; 1 over the smallest coefficient is one for every body. CPU seconds of rows made at different times,
 on different machines. A star: the relaxed gait's own certificate fails a check, so its value is not sharp. An empty
 place has not been computed. What was found is a lower end: other starts may find better gaits. What a row of width 0
@@ -86,7 +86,7 @@ its bound holds for any width: rows of other widths are those where something ch
 """
 COLUMNS = (
     "mu_t, mu_f, mu_b", "limit", "links", "width", "gait", "corners", "distance", "angle", "apart", "60 corners", "relaxed",
-    "small gait", "its apart", "small loop", "bound", "unknowns", "proved", "gap", "CPU s",
+    "small gait", "its apart", "small loop", "bound", "unknowns", "guaranteed", "gap", "CPU s",
 )  # fmt: skip
 
 
@@ -139,11 +139,11 @@ def gait(row: Row, starts: int) -> dict[str, Any]:
             joint_limit=row.limit,
         )  # fmt: skip
         with suppress(NotConvergedError):
-            ends.append(relaxed_gaits(problem, starts, first=tuple(first), least_extent=LEAST_EXTENT)[0][0])
+            ends.append(explore_relaxed(problem, starts, first=tuple(first), least_extent=LEAST_EXTENT).optima[0])
     travel = [end for end in ends if end.gait.extent >= LEAST_EXTENT]
     if not travel:
         raise NotConvergedError("no start led to a gait that travels.")
-    solution = certified(min(travel, key=lambda end: end.objective), REPEATS)
+    solution = realised_solution(min(travel, key=lambda end: end.objective), REPEATS)
     save(solution, row.file("gait"))
     return finite(row.body, solution, time.process_time() - begin)
 
@@ -237,7 +237,7 @@ def line(row: Row, known: dict) -> str:
 
     refused = " (not certified)"
     ends = [travels.get("relaxed", -np.inf), still.get("efficiency", -np.inf)]
-    least, proved = smallest_bound(row, known), guaranteed_bound(row)
+    least, guaranteed = smallest_bound(row, known), guaranteed_bound(row)
     apart = f"{100 * (1 - max(ends) / least):.1f} %" if np.isfinite(max(ends)) else ""
     program = "" if above.get("converged", True) else f" ({above['floor']:.4f})"
     cells = [
@@ -248,7 +248,7 @@ def line(row: Row, known: dict) -> str:
         value(travels, "relaxed", mark="" if travels.get("sharp") else "*"), value(still, "efficiency"),
         f"{room(row, still)[1]:.3f}" if still else "", value(loops, "efficiency", mark="" if loops.get("passed") else refused),
         value(above, "sampled", mark=program), value(above, "unknowns", "d"),
-        f"{proved:g}" if np.isfinite(proved) else "", apart,
+        f"{guaranteed:g}" if np.isfinite(guaranteed) else "", apart,
         f"{sum(part.get('seconds', 0.0) for part in parts.values()):.0f}",
     ]  # fmt: skip
     return f"| {' | '.join(cells)} |"

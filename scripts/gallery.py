@@ -22,9 +22,10 @@ from colloc.gaits.problem_file import Reference
 from colloc.gaits.relaxed import Relaxed
 from colloc.pictures.figure import draw_angles, draw_filmstrip, draw_lab, draw_shape_path
 from colloc.pictures.style import styled
-from colloc.results.solution import Solution, versions
+from colloc.results.solution import Solution
 from colloc.search.explore import STARTS
 from colloc.search.solve import solve
+from colloc.system.versions import versions
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"

@@ -20,7 +20,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.numerics.spline import TensorSpline
 from colloc.pictures.style import save
-from colloc.search.relaxed import best_relaxed_gait
+from colloc.search.relaxed import explore_relaxed, realised_solution
 from scripts.check_potential import Kept, add_domain, domain_of, keep
 from scripts.figures_measure import measure_figure
 
@@ -59,7 +59,7 @@ def main() -> None:
     problem = Problem(
         "measure", body=domain.body, friction=domain.friction, gait=Relaxed(3, "both"), delta=1e-5, joint_limit=options.limit
     )
-    solution = best_relaxed_gait(problem, 0, (1, 4), first=(measure.path(),))
+    solution = realised_solution(explore_relaxed(problem, 0, first=(measure.path(),)).optima[0], (1, 4))
     assert solution.relaxed is not None
     relaxed, best = solution.relaxed.certificate, solution.relaxed.best
     print(f"relaxed {relaxed.efficiency:.4f}, {relaxed.efficiency_at_zero_delta:.4f} for delta -> 0")

@@ -14,7 +14,8 @@ import numpy as np
 from colloc.gaits.polygon import Corners
 from colloc.mechanics.friction import Friction
 from colloc.reduced.spaces import space_near
-from colloc.search.converge import FIRST_RADIUS, ROUGH, settled
+from colloc.search.converge import FIRST_RADIUS, converged
+from colloc.search.optimum import ROUGH
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.verification.replay import Replay, replay
@@ -53,13 +54,13 @@ def main() -> None:
         sides = crawler.PROBLEM.gait.corners
         stated = crawler.PROBLEM.with_(body=body, guess=gait, delta=soft, delta_start=soft, joint_limit=ANGLE, intervals=sides)
         space, v = space_near(stated, gait)
-        found = settled(space, v, soft, FIRST_RADIUS, ROUGH)
+        found = converged(space, v, soft, FIRST_RADIUS, ROUGH)
         seconds, gait = time.process_time() - clock, found.gait
         near, best = (replayed(body, gait, at) for at in (SOFTER * delta, delta))
         ratio = (1 / best.efficiency - 1) / (1 / prescribed.efficiency - 1)
         print(
             f"{epsilon:8.3g} {prescribed.efficiency:11.7f} {prescribed.errors['efficiency']:8.1e} {best.efficiency:11.7f} "
-            f"{best.efficiency * best.error:8.1e} {ratio:10.4f} {found.conditions.kkt_error:9.1e} {near.efficiency:11.7f} "
+            f"{best.efficiency * best.error:8.1e} {ratio:10.4f} {found.kkt_error:9.1e} {near.efficiency:11.7f} "
             f"{-found.objective / near.efficiency - 1:10.1e} {seconds:6.1f}",
             flush=True,
         )

@@ -50,17 +50,16 @@ def solved(once):
 
     def result(name):
         from colloc.gaits.problem_file import read_problem_file
-        from colloc.search.explore import STARTS
         from colloc.search.solve import solve
 
         stated = read_problem_file(ROOT / "problems" / f"{name}.py")
 
-        def make():
-            solution = solve(stated.problem, stated.starts or STARTS)
+        def made():
+            solution = solve(stated.problem, stated.starts)
             solution.source = stated.source
             return solution
 
-        return once(name, make), stated.reference
+        return once(name, made), stated.reference
 
     return result
 
@@ -72,14 +71,25 @@ def three_link(solved):
 
 @pytest.fixture(scope="session")
 def unsolved():
-    """A function from a problem to a solution whose answer is the guess, in balance but not optimal."""
+    """A function from a problem to a solution whose one level is the guess, in balance but not optimal."""
     return guess_in_balance
 
 
 def guess_in_balance(problem):
-    from colloc.reduced.spaces import space_about
+    from colloc.collocation.transcription import transcribe
+    from colloc.collocation.warm_start import feasible_point
+    from colloc.results.answer import Answer
     from colloc.results.solution import Solution
-    from colloc.search.confirm import unconfirmed
-    from colloc.search.converge import as_it_is
+    from colloc.verification.replay import replay
 
-    return Solution(problem, unconfirmed(as_it_is(*space_about(problem, problem.guess), problem.delta)), message="only a guess.")
+    transcription = transcribe(problem)
+    x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
+    gait, mesh = transcription.member(x[transcription.layout.parameters[:, 0]]), transcription.mesh
+    fine = replay(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta, instants=200)
+    measured = {"value": fine.efficiency, "distance": fine.distance, "work": fine.work}
+    conditions = {"kkt_error": 1.0, "violation": 1.0, "complementarity": 0.0, "optimal": False, "status": "guess"}
+    answer = Answer(
+        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, None, x, 0 * x, np.zeros(transcription.assembly.m),
+        **measured, **conditions, iterations=0, seconds=0.0,
+    )  # fmt: skip
+    return Solution(problem, answer, message="only a guess.")

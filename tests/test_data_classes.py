@@ -11,11 +11,12 @@ import colloc
 VALUES = {
     "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FreePath", "Friction",
     "GaitClass", "Guarantee", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon", "PotentialSpace",
-    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "SearchStep",
-    "TensorSpline", "Viscous", "Wave", "Lost", "Task", "Axis", "Study",
+    "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "TensorSpline",
+    "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
 }
 MUTABLE = {
-    "Archive", "Candidate", "CellState", "Group", "Journal", "PathGeometry", "Solution", "State", "_Heard", "_State",
+    "Archive", "Candidate", "CellState", "Group", "Journal", "PathGeometry", "Run", "Solution", "State", "_Heard",
+    "_Meshes", "_State",
 }
 # fmt: on
 

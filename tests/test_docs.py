@@ -84,17 +84,23 @@ def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys)
     assert said == quoted
 
 
-def test_the_summary_quoted_in_the_tutorial_is_what_a_solve_says(three_link):
+def test_the_summary_quoted_in_the_tutorial_is_what_a_solve_says(three_link, solved):
     """Words to the letter and numbers to three digits, but for times, roundings and counts of the search."""
     from colloc.commands.summary import summary_lines
 
-    quoted = next(block for block in blocks(ROOT / "docs/tutorial.md", "text") if "by independent replay" in block)
-    said = summary_lines(three_link, None)
-    lines = [line.rstrip() for line in quoted.splitlines() if line.split()[0] in ("efficiency", "distance", "gait")]
-    assert len(lines) == 5
+    quoted = [block for block in blocks(ROOT / "docs/tutorial.md", "text") if "distance d" in block or "gait   " in block]
+    said = summary_lines(three_link, solved("three_link")[1])
+    told = [said, summary_lines(three_link, None, verbose=True)]
+    lines = [
+        (line.rstrip(), told[k])
+        for k, block in enumerate(quoted)
+        for line in block.splitlines()
+        if not line.lstrip().startswith(("three_link:", "15 checks", "upper bound", "saved"))
+    ]
+    assert len(lines) == 6
     wordless = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e-?\d+)?")
-    for line in lines:
-        same = next(other for other in said if wordless.sub("", other) == wordless.sub("", line))
+    for line, told_lines in lines:
+        same = next(other for other in told_lines if wordless.sub("", other) == wordless.sub("", line))
         for mine, theirs in zip(numbers(line), numbers(same), strict=True):
             assert mine == pytest.approx(theirs, rel=1e-3, abs=1e-3)
 
@@ -109,6 +115,28 @@ def test_messages_quoted_in_troubleshooting_are_the_programs_own():
         for piece in pieces:
             plain = re.sub(r"joint \d+ ", "joint ... ", piece)
             assert piece in known or plain in known, (message, piece)
+
+
+def test_the_manifest_of_the_curated_results_names_files_and_programs_that_are_there():
+    manifest = json.loads((ROOT / "results/curated/manifest.json").read_text(encoding="utf-8"))
+    assert len(manifest) > 30
+    for name, entry in manifest.items():
+        assert (ROOT / "results/curated" / name).exists(), name
+        programs = re.findall(r"python -m ([\w.]+)", entry["command"])
+        assert programs or "colloc " in entry["command"], (name, entry["command"])
+        for program in programs:
+            path = ROOT / program.replace(".", "/")
+            assert path.with_suffix(".py").exists() or (path / "__main__.py").exists(), (name, program)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_bound_without_samples_is_called_guaranteed_up_to_rounding_and_never_proved(page):
+    """Rounding is allowed for and not counted: until it is, that is one thing, and it has one name."""
+    text = " ".join(page.read_text(encoding="utf-8").split())
+    for place in re.finditer(r"0\.47\b", text):
+        assert not re.search(r"\bprove[nd]?\b|\btheorem\b", text[max(0, place.start() - 40) : place.end() + 40])
+    if page.stem in ("README", "known", "limits", "bound"):
+        assert re.search(r"0\.47 (is )?guaranteed up to rounding|[Gg]uaranteed up to rounding, for delta (→|->) 0", text)
 
 
 def test_readme_and_tutorial_name_every_documented_command():

@@ -4,13 +4,14 @@ import doctest
 import importlib
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import colloc
-from colloc.results.answer import SearchStep
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("casadi", "matplotlib", "h5py", "scipy", "xarray", "pandas", "numpy")
@@ -22,15 +23,22 @@ def test_importing_colloc_loads_nothing_heavy_and_shows_every_public_name():
 
 
 def test_every_public_name_has_one_home():
-    named = [name for names in colloc._HOME.values() for name in names]
-    assert sorted(named) == sorted(colloc.__all__)
-    assert all(getattr(colloc, name) is not None for name in named)
+    assert sorted(colloc._HOME) == list(colloc.__all__)
+    assert all(getattr(colloc, name) is not None for name in colloc.__all__)
+
+
+def test_completion_offers_the_public_names_and_nothing_else():
+    offered = {name for name in dir(colloc) if not name.startswith("__")}
+    assert offered == set(colloc.__all__)
+    assert "__version__" in dir(colloc)
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert colloc.__version__ == stated
 
 
 @pytest.mark.parametrize("name", colloc.__all__)
 def test_every_public_docstring_has_an_example(name):
-    home = next(module for module, names in colloc._HOME.items() if name in names)  # colloc.solve may be the module by now
-    assert ">>> " in (getattr(importlib.import_module(f"colloc.{home}"), name).__doc__ or "")
+    home = importlib.import_module(colloc._HOME[name])  # colloc.solve may be the module by now
+    assert ">>> " in (getattr(home, name).__doc__ or "")
 
 
 WITH_EXAMPLES = [
@@ -49,7 +57,7 @@ def test_the_examples_of_the_docstrings_run(module, monkeypatch):
 
 
 def test_the_examples_of_all_public_names_are_among_those_that_run():
-    assert {f"colloc.{module}" for module in colloc._HOME} <= set(WITH_EXAMPLES)
+    assert set(colloc._HOME.values()) <= set(WITH_EXAMPLES)
 
 
 def test_the_module_behind_python_m_is_also_the_function():
@@ -80,8 +88,9 @@ def test_a_wrong_argument_is_named_with_what_is_right(made, said):
 
 
 def test_what_is_printed_of_a_result_is_short(three_link):
-    shown = (three_link, three_link.problem, three_link.certificate, three_link.last, three_link.gait, three_link.sample(0.0))
-    for thing in shown:
+    shown = (three_link, three_link.problem, three_link.certificate, three_link.answer, three_link.gait, three_link.sample(0.0))
+    problem = three_link.problem
+    for thing in (*shown, colloc.replay(problem.body, problem.friction, three_link.gait, 1e-2, instants=200)):
         assert "\n" not in repr(thing)
         assert len(repr(thing)) < 160
     assert str(three_link.gait).count("\n") == 1
@@ -97,6 +106,9 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     assert len(three_link.plot().axes) == 5
     assert three_link.plot()._repr_png_().startswith(b"\x89PNG")  # by which a notebook shows it
     assert three_link.report(tmp_path / "x.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    axes = Figure().add_subplot()
+    assert three_link.plot(ax=axes) is axes
+    assert axes.collections  # the path
     assert three_link.animate(tmp_path / "x.gif", periods=1, seconds=0.2, fps=10, width=200).stat().st_size > 1000
     with pytest.raises(colloc.ProblemError, match=r"should end in \.gif or \.mp4"):
         three_link.animate(tmp_path / "x.avi")
@@ -110,6 +122,23 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     assert dataset.attrs["efficiency"] == three_link.certificate.efficiency
 
 
+def test_a_gait_is_exported_from_python_as_by_the_command(three_link, tmp_path, capsys):
+    from colloc.commands.main import main
+
+    colloc.save(three_link, tmp_path / "x.h5")
+    for name, settings in (("x.csv", {"period": 4}), ("x.json", {"max_speed": [2, 1], "rate": 20})):
+        stated = three_link.export(tmp_path / name, **settings)
+        assert stated["period_s"] * stated["rate_hz"] == stated["samples_per_period"]
+        by_hand = (tmp_path / name).read_text(encoding="utf-8")
+        words = [f"--{key.replace('_', '-')} {' '.join(map(str, np.ravel(value)))}" for key, value in settings.items()]
+        assert main(["export", str(tmp_path / "x.h5"), "--output", str(tmp_path / name), *" ".join(words).split()]) == 0
+        assert (tmp_path / name).read_text(encoding="utf-8") == by_hand
+    with pytest.raises(colloc.ProblemError, match=r"should end in \.csv or \.json"):
+        three_link.export(tmp_path / "x.txt", period=4)
+    with pytest.raises(colloc.ProblemError, match="periods must be at least 1"):
+        three_link.export(tmp_path / "x.csv", period=4, periods=0)
+
+
 def test_a_missing_library_is_named(three_link, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(colloc.CollocError, match=r"this needs pandas, which is not installed: pip install pandas"):
@@ -118,31 +147,27 @@ def test_a_missing_library_is_named(three_link, monkeypatch):
 
 def test_progress_is_told_and_printed_only_if_asked(capsys):
     problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    levels, outcomes = [], []
-    solution = colloc.solve(problem, starts=1, progress=levels.append)
-    assert [level.delta for level in levels] == [level.delta for level in solution.history]
+    told, outcomes = [], []
+    solution = colloc.solve(problem, starts=1, progress=told.append)
+    assert [news.stage for news in told][-2:] == ["confirm", "certify"]
+    assert told[-1].best.value == pytest.approx(solution.value, rel=1e-3)
     found = colloc.multistart(problem, 2, progress=outcomes.append)
     assert {o.start for o in outcomes} == {0, 1}
     assert found.optima[0].best.efficiency == max(o.efficiency for o in outcomes)
     assert capsys.readouterr().out == ""
     colloc.solve(problem, starts=1, verbose=True)
-    assert capsys.readouterr().out.count("<Level at delta") == len(levels)
+    assert len(capsys.readouterr().out.splitlines()) == len(told)
 
 
 def test_a_search_over_many_starts_tells_of_every_one_in_units_of_the_friction_stated(capsys):
     problem = colloc.Problem("quick", friction=colloc.Friction(10, 10, 10), gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     told = []
     solution = colloc.solve(problem, starts=4, progress=told.append, verbose=True)
-    steps = [news for news in told if isinstance(news, SearchStep)]
-    tried, followed = ([s for s in steps if s.what == what] for what in ("starts", "gaits"))
-    assert [s.done for s in tried] == [1, 2, 3, 4]
-    assert {s.count for s in tried} == {4}
-    assert [s.done for s in followed] == list(range(1, len(followed) + 1))
-    assert len(followed) >= 1
-    assert told[len(steps) :] == list(solution.history)
-    assert followed[-1].efficiency == pytest.approx(solution.efficiency, rel=1e-2)
+    tried = [news for news in told if news.stage == "explore" and news.count == 4]
+    assert [news.done for news in tried][:5] == [0, 1, 2, 3, 4]
+    assert told[-1].best.value == pytest.approx(solution.efficiency, rel=1e-2)
     printed = capsys.readouterr().out.splitlines()
-    assert printed[3].startswith("4 of 4 starts; best d/W = 0.02")
+    assert printed[4].startswith("explore, 4 of 4; best d/W = 0.02")
     assert len(printed) == len(told)
 
 

@@ -3,13 +3,16 @@
 import re
 import sys
 import types
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from colloc import Problem, ProblemError
 from colloc.gaits import gait_fields
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.gait import ClassOfGaits
+from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
@@ -65,6 +68,33 @@ def test_four_motors_do_better_than_two(monkeypatch):
     free = solve(own.problem.with_(body=Chain((0.2,) * 5), guess=guess), 1)
     assert free.status == "solved"
     assert free.efficiency > own.found.efficiency
+
+
+@dataclass(frozen=True)
+class Tents(ClassOfGaits):
+    """Angles that are linear between values at equally spaced phases: linear in their parameters, and no Fourier series."""
+
+    values: int = 8
+    symmetry: str = "none"
+
+    def intervals(self, n_joint):
+        return 4 * self.values
+
+    def describe(self):
+        return f"{self.values} values a joint"
+
+    def series(self, harmonics):
+        return Harmonic(harmonics)
+
+    def size(self, n_joint, n_interval):
+        return n_joint * self.values
+
+
+@pytest.mark.parametrize("starts", [1, 2])
+def test_a_class_without_a_search_is_refused_in_words(monkeypatch, starts):
+    monkeypatch.setattr(gait_fields, "CLASSES", (*gait_fields.CLASSES, Tents))
+    with pytest.raises(ProblemError, match="no search is known for the class Tents: derive it from Harmonic"):
+        solve(Problem("tents", gait=Tents(), delta=1e-2), starts=starts)
 
 
 def test_a_class_of_your_own_is_searched_certified_kept_and_read(monkeypatch, tmp_path, capsys):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
-from colloc.bounds.sampled import Bound, efficiency_bound, known_bound
+from colloc.bounds.sampled import MOST_LINKS, Bound, efficiency_bound, known_bound
 from colloc.gaits.limits import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
@@ -18,25 +19,32 @@ CACHE = "bounds.sqlite"
 """Where bounds are kept, beside the results."""
 
 
+def refusal(problem: Problem) -> str:
+    """Why no upper bound can be computed for the gaits of a problem, in a sentence; "" if one can."""
+    if not isinstance(problem.body, Chain) or not isinstance(problem.friction, Friction):
+        return (
+            "upper bounds are computed for chains of links under Coulomb friction, or the elliptic law, only; for this one "
+            "there is 1/min(mu)."
+        )
+    if not _bounded(problem):
+        return "upper bounds are of the efficiency, on the level, of gaits that do not turn."
+    if problem.body.n_link > MOST_LINKS:
+        return f"upper bounds are computed for at most {MOST_LINKS} links, not {problem.body.n_link}; there is 1/min(mu)."
+    return ""
+
+
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
     """The upper bound for a problem's body, friction and joint limit: from the cache, or computed if asked for.
 
-    None for bodies that are no chains, laws that are neither Coulomb's nor the elliptic one, other objectives, and gaits that
-    turn. A cache that cannot be read or written is left as it is, with a `ChangedFileWarning`: no result depends on it.
+    None where there can be none (`refusal`), unless it is asked for: that is a `ProblemError`. A cache that cannot be read or
+    written is left as it is, with a `ChangedFileWarning`: no result depends on it.
     """
-    friction = problem.friction
-    if not isinstance(problem.body, Chain) or not isinstance(friction, Friction):
+    if why := refusal(problem):
         if compute:
-            raise ProblemError(
-                "upper bounds are computed for chains of links under Coulomb friction, or the elliptic law, only; for this one "
-                "there is 1/min(mu)."
-            )
+            raise ProblemError(why)
         return None
-    if not _bounded(problem):
-        if compute:
-            raise ProblemError("upper bounds are of the efficiency, on the level, of gaits that do not turn.")
-        return None
-    domain, cache = (problem.body, friction, widest(problem.joint_limit)), folder / CACHE
+    domain: tuple[Any, Any, float] = (problem.body, problem.friction, widest(problem.joint_limit))
+    cache = folder / CACHE
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:
@@ -50,13 +58,13 @@ def _bounded(problem: Problem) -> bool:
     return on_level and problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.friction)
 
 
-def gap_line(problem: Problem, efficiency: float, bound: Bound | None) -> str:
-    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq. lambdaupper)."""
+def gap_line(problem: Problem, efficiency: float, bound: Bound | None, *, asked: bool = False) -> str:
+    """Efficiency, upper bound and gap; without a computed bound, the paper's 1/min(mu) (eq. lambdaupper). Whoever has asked for
+    a bound in vain is not told to ask for one."""
     if bound is not None:
         return f"  {bound.report(efficiency)}"
     if not _bounded(problem):
         return f"  no upper bound on the {problem.objective.name} is known"
     limit = 1.0 / problem.friction.smallest
-    known = isinstance(problem.body, Chain) and isinstance(problem.friction, Friction)
-    tighter = "; --bound computes a tighter one" if known else ""
+    tighter = "" if asked or refusal(problem) else "; --bound computes a tighter one"
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

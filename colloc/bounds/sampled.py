@@ -75,6 +75,8 @@ THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4
 FOUR_LINKS = Budget(5, None, 6, 40, 80, starts=400, tolerance=1e-3, first=5, smoothing=1e-4, together=2)
 """Functions of two joint angles at a time: 81 unknowns do better than 108 that are products of three."""
 FIVE_LINKS = replace(FOUR_LINKS, intervals=3, first=3, tolerance=3e-3)
+MOST_LINKS = 5
+"""Samples fill all of shape space, which has a dimension a joint."""
 
 
 def usual_budget(body: Chain) -> Budget:
@@ -256,9 +258,9 @@ def efficiency_bound(
     """
     if not 0 < joint_limit <= np.pi + 1e-12:
         raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
-    if body.n_joint > 4:
+    if body.n_link > MOST_LINKS:
         raise ProblemError(
-            f"bounds are computed for at most five links, not {body.n_link}: the samples fill all of shape space."
+            f"bounds are computed for at most {MOST_LINKS} links, not {body.n_link}: the samples fill all of shape space."
         )
     budget = budget or usual_budget(body)
     known = known_bound(body, friction, joint_limit, budget=budget, cache=cache) if cache is not None else None

@@ -12,7 +12,7 @@ import numpy as np
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, new_parser
 from colloc.gaits.objective import EFFICIENCY
-from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE
+from colloc.results.equivalence import SAME_GAIT, SAME_VALUE
 from colloc.results.solution import Solution
 from colloc.results.store import load
 

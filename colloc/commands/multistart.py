@@ -134,30 +134,29 @@ def _run(options: argparse.Namespace, command: str) -> int:
     from colloc.studies.campaign import run_starts
 
     quiet = options.quiet or options.json
-    table = not quiet and sys.stdout.isatty()
     archive = open_archive(problem, path)  # or refused, before anything is solved
     before = archive.of_search(options.sampler, options.seed)
-    done = {k for k, o in before.items() if not (options.retry and o.status in RETRIED)}
-    todo = [k for k in range(options.starts) if k not in done]
+    done = {k for k, o in before.items() if k < options.starts and not (options.retry and o.status in RETRIED)}
+    todo = (k for k in range(options.starts) if k not in done)  # there may be more than memory holds
+    to_go = options.starts - len(done)
     if not quiet:
-        print(f"{options.starts - len(todo)} starts done already, {len(todo)} to go", flush=True)
+        print(f"{len(done)} starts done already, {to_go} to go", flush=True)
         if archive.damaged:
-            print(f"  {archive.damaged} damaged rows beside {path} were left out; their starts are solved again", flush=True)
-    if table:
+            print(f"  {archive.loss}; these starts are solved again", flush=True)
         print(OUTCOME_HEADER, flush=True)
     begin = time.perf_counter()
     interrupted = False
     settings = {"sampler": options.sampler, "seed": options.seed, "workers": options.workers, "time_limit": options.time_limit}
     try:
         with StatusLine(enabled=not quiet) as line:
-            line.say(f"{problem.name}: 0 of {len(todo)} starts")
+            line.say(f"{problem.name}: 0 of {to_go} starts")
             for count, outcome in enumerate(run_starts(problem, todo, **settings), 1):
                 archive.add({StartName(options.sampler, options.seed, outcome.start): outcome})  # before it is reported
-                if table:
+                if not quiet:
                     line.clear()
                     print(outcome_line(outcome), flush=True)
-                left = (time.perf_counter() - begin) / count * (len(todo) - count)
-                line.say(f"{problem.name}: {count} of {len(todo)} starts", left)
+                left = (time.perf_counter() - begin) / count * (to_go - count)
+                line.say(f"{problem.name}: {count} of {to_go} starts", left)
     except KeyboardInterrupt:
         interrupted = True
     save_archive(archive, command)

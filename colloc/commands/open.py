@@ -11,7 +11,7 @@ from pathlib import Path
 
 from colloc.commands.ending import NONE_FOUND, OK, run
 from colloc.commands.multistart import summary_dict, summary_lines
-from colloc.commands.options import add_printing, new_parser, output_path, tell
+from colloc.commands.options import add_printing, add_verbose, new_parser, output_path, tell
 from colloc.commands.solve import EXIT
 from colloc.commands.summary import summary_dict as solution_dict
 from colloc.commands.summary import summary_lines as solution_lines
@@ -37,6 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--sampler", choices=SAMPLERS, default=LATIN_HYPERCUBE)
     parser.add_argument("--output", metavar="PATH", help="folder, or .h5 file (default: beside the archive)")
     add_printing(parser)
+    add_verbose(parser)
     return parser
 
 
@@ -51,13 +52,15 @@ def _open(options: argparse.Namespace) -> int:
     if options.start is None:
         shown = list(archive.outcomes.values())
         found = basins(problem, shown)
-        tell(options, summary_dict(problem, shown, found, archive.path), summary_lines(problem, shown, found))
+        facts = {**summary_dict(problem, shown, found, archive.path), "damaged": list(archive.damaged)}
+        tell(options, facts, [*summary_lines(problem, shown, found), *([f"  {archive.loss}"] if archive.loss else [])])
         return OK if found else NONE_FOUND
     if options.start not in outcomes:
         there = sorted({f"{name.sampler} seed {name.seed}" for name in archive.outcomes})
         raise ProblemError(
             f"{options.archive} holds no start {options.start} of {options.sampler} seed {options.seed}; "
-            f"it holds {len(archive.outcomes)} starts of {', '.join(there) or 'no sampler'}."
+            f"it holds {len(archive.outcomes)} starts of {', '.join(there) or 'no sampler'}"
+            f"{'; ' if archive.loss else ''}{archive.loss}."
         )
     name = f"{problem.name}.start-{options.start}"
     path = output_path(options.output, Path(options.archive).with_name(f"{name}.h5"))
@@ -69,5 +72,9 @@ def _open(options: argparse.Namespace) -> int:
         solution = reopened(problem, archive.outcomes[StartName(options.sampler, options.seed, options.start)])
     path = path if solution.success else path.with_suffix(".failed.h5")
     save(solution, path)
-    tell(options, solution_dict(solution, path, None, None), [*solution_lines(solution, None), f"  saved {path}"])
+    tell(
+        options,
+        solution_dict(solution, path, None, None),
+        [*solution_lines(solution, None, verbose=options.verbose), f"  saved {path}"],
+    )
     return EXIT[solution.status]

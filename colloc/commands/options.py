@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import re
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -82,6 +83,11 @@ def add_printing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress, only the final summary")
 
 
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """``--verbose``, for commands that end in the summary of a result."""
+    parser.add_argument("--verbose", action="store_true", help="also tell the search, the gait and every check")
+
+
 def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
     """What a command ends with: one JSON object of the facts if that was asked for, else lines for people."""
     print(json.dumps(facts) if options.json else "\n".join(lines), flush=True)
@@ -126,6 +132,10 @@ def output_path(output: str | None, default: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ProblemError(f"cannot make the folder {path.parent}: {error.strerror or error}.") from None
-    if not os.access(path.parent, os.W_OK) or path.is_dir():
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError:
+        raise ProblemError(f"cannot write {path}; choose another --output.") from None
+    if path.is_dir():
         raise ProblemError(f"cannot write {path}; choose another --output.")
     return path

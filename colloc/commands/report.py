@@ -47,7 +47,7 @@ def _report(options: argparse.Namespace) -> int:
         line.say("writing the page")
         write_report(solution, path, _reference(options.problem), source.parent)
         figures: list[Path] = []
-        if options.figures and solution.history:
+        if options.figures:
             from colloc.pictures.publication import save_panels
 
             line.say("drawing the figures")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from colloc.commands import ending
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, run
-from colloc.commands.options import add_bound, add_printing, add_problem, changed, new_parser, output_path, tell
+from colloc.commands.options import add_bound, add_printing, add_problem, add_verbose, changed, new_parser, output_path, tell
 from colloc.commands.summary import summary_dict, summary_lines
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED
@@ -66,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-figure", action="store_true", help="do not draw NAME.png")
     parser.add_argument("--pdf", action="store_true", help="draw NAME.pdf too")
     add_printing(parser)
+    add_verbose(parser)
     return parser
 
 
@@ -119,7 +120,8 @@ def _solve(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(summary_dict(solution, path, stated.reference, bound)), flush=True)
     else:
-        lines = [*summary_lines(solution, stated.reference), gap_line(problem, solution.measured.efficiency, bound)]
+        said = summary_lines(solution, stated.reference, verbose=options.verbose)
+        lines = [*said, gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)]
         print("\n".join(lines), flush=True)
 
     if not options.no_figure:

@@ -9,19 +9,24 @@ from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
 from colloc.results.answer import PRESCRIBED, REALISED, REDUCED
+from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
 
 
-def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
-    """What a person wants to know at the end."""
-    lines = [f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"]
+def summary_lines(solution: Solution, reference: Reference | None, *, verbose: bool = False) -> list[str]:
+    """What a person wants to know at the end: the result, whether the checks hold, and what failed; with `verbose` also the
+    search, the gait and every check."""
+    verdict = f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"
     certificate = solution.certificate
-    best = solution.problem.objective
+    lines = [verdict]
     if certificate.replayed:
-        lines += [
+        alone = solution.answer.program in (PRESCRIBED, REALISED)  # what these are the best of, `_search_lines` tells
+        best = solution.problem.objective
+        lines = [
+            verdict if alone else f"{verdict} ({solution.standing[0]})",
             f"  {best.label:<15s} {certificate.value:.6f} +- {certificate.value_error:.0e} by independent replay "
             f"({certificate.instants} instants); {certificate.value_at_zero_delta:.6f} +- "
             f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
@@ -29,20 +34,40 @@ def summary_lines(solution: Solution, reference: Reference | None) -> list[str]:
             f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
             f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.answer.delta:.0e}",
         ]
-        lines += [f"  search          {text}" for text in _search_lines(solution)]
-        reason = solution.problem.paced_by
-        paced = f"; run in a period of 1, as {reason}" if reason else ""
-        lines += [] if solution.problem.slope is None else [f"  ground          {solution.problem.slope.describe()}"]
-        gait = [f"class: {solution.problem.gait.describe()}{paced}", *solution.gait.lines(solution.problem.body.coordinate)]
-        lines += [f"  gait            {text}" for text in gait]
-        lines += [f"  {check.line()}" for check in certificate.checks]
+        lines += _background(solution) if verbose else []
+        lines += _check_lines(certificate, verbose)
         if solution.relaxed is not None:
             lines += [f"  relaxed         {text}" for text in solution.relaxed.lines()]
-            lines += [f"  {check.line()}" for check in solution.relaxed.certificate.checks]
+            lines += _check_lines(solution.relaxed.certificate, verbose)
         if reference is not None:
             lines.append(f"  {reference.verdict(solution.tends_to.efficiency)}")
     if solution.message:
         lines.append(f"  {solution.message}")
+    return lines
+
+
+def _background(solution: Solution) -> list[str]:
+    """How the gait was found, where it moves, and the gait itself."""
+    problem = solution.problem
+    paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
+    gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
+    return [
+        *(f"  search          {text}" for text in _search_lines(solution)),
+        *([] if problem.slope is None else [f"  ground          {problem.slope.describe()}"]),
+        *(f"  gait            {text}" for text in gait),
+    ]
+
+
+def _check_lines(certificate: Certificate, verbose: bool) -> list[str]:
+    """Every check; or in one line that they hold, with the one that comes nearest to its limit, and those that fail."""
+    if verbose:
+        return [f"  {check.line()}" for check in certificate.checks]
+    held = [check for check in certificate.checks if check.passed]
+    nearest = max(held, key=lambda check: abs(check.value) / max(check.threshold, 1e-300), default=None)
+    lines = [f"  {check.line()}" for check in certificate.failures]
+    if nearest is not None:
+        largest = f"largest: {nearest.name}, {abs(nearest.value):.1e} where {nearest.threshold:.0e} is allowed"
+        lines.insert(0, f"  {len(held)} checks hold ({largest})")
     return lines
 
 
@@ -56,7 +81,7 @@ def _besides(solution: Solution) -> list[str]:
     if problem.uses("driven_work"):
         lines.append(f"  driven work W+  {found.driven_work:.6f}")
     if problem.rotation != 0:
-        lines.append(f"  net rotation    {found.rotation:.6f} rad")
+        lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
-from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
 from colloc.numerics.arcs import advance, direction
@@ -124,7 +124,7 @@ class ArcPath(UnitSpeedGait):
             return None
         return round(float(self.tangents[0, -1] - self.tangents[0, 0]) / (2 * np.pi * fraction(self.symmetry)))
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """Length, winding and sharpest bend."""
         turned = "" if self.winding is None else f", winding {self.winding}"
         sharpest = np.abs(self.curvatures()).max()
@@ -209,7 +209,7 @@ class FreePath(ClassOfGaits):
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for its gaits."""
-        return Harmonic(harmonics, self.symmetry)
+        return harmonics_within(harmonics, self.symmetry)
 
     def own_checks(self, gait: ArcPath) -> list[tuple[str, float, float, str]]:
         """What a certificate checks of a member beyond what all gaits have to keep: name, value, allowed, meaning."""

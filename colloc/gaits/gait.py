@@ -7,6 +7,7 @@ registered in `colloc.reduced.spaces`.
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,8 @@ class GaitFunction:
     """Whether it is a Fourier series of the phase."""
     theta: float | None = None
     """Where the tail link points at phase 0, of a gait for a slope (`colloc.gaits.sloped`)."""
+    coordinate = "joint"
+    """What the gait's body calls a shape coordinate."""
 
     @property
     def n_joint(self) -> int:
@@ -70,9 +73,15 @@ class GaitFunction:
         """Phases in (0, 1) where the rates jump: by default none."""
         return np.empty(0)
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
-        """The gait in words or as a formula; `coordinate` is what the body calls its shape coordinates."""
+    def lines(self) -> list[str]:
+        """The gait in words or as a formula."""
         raise NotImplementedError
+
+    def named(self, coordinate: str) -> Any:
+        """The gait of a body that calls its shape coordinates so."""
+        found = copy.copy(self)
+        object.__setattr__(found, "coordinate", coordinate)
+        return found
 
     def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.angles(t), self.rates(t)
@@ -81,7 +90,7 @@ class GaitFunction:
         return "\n".join(self.lines())
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self.n_joint} joint{'s' if self.n_joint > 1 else ''}>"
+        return f"<{type(self).__name__} of {self.n_joint} {self.coordinate}{'s' if self.n_joint > 1 else ''}>"
 
 
 class UnitSpeedGait(GaitFunction):

@@ -18,7 +18,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.relaxed import Mixture, Relaxed
-from colloc.gaits.sloped import PointedSeries
+from colloc.gaits.sloped import PointedSeries, SlopeHarmonic
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
@@ -77,7 +77,7 @@ def gait_from(given: dict[str, Any]) -> AnyGait:
 
 def class_from(given: dict[str, Any]) -> AnyClass:
     """The class of gaits that `fields` described; as `gait_from`."""
-    return _from(CLASSES, given)
+    return _from((*CLASSES, SlopeHarmonic), given)
 
 
 def law_from(given: dict[str, Any]) -> Law:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
+from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Body
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
@@ -75,7 +76,7 @@ class Fourier(GaitFunction):
         k, cos, sin = self._waves(np.asarray(t, dtype=float))
         return -self.cos @ (k * sin) + self.sin @ (k * cos)
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """The formula, joint by joint, or mode by mode."""
         found = []
         for j in range(self.n_joint):
@@ -83,7 +84,7 @@ class Fourier(GaitFunction):
             for k in range(self.n_harmonic):
                 wave = "2πt" if k == 0 else f"{2 * (k + 1)}πt"
                 terms.append(f"{_rounded(self.cos[j, k])} cos {wave} {_rounded(self.sin[j, k])} sin {wave}")
-            found.append(f"{coordinate} {j + 1}: " + " ".join(terms))
+            found.append(f"{self.coordinate} {j + 1}: " + " ".join(terms))
         return found
 
     def mapped(self, matrix: np.ndarray) -> Fourier:
@@ -140,7 +141,13 @@ class Harmonic(ClassOfGaits):
     Parameters
     ----------
     harmonics : int
+        The highest; antipodal gaits have odd ones alone, so that theirs is odd.
     symmetry : {"none", "bilateral", "antipodal"}
+
+    Raises
+    ------
+    ProblemError
+        If the symmetry leaves gaits nothing of the highest harmonic.
 
     Examples
     --------
@@ -158,6 +165,11 @@ class Harmonic(ClassOfGaits):
         if not is_whole(self.harmonics, 1, 64):
             raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
         self._check_symmetry()
+        if self.symmetry == ANTIPODAL and self.harmonics % 2 == 0:
+            raise ProblemError(
+                f"antipodal gaits have odd harmonics only, as q(t + 1/2) = -q(t): {self.harmonics} would be the same class as "
+                f"{self.harmonics - 1}; ask for {self.harmonics - 1} or {self.harmonics + 1}."
+            )
 
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
@@ -184,7 +196,7 @@ class Harmonic(ClassOfGaits):
         columns = []
         for kind in range(2 * self.harmonics + 1):
             odd_harmonic = (kind + 1) // 2 % 2 == 1
-            if self.symmetry == "antipodal" and not odd_harmonic:
+            if self.symmetry == ANTIPODAL and not odd_harmonic:
                 continue
             sine = kind > 0 and kind % 2 == 0
             for joint in range(n_joint):
@@ -265,6 +277,11 @@ class Harmonic(ClassOfGaits):
         waves[:1], waves[1::2], waves[2::2] = constant, cos, sin
         basis = self._basis(n_joint).reshape(n_joint, waves.shape[0], -1)
         return np.einsum("wt,jwp->tjp", waves, basis)
+
+
+def harmonics_within(highest: int, symmetry: str) -> Harmonic:
+    """The class of all harmonics up to `highest` that gaits of a symmetry have."""
+    return Harmonic(highest - 1 if symmetry == ANTIPODAL and highest % 2 == 0 else highest, symmetry)
 
 
 def shifted(gait: Fourier, phase: float) -> Fourier:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits, UnitSpeedGait, finite_array
-from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, both_halves, fraction
 from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
@@ -106,7 +106,7 @@ class Corners(UnitSpeedGait):
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
         return vertices[:, k], (np.diff(vertices) / np.diff(phases))[:, k], phase - phases[k]
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """Length and, if they are few, corners."""
         n = self.corners.shape[1]
         if n > _MOST_TOLD:
@@ -188,7 +188,7 @@ class Polygon(ClassOfGaits):
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for its gaits."""
-        return Harmonic(harmonics, self.symmetry)
+        return harmonics_within(harmonics, self.symmetry)
 
     def size(self, n_joint: int, n_interval: int | None = None) -> int:
         """Number of parameters."""

@@ -45,7 +45,7 @@ class Phases(GaitFunction):
         """Phases in (0, 1) at which the motion may start to move otherwise."""
         return both_halves(self.symmetry, np.array(self.schedule))
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """The gait in words: its class says all."""
         return []
 

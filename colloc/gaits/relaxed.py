@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from colloc.gaits.gait import DELTA_START, ClassOfGaits
-from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.polygon import Corners
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, SYMMETRIES
 from colloc.system.arguments import is_whole
@@ -239,7 +239,7 @@ class Relaxed(ClassOfGaits):
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series in arc length that stand for the mean shapes of its gaits."""
-        return Harmonic(harmonics, self.finite.symmetry)
+        return harmonics_within(harmonics, self.finite.symmetry)
 
     # finite gaits that come near: polygons
     @property

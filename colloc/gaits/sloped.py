@@ -74,11 +74,11 @@ class PointedSeries(Fourier):
         super().__post_init__()
         object.__setattr__(self, "theta", float(finite_array("guess.theta", self.theta, 0)))
 
-    def lines(self, coordinate: str = "joint") -> list[str]:
+    def lines(self) -> list[str]:
         """The formula, and where the body points."""
         turned = np.degrees(np.angle(np.exp(1j * self.theta)))
         where = f"at t = 0 the tail link points {turned:+.2f}° off straight uphill (+: to the left)"
-        return [*super().lines(coordinate), where]
+        return [*super().lines(), where]
 
 
 class SlopeHarmonic(Harmonic):

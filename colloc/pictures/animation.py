@@ -12,16 +12,17 @@ from matplotlib.figure import Figure
 from colloc.pictures.figure import draw_shape_path
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
+from colloc.results.motion import turned
 from colloc.results.solution import Solution
 
 
 def pictures(solution: Solution, count: int, periods: int, *, arrows: bool = True, width: int = 900) -> Iterator[np.ndarray]:
-    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes, of an even width [pixels].
-    Where the body turns fewer periods are shown, since then its path is no straight line; with arrows friction is drawn."""
+    """Images of `periods` periods in a row, `count` a period, each ``(height, width, 3)`` of bytes, of an even width [pixels];
+    with arrows friction is drawn."""
     shown = frames(solution, count + 1, periods=periods)
     with styled():
         scene = _Scene(solution, shown, arrows, width)
-        for k in range(shown.periods * count):
+        for k in range(periods * count):
             yield scene.picture(*divmod(k, count))
 
 
@@ -85,18 +86,18 @@ class _Scene:
 
     def picture(self, period: int, k: int) -> np.ndarray:
         """The image at column k of a period."""
-        shown, shift = self.shown, period * self.shown.step
-        ends = shown.ends[:, :, k] + shift[:, None]
+        shown, before = self.shown, self.shown.before[period]
+        ends = before.of(shown.ends[:, :, k])
         self.body.set_data(*ends)
         self.joints.set_data(*ends[:, self.hinges])
         self.head.set_data(*ends[:, -1:])
-        self.centre.set_data(*(shown.centre[:, [k]] + shift[:, None]))
+        self.centre.set_data(*before.of(shown.centre[:, [k]]))
         for line, path in zip(self.trails, (shown.ends[:, 0], shown.ends[:, -1], shown.centre), strict=True):
-            whole = [path + p * shown.step[:, None] for p in range(period)]
-            line.set_data(*np.concatenate([*whole, path[:, : k + 1] + shift[:, None]], axis=1))
+            whole = [earlier.of(path) for earlier in shown.before[:period]]
+            line.set_data(*np.concatenate([*whole, before.of(path[:, : k + 1])], axis=1))
         if self.quiver is not None:
-            self.quiver.set_offsets((shown.arrow_base[:, :, k] + shift[:, None]).T)
-            self.quiver.set_UVC(*(shown.arrow_scale * shown.arrow[:, :, k]))
+            self.quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
+            self.quiver.set_UVC(*(shown.arrow_scale * turned(shown.arrow[:, :, k], before.rotation)))
         if self.dot is not None:
             self.dot.set_data(shown.angles[:1, k], shown.angles[1:2, k])
         self.phase.set_text(f"t = {period + shown.t[k]:.2f}")

@@ -108,30 +108,35 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     _key(axes)
 
 
-def forbidden(body: Body, joint_limit: Limit) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of joint angles that joint limits or, for two joints, crossing links forbid.
+def forbidden(body: Body, joint_limit: Limit, first: int = 0, second: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of two shape coordinates that are forbidden whatever the others are.
+
+    Of a body with no others: by its limits, and where parts cross. Of one with more: by limits on these two alone, as those of
+    a chain's joints are; what a smooth body may do in one of several modes depends on all.
 
     Returns
     -------
     grid : (n,)
-        Joint angles from -pi to pi.
+        Values of the coordinates from -pi to pi.
     excess : (n, n)
-        Positive where forbidden; rows are the second joint. With more joints contact depends on the others and is left out.
+        Positive where forbidden; rows are the second coordinate.
     """
     grid = np.linspace(-np.pi, np.pi, _CELLS + 1)
     a, b = np.meshgrid(grid, grid)
     shapes = np.zeros((body.n_joint, a.size))
-    shapes[:2] = a.ravel(), b.ravel()
+    shapes[[first, second]] = a.ravel(), b.ravel()
     stretched, limit = under_one_limit(shapes, joint_limit)
-    excess = np.maximum(body.largest_angles(stretched) - limit, 0.0)
     if body.n_joint == 2:
-        excess = np.maximum(excess, body.crossing_depth(shapes))
-    return grid, excess.reshape(a.shape)
+        excess = np.maximum(body.largest_angles(stretched) - limit, body.crossing_depth(shapes))
+    else:
+        by_others = np.delete(body.limited, [first, second], axis=1).any(axis=1)
+        excess = np.abs(body.limited[~by_others] @ stretched).max(axis=0, initial=0.0) - limit
+    return grid, np.maximum(excess, 0.0).reshape(a.shape)
 
 
-def draw_allowed(axes: Axes, body: Body, joint_limit: Limit) -> None:
-    """Grey over the pairs of joint angles that are forbidden."""
-    grid, excess = forbidden(body, joint_limit)
+def draw_allowed(axes: Axes, body: Body, joint_limit: Limit, first: int = 0, second: int = 1) -> None:
+    """Grey over the pairs of two shape coordinates that are `forbidden`."""
+    grid, excess = forbidden(body, joint_limit, first, second)
     if excess.max() > 1e-9:
         axes.contourf(grid, grid, excess, levels=[1e-9, 10.0], colors=[GREY], alpha=0.4)
 
@@ -146,7 +151,7 @@ def draw_angles(axes: Axes, t: np.ndarray, angles: np.ndarray, body: Body) -> No
 
 def draw_shape_path(axes: Axes, problem: Problem, angles: np.ndarray, first: int = 0, second: int = 1) -> None:
     """The gait in the plane of two joint angles, light to dark, its start a disc, over the shapes that are allowed."""
-    draw_allowed(axes, problem.body, problem.joint_limit)
+    draw_allowed(axes, problem.body, problem.joint_limit, first, second)
     q = angles[[first, second]]
     colours = colormaps[PHASE](np.linspace(0.1, 0.8, 200))  # to be seen on white and on black
     pieces = np.array_split(np.arange(q.shape[1] - 1), min(200, q.shape[1] - 1))

@@ -34,5 +34,6 @@ def front_figure(front: ParetoFront) -> Figure:
                 # a mirror image is the same gait
                 mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
                 panel.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
-            panel.set(xlabel="joint angle 1  [rad]", ylabel="joint angle 2  [rad]", aspect="equal")
+            what = front.problem.body.quantity
+            panel.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")
     return figure

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
-from colloc.results.motion import turned
+from colloc.results.motion import RigidMotion, turned
 from colloc.results.solution import Solution
 
 _ARROW = 0.12
 """Length [body lengths] of the arrow of the largest friction."""
-_STRAIGHT = 1e-2
-"""A body that turns by less a period [rad] is shown over several periods, one after the other along a straight line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +27,14 @@ class Frames:
     arrow_base: np.ndarray
     arrow: np.ndarray
     """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow, n_time)`` each."""
-    step: np.ndarray
-    """What a period adds to every position, ``(2,)``."""
-    periods: int
-    """How many periods can be shown in a row."""
+    before: tuple[RigidMotion, ...]
+    """What the periods before do to each one that is shown, the first of which has none before."""
 
     @property
     def window(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners ``(2,)``, low and high, of what all periods need with their arrows."""
         ends = self.ends.reshape(2, -1)
-        reach = np.concatenate([ends, ends + (self.periods - 1) * self.step[:, None]], axis=1)
+        reach = np.concatenate([moved.of(ends) for moved in self.before], axis=1)
         return reach.min(axis=1) - _ARROW, reach.max(axis=1) + _ARROW
 
     @property
@@ -54,13 +50,13 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
     """Sample a solution's motion at `count` instants, both ends of the period included, and the friction that acts on it at
-    about so many arrows along the body. `periods` are shown where the body does not turn."""
+    about so many arrows along the body; `periods` are shown in a row."""
     problem = solution.problem
     body, delta = problem.body, solution.delta_per_period
     motion = solution.sample(np.linspace(0.0, 1.0, count))
     ends = lab_outline(body, motion.angles, motion.theta, motion.tail)
     places, forces = body.rubbing(problem.friction, motion.angles, motion.rates, delta, motion.z, arrows)
-    straight = abs(float(motion.theta[-1] - motion.theta[0])) < _STRAIGHT
+    period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), complex(*(motion.centre[:, -1] - motion.centre[:, 0])))
     return Frames(
         motion.t,
         motion.angles,
@@ -68,6 +64,5 @@ def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: 
         motion.centre,
         motion.tail[:, None] + turned(places, motion.theta),
         turned(forces, motion.theta),
-        motion.centre[:, -1] - motion.centre[:, 0],
-        periods if straight else 1,
+        tuple(period.repeated(k) for k in range(periods)),
     )

@@ -83,7 +83,7 @@ def write_movie(
     path : Path
         Ends in ``.gif`` or ``.mp4``.
     periods : int
-        Periods in a row; one where the body turns.
+        Periods in a row.
     seconds : float
         A period takes.
     fps : float

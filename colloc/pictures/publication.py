@@ -46,14 +46,14 @@ class Panel(NamedTuple):
 
 
 def draw_convergence(axes: Axes, solution: Solution) -> None:
-    """The objective at every level of the continuation against its delta; crosses did not converge."""
-    good = [level for level in solution.history if level.optimal]
-    bad = [level for level in solution.history if not level.optimal]
-    deltas = np.array([level.delta for level in solution.history])
-    axes.plot([level.delta for level in good], [level.value for level in good], "o-", color=BLUE, ms=4, lw=1.2)
+    """The objective at every step of the search against its delta; crosses did not converge."""
+    good = [step for step in solution.history if step.optimal]
+    bad = [step for step in solution.history if not step.optimal]
+    deltas = np.array([step.delta for step in solution.history])
+    axes.plot([step.delta for step in good], [step.value for step in good], "o-", color=BLUE, ms=4, lw=1.2)
     if good:
         axes.set_ylim(*axes.get_ylim())
-    axes.plot([level.delta for level in bad], [level.value for level in bad], "x", color=VERMILION, ms=5)
+    axes.plot([step.delta for step in bad], [step.value for step in bad], "x", color=VERMILION, ms=5)
     axes.set(xlabel="δ  [length/period]", ylabel=solution.problem.objective.label)
     axes.ticklabel_format(axis="y", useOffset=False)
     set_log(axes, "x", (deltas.min() / 2, deltas.max() * 2))

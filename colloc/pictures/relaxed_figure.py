@@ -34,7 +34,8 @@ def draw_mixture(axes: Axes, problem: Problem, gait: Mixture) -> None:
         axes.plot(*corners.T, color=ORANGE, lw=0.9, label="directions mixed" if piece == mixed[0] else None)
     limit = 1.02 * np.pi
     axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
-    axes.set(xlabel="joint angle 1  [rad]", ylabel="joint angle 2  [rad]")
+    what = problem.body.quantity
+    axes.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]")
     axes.legend(loc="lower left")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from io import StringIO
 from pathlib import Path
@@ -48,6 +49,8 @@ PLAIN = {
     "curvature": "The path bends no more sharply than it may.",
 }
 """What a check means for a reader who knows nothing of optimisation, by its name."""
+TURNING = {"net rotation": "It ends the cycle turned by the angle that was asked for: it crawls in a circle."}
+"""The same for gaits that are asked to turn."""
 
 
 class Drawn(NamedTuple):
@@ -74,28 +77,27 @@ def environment() -> Environment:
 def report_page(solution: Solution, reference: Reference | None = None, gap: str = "") -> str:
     """The page as a string, also of a solution that failed: what does not exist is left out. The reference is the value to hold
     the result against, `gap` a sentence about the upper bound."""
-    found: dict[str, Any] = {"gait_pictures": [], "convergence_pictures": [], "motion": None, "errors": None}
-    if solution.history:
-        errors = mesh_errors(solution)
-        drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
-        drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
-        planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
-        body = solution.problem.body
-        captions = {"angles": f"{body.quantity}s", "speeds": "speeds along the body; what is near δ sticks"}
-        captions["power"] = "power against friction; ticks: mesh"
-        found["gait_pictures"] = [
-            _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1)) for j, name in enumerate(planes)
-        ]
-        found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
-        if solution.relaxed is not None:
-            mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
-            mixed["realised"] = "what finite gaits lose to it"
-            found["gait_pictures"] += [_picture(drawn[name], text) for name, text in mixed.items()]
-        found["convergence_pictures"] = [
-            _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
-            _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
-        ]
-        found |= {"motion": motion_data(frames(solution), body), "errors": float(errors.sum())}
+    found: dict[str, Any] = {}
+    errors = mesh_errors(solution)
+    drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
+    drawn["mesh"] = Panel(COLUMN, 2.4, lambda axes: draw_mesh(axes, solution, errors))
+    planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
+    body = solution.problem.body
+    captions = {"angles": f"{body.quantity}s", "speeds": "speeds along the body; what is near δ sticks"}
+    captions["power"] = "power against friction; ticks: mesh"
+    found["gait_pictures"] = [
+        _picture(drawn[name], f"{body.coordinate}s {j + 1} and {j + 2}", joints=(j, j + 1)) for j, name in enumerate(planes)
+    ]
+    found["gait_pictures"] += [_picture(drawn[name], text, has_phase=True) for name, text in captions.items()]
+    if solution.relaxed is not None:
+        mixed = {"mixture": "the relaxed gait: mean shape, and directions mixed", "shares": "shares of the directions"}
+        mixed["realised"] = "what finite gaits lose to it"
+        found["gait_pictures"] += [_picture(drawn[name], text) for name, text in mixed.items()]
+    found["convergence_pictures"] = [
+        _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
+        _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
+    ]
+    found |= {"motion": motion_data(frames(solution), body), "errors": float(errors.sum())}
     return (
         environment()
         .get_template("report.html")
@@ -108,8 +110,9 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             gap=gap.strip(),
             reference=_comparison(solution, reference),
             relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
-            plain=PLAIN,
+            plain=PLAIN | TURNING if solution.problem.rotation else PLAIN,
             policy=_POLICY,
+            degrees=math.degrees,
             fields={name: json.dumps(value) for name, value in solution.problem.to_dict().items()},
             commands=_commands(solution),
             source=solution.source or problem_file_text(solution.problem),
@@ -130,13 +133,12 @@ def write_report(solution: Solution, path: Path, reference: Reference | None = N
 
 
 def _headline(solution: Solution) -> str:
-    if not solution.history:
-        return "no gait was found"
     measured = solution.measured
     best = solution.problem.objective
     other = "" if best == EFFICIENCY else f"; {best.name} {measured.value:.3g}"
-    moves = f"moves {measured.distance:.2g} body lengths a cycle; {measured.efficiency:.2g} body lengths per unit of work"
-    return moves + other
+    turns = f" and {solution.turning}" if solution.turning else ""
+    moves = f"moves {measured.distance:.2g} body lengths a cycle{turns}"
+    return f"{moves}; {measured.efficiency:.2g} body lengths per unit of work{other}"
 
 
 def _comparison(solution: Solution, reference: Reference | None) -> str:
@@ -188,7 +190,7 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
         "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
-        "periods": shown.periods, "step": np.round(shown.step, 6).tolist(), "arrowScale": shown.arrow_scale,
-        "grid": grid,
+        "before": [np.array([np.exp(1j * b.rotation), b.shift]).view(float).round(6).tolist() for b in shown.before],
+        "arrowScale": shown.arrow_scale, "grid": grid,
         "shape": float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 1.2, 4.0)),
     }  # fmt: skip

@@ -28,8 +28,6 @@ def solution_card(solution: Solution) -> str:
 
 def _facts(solution: Solution) -> list[tuple[str, str]]:
     """Names and values."""
-    if not solution.history:
-        return []
     certificate, best = solution.certificate, solution.problem.objective
     if not certificate.replayed:
         return [(f"{best.name} (not replayed)", f"{solution.value:.5f}"), ("δ", f"{solution.answer.delta:.0e}")]
@@ -40,6 +38,7 @@ def _facts(solution: Solution) -> list[tuple[str, str]]:
         *own,
         ("distance d", f"{certificate.distance:.5f}"),
         ("work W", f"{certificate.work:.5f}"),
+        *([("course", solution.turning)] if solution.turning else []),
         ("δ", f"{solution.answer.delta:.0e}"),
         ("search", solution.standing[0]),
     ]

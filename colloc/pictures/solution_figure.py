@@ -13,7 +13,8 @@ from colloc.pictures.relaxed_figure import draw_mixture, draw_realised, draw_sha
 from colloc.pictures.style import INK, VERMILION, Picture, styled
 from colloc.results.solution import SOLVED, Solution
 
-_Panels = dict[str, Callable[[Axes], None]]
+_PHASES = np.linspace(0.0, 1.0, 1201)
+_Panels = dict[str, Callable[[Axes], object]]
 """Title to what draws it."""
 
 
@@ -48,21 +49,33 @@ def _headline(solution: Solution) -> str:
         f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}{near}   "
         f"{problem.friction.label},  δ = {solution.answer.delta:.0e}{verdict}\n"
         f"class: {problem.gait.describe()}{'' if problem.slope is None else f';  {problem.slope.describe()} (x: uphill)'}"
+        f"{f';  {solution.turning}' if solution.turning else ''}"
     )
 
 
 def _of_motion(solution: Solution) -> _Panels:
-    t = np.linspace(0.0, 1.0, 1201)
-    angles, problem = solution.gait.angles(t), solution.problem
+    t, problem = _PHASES, solution.problem
     found: _Panels = {"in the lab (black: at the end)": lambda axes: draw_lab(axes, solution)}
-    if len(angles) == 2 and problem.gait.free:
-        found["shape space (disc: t = 0)"] = lambda axes: draw_shape_path(axes, problem, angles)
-    else:  # no one plane shows them all
-        found["shape"] = lambda axes: draw_angles(axes, t, angles, problem.body)
+    found["shape space (disc: t = 0)" if _is_planar(solution) else "shape"] = lambda axes: draw_gait(axes, solution)
     found["speeds along the body; what is near δ sticks"] = lambda axes: draw_speeds(axes, solution, t)
     spent = "W" if problem.slope is None else "against friction; W of the joints"
     found[f"{spent} = {solution.measured.work:.4f} a period (ticks: mesh)"] = lambda axes: draw_power(axes, solution, t)
     return found
+
+
+def _is_planar(solution: Solution) -> bool:
+    return solution.problem.body.n_joint == 2 and solution.problem.gait.free
+
+
+def draw_gait(axes: Axes, solution: Solution) -> Axes:
+    """The gait of a solution: its path in the plane of two shape coordinates, or where that is not all of it their course in
+    time; returns the axes."""
+    angles, problem = solution.gait.angles(_PHASES), solution.problem
+    if _is_planar(solution):
+        draw_shape_path(axes, problem, angles)
+    else:
+        draw_angles(axes, _PHASES, angles, problem.body)
+    return axes
 
 
 def _of_mixture(solution: Solution) -> _Panels:

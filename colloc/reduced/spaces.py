@@ -1,6 +1,6 @@
 """Programs and classes of gaits for a problem of any kind: which of them a class of gaits wants.
 
-A class in whose parameters the angles are linear, as `Harmonic`, needs nothing here; another kind has a line in `SEARCHED`.
+A class that derives from `Harmonic` needs nothing here; any other has a line in `SEARCHED`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.polygon import Polygon
+from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sloped import SlopeHarmonic
@@ -26,6 +28,7 @@ from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
 from colloc.reduced.sloped import SlopeSpace
+from colloc.system.errors import ProblemError
 
 
 class Searched(NamedTuple):
@@ -49,12 +52,25 @@ _MIXED = Searched(
         problem, problem.intervals if edges is None else edges.size - 1, far
     ),
 )
-SEARCHED: dict[type, Searched] = {FreePath: _ALONG_PATHS, Polygon: _ALONG_PATHS, SlopeHarmonic: _ON_SLOPE, Relaxed: _MIXED}
-"""Of classes whose angles are not linear in their parameters, or that have other parameters besides."""
+SEARCHED: dict[type, Searched] = {
+    FreePath: _ALONG_PATHS,
+    Polygon: _ALONG_PATHS,
+    SlopeHarmonic: _ON_SLOPE,
+    Relaxed: _MIXED,
+    Harmonic: _LINEAR,
+    Prescribed: _LINEAR,
+}
+"""By class, for it and those that derive from it; the first that fits counts."""
 
 
 def _searched(problem: Problem) -> Searched:
-    return next((how for kind, how in SEARCHED.items() if isinstance(problem.gait, kind)), _LINEAR)
+    found = next((how for kind, how in SEARCHED.items() if isinstance(problem.gait, kind)), None)
+    if found is None:
+        raise ProblemError(
+            f"no search is known for the class {type(problem.gait).__name__}: derive it from Harmonic if its gaits are Fourier "
+            "series, or give its program and its space a line in SEARCHED of colloc.reduced.spaces (docs/own_gait_class.md)."
+        )
+    return found
 
 
 def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:

@@ -37,6 +37,7 @@ from colloc.system.store_file import mark, new_file, put, put_attribute
 KIND, VERSION = "colloc archive", 4
 ROWS = "colloc starts 1"
 _PROBLEM = "problem"
+_MOST_NAMED = 12
 _COLUMNS = {"status": "text", "message": "text", **UNITS, "iterations": "1", "cpu_seconds": "s"}
 
 
@@ -50,16 +51,26 @@ class StartName(NamedTuple):
 
 @dataclass(eq=False)
 class Archive:
-    """The starts of a problem that ended so far, whoever asked for them; `damaged` rows were left out. See `open_archive`."""
+    """The starts of a problem that ended so far, whoever asked for them; the rows of `damaged` ones were left out. See
+    `open_archive`."""
 
     problem: Problem
     path: Path
     outcomes: dict[StartName, Outcome] = field(default_factory=dict)
-    damaged: int = 0
+    damaged: tuple[str, ...] = ()
 
     def of_search(self, sampler: str, seed: int) -> dict[int, Outcome]:
         """Outcomes of one sampler and seed, by start number."""
         return {name.number: self.outcomes[name] for name in sorted(self.outcomes) if name[:2] == (sampler, seed)}
+
+    @property
+    def loss(self) -> str:
+        """Which rows are damaged, in words; "" if none is."""
+        if not self.damaged:
+            return ""
+        named = ", ".join(f"start {key.rpartition(' ')[2]} ({key.rpartition(' ')[0]})" for key in self.damaged[:_MOST_NAMED])
+        more = ", ..." if len(self.damaged) > _MOST_NAMED else ""
+        return f"{len(self.damaged)} damaged rows of {row_path(self.path)} were left out: {named}{more}"
 
     def add(self, outcomes: Mapping[StartName, Outcome]) -> None:
         """Put starts that ended on the disk; StoreError if that is not possible."""
@@ -76,8 +87,8 @@ def _lock(path: Path) -> Path:
     return path.with_name(f".{path.name}.lock")
 
 
-def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], int] | None:
-    """Outcomes on the disk and the number of damaged ones; None if nothing is there."""
+def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], tuple[str, ...]] | None:
+    """Outcomes on the disk and the keys of damaged ones; None if nothing is there."""
     rows = read_rows(row_path(path), ROWS)
     stated = rows.values.pop(_PROBLEM, None)
     if stated is None:
@@ -86,14 +97,14 @@ def _rows_of(problem: Problem, path: Path) -> tuple[dict[StartName, Outcome], in
         return None
     if statement_hash(stated) != problem.hash:
         raise StoreError(f"{row_path(path)} holds starts of another problem; choose another --output, or move it away.")
-    outcomes, damaged = {}, rows.damaged
-    for value in rows.values.values():
+    outcomes, damaged = {}, list(rows.damaged)
+    for key, value in rows.values.items():
         try:
             (sampler, seed, number), entry = value
             outcomes[StartName(str(sampler), int(seed), int(number))] = outcome_from(entry)
         except (KeyError, TypeError, ValueError, CollocError):
-            damaged += 1
-    return outcomes, damaged
+            damaged.append(key)
+    return outcomes, tuple(damaged)
 
 
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
@@ -113,7 +124,8 @@ def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
 
 
 def archive_at(path: str | os.PathLike[str]) -> Archive:
-    """The archive with this HDF5 file, whatever its problem is. `StoreError` if there is none, or it is damaged."""
+    """The archive with this HDF5 file, whatever its problem is, to be read: nothing is written, and other runs may go on adding
+    to it. `StoreError` if there is none, or it is damaged."""
     rows = row_path(path)
     stated = read_rows(rows, ROWS).values.get(_PROBLEM) if rows.exists() else None
     if stated is None:
@@ -121,7 +133,8 @@ def archive_at(path: str | os.PathLike[str]) -> Archive:
         if os.path.isfile(path):
             what = f"{path} is no archive of starts, or {rows.name}, which holds its rows, is not beside it"
         raise StoreError(f"{what}; colloc multistart makes one.")
-    return open_archive(Problem.from_dict(stated), Path(path).with_suffix(".h5"))
+    problem, path = Problem.from_dict(stated), Path(path).with_suffix(".h5")
+    return Archive(problem, path, *(_rows_of(problem, path) or ()))
 
 
 def save_archive(archive: Archive, command: str = "") -> Path:

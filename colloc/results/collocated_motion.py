@@ -11,11 +11,11 @@ from colloc.collocation.layout import Layout
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import checked_chain
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, reduced
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
-from colloc.results.motion import SampledMotion, turned
+from colloc.results.motion import RigidMotion, SampledMotion, turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +64,17 @@ class CollocatedMotion:
         theta[self.mesh.points] = self.x[self.layout.theta[0]][self.mesh.sites]
         return theta
 
+    @property
+    def rotation(self) -> float:
+        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none."""
+        theta = self.x[self.layout.theta[0]]
+        return float(theta[-1] - theta[0]) if self.problem.gait.motion_symmetry == NONE else 0.0
+
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers; whole periods add up.
+        """The motion at phases t, any real numbers; periods follow each other, turned by the net rotation of those before.
 
         Angles and rates are the gait's; tail velocity and pose are the collocation polynomial's. The lab frame has the centre
-        of mass at the origin at t = 0, and the motion along +x; on a slope +x is straight uphill.
+        of mass at the origin at t = 0, and the first period's way along +x; on a slope +x is straight uphill.
         """
         t = np.atleast_1d(np.asarray(t, dtype=float))
         if t.ndim != 1 or not np.isfinite(t).all():
@@ -92,7 +98,8 @@ class CollocatedMotion:
             theta = np.where(second, turns - theta, theta)
             centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
             end = np.array([2 * end[0], 0.0])
-        centre = centre + period * end[:, None]
+        before = RigidMotion(self.rotation, complex(*end)).repeated(period)
+        theta, centre = theta + before.rotation, before.of(centre)
         return SampledMotion(t, angles, rates, z, theta, centre, centre - turned(body.centre(angles), theta))
 
     def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -9,13 +9,10 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.results.equivalence import distance
+from colloc.results.equivalence import are_one
 from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
 
-SAME_VALUE, SAME_GAIT = 1e-3, 0.05
-"""Two certified optima are the same if their values differ by less than this relative amount and their paths by less than
-this root-mean-square distance [rad], modulo symmetries. The objective is flat at its maximum, so the path is the laxer."""
 SERIES_HARMONICS = 16
 """Free paths and polygons are tabulated and told apart by their Fourier series in arc length."""
 
@@ -62,10 +59,7 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     for outcome in solved:
         path = fourier_series(problem, outcome.gait)
         for members, near in found:
-            best = members[0]
-            if best.value - outcome.value > SAME_VALUE * abs(best.value):
-                continue
-            if distance(near, path, problem.body, problem.friction) < SAME_GAIT:
+            if are_one((members[0].value, near), (outcome.value, path), problem.body, problem.friction):
                 members.append(outcome)
                 break
         else:

@@ -26,6 +26,9 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 
 Image = Callable[[Fourier], Fourier]
+SAME_VALUE, SAME_GAIT = 1e-3, 0.05
+"""Two gaits are one if their values differ by less than this relative amount and their paths by less than this root-mean-square
+distance [rad], modulo symmetries. The objective is flat at its maximum, so the path is the laxer."""
 _GRID = 64
 _NEWTON_STEPS = 6
 
@@ -77,3 +80,10 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
 def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
     """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body and friction."""
     return min(phase_distance(a, image) for image in images(b, body, friction))
+
+
+def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, friction: Law) -> bool:
+    """Whether two gaits, each given by its value and its path, are the same gait."""
+    (one, path), (other, near) = a, b
+    close = abs(one - other) <= SAME_VALUE * max(abs(one), abs(other))
+    return close and distance(path, near, body, friction) < SAME_GAIT

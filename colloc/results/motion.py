@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.bodies import Body
 from colloc.system.late_binding import optional
 
 if TYPE_CHECKING:
@@ -46,10 +48,52 @@ class SampledMotion:
         return f"<SampledMotion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
 
 
-def turned(vectors: np.ndarray, theta: np.ndarray) -> np.ndarray:
+def turned(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:
     """Vectors ``(2, ..., n_time)`` of the body's axes in those of the lab."""
     (x, y), c, s = vectors, np.cos(theta), np.sin(theta)
     return np.stack([c * x - s * y, s * x + c * y])
+
+
+@dataclass(frozen=True, eq=False)
+class RigidMotion:
+    """A turn about the origin, then a shift: what a period of a gait does to everything in the lab.
+
+    Attributes
+    ----------
+    rotation : float or (n,)
+        Angle, counter-clockwise [rad].
+    shift : complex or (n,)
+        x + iy of where the origin goes [body lengths]: of a gait the way of its centre of mass, a chord if it turns.
+
+    Examples
+    --------
+    >>> quarter = RigidMotion(np.pi / 2, 1.0 + 0.0j)
+    >>> np.round(quarter.repeated(np.array([2, 4])).shift, 9) + 0.0
+    array([1.+1.j, 0.+0.j])
+    >>> round(quarter.radius**2, 9)
+    0.5
+    """
+
+    rotation: float | np.ndarray
+    shift: complex | np.ndarray
+
+    def repeated(self, times: np.ndarray | int) -> RigidMotion:
+        """The motion so many times in a row, whole numbers ``(n,)`` or one; negative ones go back."""
+        angle = math.remainder(self.rotation, 2 * np.pi)
+        # sum of e^(i k angle) for k = 0 to n - 1: e^(i (n - 1) angle / 2) sin(n angle / 2) / sin(angle / 2)
+        chords = times * np.sinc(0.5 * times * angle / np.pi) / np.sinc(0.5 * angle / np.pi)
+        return RigidMotion(times * self.rotation, chords * np.exp(0.5j * (times - 1) * angle) * self.shift)
+
+    def of(self, points: np.ndarray) -> np.ndarray:
+        """Where points ``(2, ..., n)`` of the lab go."""
+        x, y = turned(points, self.rotation)
+        return np.stack([x + np.real(self.shift), y + np.imag(self.shift)])
+
+    @property
+    def radius(self) -> float:
+        """Of the circle on which the origin goes round when the motion is repeated; infinite where it goes straight."""
+        turn = 2 * abs(math.sin(0.5 * self.rotation))
+        return float(np.abs(self.shift)) / turn if turn else math.inf
 
 
 class Column(NamedTuple):
@@ -60,12 +104,13 @@ class Column(NamedTuple):
     dims: tuple[str, ...]
 
 
-def motion_columns(motion: SampledMotion, power: np.ndarray) -> dict[str, Column]:
-    """Name to column, with the power against friction ``(n_time,)``."""
+def motion_columns(motion: SampledMotion, power: np.ndarray, body: Body) -> dict[str, Column]:
+    """Name to column, with the power against friction ``(n_time,)``; shape coordinates are named as their body names them."""
+    shape = body.coordinate, "t"
     return {
         "t": Column(motion.t, "period", ("t",)),
-        "joint_angles": Column(motion.angles, "rad", ("joint", "t")),
-        "joint_rates": Column(motion.rates, "rad/period", ("joint", "t")),
+        f"{body.quantity.replace(' ', '_')}s": Column(motion.angles, "rad", shape),
+        f"{body.coordinate}_rates": Column(motion.rates, "rad/period", shape),
         "tail_velocity": Column(motion.z, "length/period, length/period, rad/period", ("velocity", "t")),
         "theta": Column(motion.theta, "rad", ("t",)),
         "centre": Column(motion.centre, "length", ("axis", "t")),
@@ -95,6 +140,7 @@ def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
 
 
 def _labels(columns: dict[str, Column]) -> dict[str, list]:
-    """Labels along the dimensions other than time."""
-    joints = [*range(1, len(columns["joint_angles"].values) + 1)]
-    return {"joint": joints, "velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
+    """Labels along the dimensions other than time: names, or numbers from 1."""
+    named: dict[str, list] = {"velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
+    sizes = {column.dims[0]: len(column.values) for column in columns.values() if len(column.dims) > 1}
+    return {dim: named.get(dim, [*range(1, size + 1)]) for dim, size in sizes.items()}

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-import platform
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +19,10 @@ from colloc.numerics.mesh import Mesh
 from colloc.results.answer import Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
-from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
+from colloc.results.motion import SAMPLES, Column, RigidMotion, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
 from colloc.system.late_binding import bound
+from colloc.system.versions import versions
 
 if TYPE_CHECKING:
     import pandas
@@ -115,7 +115,7 @@ class Solution:
     @property
     def history(self) -> tuple[Step, ...]:
         """How the search came to the answer; the last step is the answer."""
-        return self.answer.history
+        return self.answer.history or (self.answer.step,)
 
     @property
     def measured(self) -> Certificate | Answer:
@@ -148,6 +148,31 @@ class Solution:
         return self.measured.work
 
     @property
+    def rotation(self) -> float:
+        """Net rotation over a period [rad], counter-clockwise: of the replay if there was one, else as collocated."""
+        return self.certificate.rotation if self.certificate.replayed else self.motion.rotation
+
+    @property
+    def turning_radius(self) -> float:
+        """Of the circle on which the gait crawls [body lengths]; infinite where it is asked to crawl straight on.
+
+        Period after period the centre of mass comes to points of a circle, on chords of length `distance`, which `rotation`
+        turns. That is the centre of mass at phase 0: at another phase it goes round the same point at another distance.
+        """
+        if self.problem.rotation == 0:
+            return math.inf
+        return RigidMotion(self.rotation, complex(self.measured.distance)).radius
+
+    @property
+    def turning(self) -> str:
+        """How the gait turns, in words; "" where it is asked to crawl straight on."""
+        if self.problem.rotation == 0:
+            return ""
+        side = "counter-clockwise" if self.rotation > 0 else "clockwise"
+        turned = f"turns {math.degrees(abs(self.rotation)):.4g}° {side}"
+        return f"{turned}, on a circle of radius {self.turning_radius:.4g} body lengths"
+
+    @property
     def standing(self) -> list[str]:
         """What the gait is the best of, and what else the search met."""
         if self.starts == 1 or not self.others:
@@ -171,7 +196,7 @@ class Solution:
     @property
     def gait(self) -> AnyGait:
         """The gait of the answer."""
-        return self.answer.gait
+        return self.answer.gait.named(self.problem.body.coordinate)
 
     @property
     def delta_per_period(self) -> float:
@@ -188,16 +213,20 @@ class Solution:
         return self.mesh.times, self.motion.at_points
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers; whole periods add up: `CollocatedMotion.sample`."""
+        """The motion at phases t, any real numbers, period after period: `CollocatedMotion.sample`."""
         return self.motion.sample(t)
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
         return self.motion.sliding(motion.angles, motion.rates, motion.z).power[0]
 
-    def plot(self) -> Any:
-        """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it."""
-        return bound("plot")(self)
+    def plot(self, ax: Any = None) -> Any:
+        """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it, ``.savefig("mine.png")`` writes it.
+
+        With `ax`, a matplotlib Axes, the gait alone is drawn there, and the Axes returned: its path in the plane of two shape
+        coordinates, of one or more than two their course in time.
+        """
+        return bound("plot")(self) if ax is None else bound("plot_gait")(ax, self)
 
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""
@@ -207,33 +236,31 @@ class Solution:
         """Write the web page of `colloc report`."""
         return bound("report")(self, Path(path))
 
+    def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+        """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`: ``solution.export("mine.csv",
+        period=4)``; returns what the file says about them. Options as for `colloc.results.export.write_export`."""
+        return bound("export")(self, Path(path), **options)
+
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
         about = {"name": self.problem.name, "status": self.status, "efficiency": self.measured.efficiency}
+        about |= {"rotation": self.rotation, "turning_radius": self.turning_radius}
         if self.problem.objective != EFFICIENCY:
             about |= {"objective": self.problem.objective.name, "value": self.measured.value}
-        return motion_dataset(self._columns(t), about)
+        return motion_dataset(self.columns(t), about)
 
     def to_dataframe(self, t: np.ndarray | None = None) -> pandas.DataFrame:
-        """The motion at phases `t` (one period by default) as a pandas DataFrame: ``joint_angles_1``, ``centre_x``, ..."""
-        return motion_frame(self._columns(t))
+        """The motion at phases `t` (one period by default) as a pandas DataFrame: ``joint_angles_1``, ``centre_x``, ...
 
-    def _columns(self, t: np.ndarray | None) -> dict[str, Column]:
+        Of a body with modes for joints these are ``modes_1``, ``mode_rates_1``, and so in `to_xarray`.
+        """
+        return motion_frame(self.columns(t))
+
+    def columns(self, t: np.ndarray | None = None) -> dict[str, Column]:
+        """The motion at phases `t` (one period by default): name to values with their units and dimensions."""
         motion = self.sample(np.linspace(0.0, 1.0, SAMPLES) if t is None else t)
-        return motion_columns(motion, self.power(motion))
+        return motion_columns(motion, self.power(motion), self.problem.body)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: verdict, numbers and checks."""
         return bound("card")(self)
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything a result depends on."""
-    names = ("colloc", "casadi", "numpy", "scipy", "h5py")
-    found = {"python": platform.python_version()}
-    for name in names:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "source tree"
-    return found

@@ -5,7 +5,8 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
     /problem            JSON text of all fields          /source     text of the problem file
     /gait/{mean,cos,sin}                                 /versions   JSON text
          or {edges,shapes,tangents,length} of a free path, or {corners} of a polygon, with attribute symmetry
-    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result
+    /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}    one period of the result; of a smooth body
+        modes and mode_rates
     /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work, kkt_error, panels, ...
     /history/{delta,intervals,value,distance,work,...}: how the search came there, a row a step
     /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, efficiency, efficiency_error, ...
@@ -24,13 +25,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from colloc.collocation.layout import problem_layout
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
 from colloc.results.answer import REALISED, Alternative, Answer, SecondOrder, Step
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
-from colloc.results.motion import SAMPLES, motion_columns
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
 from colloc.system.errors import ChangedFileWarning, StoreError
@@ -152,7 +155,7 @@ def _write(file: h5py.File, solution: Solution) -> None:
     if solution.certificate.replayed:
         _write_certificate(file.create_group("certificate"), solution.certificate)
     if solution.relaxed is not None:
-        _write_relaxation(file.create_group("relaxed"), solution.relaxed)
+        _write_relaxation(file.create_group("relaxed"), solution.relaxed, solution.problem.body.coordinate)
 
 
 def _write_answer(file: h5py.File, answer: Answer) -> None:
@@ -188,41 +191,39 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     steps = child(file, "history")
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
     history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
-    gait = _read_gait(child(file, "gait"))
+    # by the variables, not by what the group gait says for other readers
+    layout = problem_layout(problem, Mesh(scheme(plain["scheme"]), arrays["edges"]), knots)
+    if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
+        raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
+    parameters, meet = arrays["x"][layout.parameters[:, 0]], arrays["edges"] if knots is None else knots
+    gait = problem.gait.member(parameters, problem.body.n_joint, meet)
     return Answer(problem, gait, knots=knots, **arrays, **plain, second_order=second, history=history)
 
 
-def _write_gait(group: h5py.Group, gait: AnyGait) -> None:
+def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
     for name, value in fields(gait).items():
         if name in _GAIT_ARRAYS:
             units, dims = _GAIT_ARRAYS[name]
-            put(group, name, value, units=units, dims=dims)
+            put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
         else:
             put_attribute(group, name, value)
 
 
-def _read_gait(group: h5py.Group) -> AnyGait:
-    """The gait that `_write_gait` wrote."""
-    arrays = {name: array(group, name) for name in _GAIT_ARRAYS if name in group}
-    return gait_from(arrays | {name: attribute(group, name) for name in group.attrs})
-
-
 def _write_motion(file: h5py.File, solution: Solution) -> None:
-    _write_gait(file.create_group("gait"), solution.gait)
+    _write_gait(file.create_group("gait"), solution.gait, solution.problem.body.coordinate)
     group = file.create_group("motion")
-    motion = solution.sample(np.linspace(0.0, 1.0, SAMPLES))
-    for name, column in motion_columns(motion, solution.power(motion)).items():
+    for name, column in solution.columns().items():
         put(group, name, column.values, units=column.units, dims=BETWEEN_DIMS.join(column.dims))
 
 
-def _write_relaxation(group: h5py.Group, relaxed: Relaxation) -> None:
-    _write_gait(group, relaxed.gait)
+def _write_relaxation(group: h5py.Group, relaxed: Relaxation, coordinate: str) -> None:
+    _write_gait(group, relaxed.gait, coordinate)
     for field in dataclasses.fields(Optimality):
         put_attribute(group, field.name, getattr(relaxed.optimality, field.name))
     _write_certificate(group.create_group("certificate"), relaxed.certificate)
     for index, realised in enumerate(relaxed.realised):
         one = group.create_group(f"realised/{index:03d}")
-        _write_gait(one, realised.gait)
+        _write_gait(one, realised.gait, coordinate)
         for name in ("repeats", "sense"):
             put_attribute(one, name, getattr(realised, name))
         _write_certificate(one.create_group("certificate"), realised.certificate)
@@ -281,6 +282,4 @@ def _read(file: h5py.File) -> Solution:
     if "relaxed" in file:
         solution.relaxed = _read_relaxation(child(file, "relaxed"))
     solution.interrupted = bool(attribute(file, "interrupted"))
-    if answer.x.shape != (solution.layout.n,) or not np.isfinite(answer.x).all():
-        raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     return solution

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from colloc.gaits.friction_unit import friction_unit, in_unit
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
+from colloc.gaits.starts import on_speed_floor
+from colloc.gaits.symmetry import NONE
 from colloc.results.answer import REALISED, Answer
-from colloc.results.checks import Certificate, Check
+from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import MixedPath, Path, Replay
@@ -27,6 +32,42 @@ SADDLE, FLAT = 1e-2, 1e-4
 5e-5, what the mesh may be wrong by; less than FLAT is called flat."""
 
 _FINE_PHASES = 20000
+TRIVIAL_EFFICIENCY = 1e-4
+"""Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
+TRIVIAL_ROTATION = 1e-3
+"""Rotation a period [rad] from which a gait that goes nowhere turns."""
+NOWHERE = 1e-4
+"""Value of the objective on a slope, in units of the friction, up to which a gait goes nowhere."""
+
+
+class Certified(NamedTuple):
+    """An answer with its certificate, which is `UNCERTIFIED` where no replay was possible or of use."""
+
+    answer: Answer
+    certificate: Certificate = UNCERTIFIED
+    failure: str = ""
+    """Why there was no replay."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the first-order conditions and every check hold."""
+        return self.answer.optimal and self.certificate.passed
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether the gait has a size of its own."""
+        return not on_speed_floor(self.answer.problem, self.answer.gait)
+
+
+def is_trivial(answer: Answer) -> bool:
+    """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
+    problem = answer.problem
+    if problem.slope is not None:
+        return in_unit(answer.value, 1 / friction_unit(problem.friction), problem.objective) < NOWHERE
+    if abs(answer.efficiency) * problem.friction.smallest >= TRIVIAL_EFFICIENCY:
+        return False
+    theta = answer.x[answer.layout.theta[0]]
+    return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
 
 
 def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
@@ -172,7 +213,7 @@ def _motion(
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     checks = [
         Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
-        Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, "joint angles after one period [rad]"),
+        Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, f"{body.quantity}s after one period [rad]"),
         *_rotation(problem, fine),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),

@@ -8,24 +8,17 @@ beside it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.friction_unit import friction_unit, in_unit
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
-from colloc.gaits.symmetry import NONE
 from colloc.results.answer import Answer
-from colloc.results.checks import UNCERTIFIED, Certificate
+from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
-from colloc.search.refine import NOWHERE
+from colloc.search.certify import Certified, is_trivial
 
-TRIVIAL_EFFICIENCY = 1e-4
-"""Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
-TRIVIAL_ROTATION = 1e-3
-"""Rotation a period [rad] from which a gait that goes nowhere turns."""
 FINER = "a smaller mesh_tolerance"
 ADVICE = {
     "joint limits": "another guess or a smaller joint_limit",
@@ -34,36 +27,6 @@ ADVICE = {
     "second order": "another guess or more starts",
 }
 """What helps against a check that failed; anything else is a matter of the mesh."""
-
-
-class Certified(NamedTuple):
-    """An answer with its certificate, which is `UNCERTIFIED` where no replay was possible or of use."""
-
-    answer: Answer
-    certificate: Certificate = UNCERTIFIED
-    failure: str = ""
-    """Why there was no replay."""
-
-    @property
-    def holds(self) -> bool:
-        """Whether the first-order conditions and every check hold."""
-        return self.answer.optimal and self.certificate.passed
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether the gait has a size of its own."""
-        return not on_speed_floor(self.answer.problem, self.answer.gait)
-
-
-def is_trivial(answer: Answer) -> bool:
-    """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
-    problem = answer.problem
-    if problem.slope is not None:
-        return in_unit(answer.value, 1 / friction_unit(problem.friction), problem.objective) < NOWHERE
-    if abs(answer.efficiency) * problem.friction.smallest >= TRIVIAL_EFFICIENCY:
-        return False
-    theta = answer.x[answer.layout.theta[0]]
-    return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
 
 
 def choose(problem: Problem, found: Sequence[Certified]) -> Solution:

@@ -28,6 +28,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import heading, space_near, transcribed
 from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
+from colloc.search.certify import ADMISSIBLE, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
 from colloc.search.ipopt import NlpResult, Solver
@@ -37,11 +38,9 @@ from colloc.search.run import this_run
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
 _OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60, "max_cpu_time": 20.0}
-STATIONARY_ROWS = 1e-8
-"""Violation of the full program up to which its equations hold at the gait of a search."""
-_ROUNDS, _ADMISSIBLE, _LET_PASS = 4, 1e-8, 1e-6
-"""Times that the shape checks are moved after IPOPT, what may be beyond them [rad], and what a certificate lets pass where
-the worst instant swings between two."""
+_ROUNDS = 4
+"""Times that the shape checks are moved after IPOPT. What may be beyond them is what SQP allows; at the end, where the worst
+instant swings between two, what a certificate lets pass."""
 _MOST_PARAMETERS = 150
 """Curvature is measured for so many parameters at most: it takes two gradients for each."""
 _NEAR = 1e-2
@@ -90,13 +89,12 @@ def confirm(optimum: Optimum) -> Answer:
     def compute() -> Answer:
         found = with_kink(optimum)
         reduced = found.program()
-        conditions = stationarity(reduced, found.v)
-        outcome = _outcome(found, reduced, conditions)
+        outcome = _outcome(found, reduced, stationarity(reduced, found.v))
         program, result, confirmed = outcome.program, outcome.result, outcome.verdict is Verdict.CONFIRMED
-        answer = answer_of(found.problem, program, result, found.delta, reduced.unit)
+        answer = answer_of(optimum.problem, program, result, optimum.delta, reduced.unit)
         answer = replace(
             answer,
-            program=found.problem.formulation if confirmed else REDUCED,
+            program=optimum.problem.formulation if confirmed else REDUCED,
             seconds=time.perf_counter() - begin,
             message=" ".join(part for part in (_sentence(found, outcome), found.lacks) if part),
         )
@@ -119,11 +117,11 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
     failed = replace(before, status=NOT_STATIONARY, iterations=optimum.iterations)
     if optimum.violation > RADIUS:  # no gait within reach is admissible
         return _Outcome(Verdict.FAILED, program, failed)
-    if optimum.on_kink and before.violation < STATIONARY_ROWS:
+    if optimum.on_kink and before.violation < VIOLATION:
         return _Outcome(Verdict.ON_KINK, program, here)
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
-    for allowed in (*_ROUNDS * (_ADMISSIBLE,), _LET_PASS):
+    for allowed in (*_ROUNDS * (VIOLATION,), ADMISSIBLE):
         if not result.optimal:
             break
         if reduced.place_rows(result.x[own]) <= allowed:
@@ -136,7 +134,7 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
         ended = f"IPOPT, begun there, moved the gait beyond its limits {_ROUNDS} times"
     if before.optimal:
         return _Outcome(Verdict.STATIONARY_ON_FULL, program, replace(before, status=STATIONARY), ended)
-    if optimum.optimal and before.violation < STATIONARY_ROWS:
+    if optimum.optimal and before.violation < VIOLATION:
         # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits than the conditions need
         return _Outcome(Verdict.STATIONARY_ON_REDUCED, program, here, ended, before.kkt_error)
     return _Outcome(Verdict.FAILED, program, failed, ended)

@@ -23,7 +23,7 @@ from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
-from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum, replace_keeping_space
+from colloc.search.optimum import ROUGH, SKETCH, VIOLATION, Effort, Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.system.errors import NotConvergedError
 
@@ -217,26 +217,32 @@ def _rested(
     return at_rest(program, v, radius, effort, curvature), program
 
 
-def with_kink(optimum: Optimum) -> Optimum:
-    """The same; where the conditions do not hold at the gait but around it, it rests on a kink, and they are those."""
-    if optimum.optimal:
-        return optimum
-    program = optimum.program()
-    conditions = stationarity(program, optimum.v)
+def conditions_on_kink(program: NonlinearProgram, v: np.ndarray, effort: Effort) -> Stationarity | None:
+    """First-order conditions that hold by the gradients around v, where they do not hold by that at v: it lies on a kink."""
+    conditions = stationarity(program, v)
     radius = min(max(KINK_RADIUS, _MISSED / conditions.kkt_error), _WIDEST)
     for points in _AROUND:
-        around = stationarity_around(program, optimum.v, conditions, radius, points)
-        found = replace_keeping_space(
-            optimum,
-            kkt_error=around.kkt_error,
-            violation=around.violation,
-            complementarity=around.complementarity,
-            on_kink=True,
-        )
-        if found.optimal:
-            step = replace(optimum.step, kkt_error=around.kkt_error, optimal=True, status=STATIONARY)
-            return replace_keeping_space(found, step=step, history=(*optimum.history[:-1], step))
-    return optimum
+        around = stationarity_around(program, v, conditions, radius, points)
+        if max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < VIOLATION:
+            return around
+    return None
+
+
+def with_kink(optimum: Optimum) -> Optimum:
+    """The same; where the conditions do not hold at the gait but around it, it rests on a kink, and they are those."""
+    around = None if optimum.optimal else conditions_on_kink(optimum.program(), optimum.v, optimum.effort)
+    if around is None:
+        return optimum
+    step = replace(optimum.step, kkt_error=around.kkt_error, optimal=True, status=STATIONARY)
+    return replace_keeping_space(
+        optimum,
+        kkt_error=around.kkt_error,
+        violation=around.violation,
+        complementarity=around.complementarity,
+        on_kink=True,
+        step=step,
+        history=(*optimum.history[:-1], step),
+    )
 
 
 class Members(Protocol):

@@ -23,8 +23,6 @@ _ALMOST = 1.2
 """A level within this factor of the last one is the last one."""
 _STEPS = (0.1, 0.03, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
-_FALLS = 1e-3
-"""A curvature below minus this part of the objective [1/rad^2] is one to follow."""
 _GAIN = 1e-7
 """The part of the objective that leaving a saddle has to gain."""
 _DRIER, _LOST = 0.1, 0.5
@@ -79,7 +77,7 @@ def below_saddle(optimum: Optimum) -> Optimum | None:
     """A better gait that the search comes to from beside a gait of negative curvature; None if there is none."""
     program = optimum.program()
     here = curvature(program, optimum.v)
-    if here.smallest + here.error >= -_FALLS * abs(optimum.objective):
+    if here.smallest + here.error >= 0:
         return None
     lagrangian, length = Lagrangian(program, optimum.v), np.linalg.norm(optimum.v)
     value = lagrangian.value(optimum.v)

@@ -19,7 +19,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.harmonic import Fourier, ellipse
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
@@ -28,27 +28,25 @@ from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_about, space_near
 from colloc.results.answer import Alternative
-from colloc.results.equivalence import distance
+from colloc.results.distinct_optima import fourier_series
+from colloc.results.equivalence import SAME_VALUE, are_one
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, as_it_is, converged
-from colloc.search.descend import descend, is_viscous, levels
+from colloc.search.descend import FACTOR, descend, is_viscous, levels
 from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum
 from colloc.search.run import this_run
 from colloc.search.small_starts import small_loops
 from colloc.system.errors import CollocError, NotConvergedError
 
-STARTS = 32
-"""Starts where none are asked for."""
+STARTS, _AGREE = 32, 8
+"""Starts where no number is asked for, at most unless they lead on; then the search also ends once so many have met the best
+gait. On the zoo that ends 44 of 99 searches early and loses no best gait (`python -m benchmarks.zoo`; with `--starts 32`)."""
 FOLLOW = Effort(ROUGH.accuracy, ROUGH.kkt_error, 3, ROUGH.iterations)
 """Of gaits that are followed: refinement goes on from there."""
 _FEWEST = 12
 """Intervals of a coarse mesh, at least."""
-_NEARLY_DRY = 0.2
-"""Where starts are compared, besides the problem's first delta: at this share of the usual first one, or of a smaller one."""
-_SAME_VALUE, _SAME_GAIT = 1e-3, 0.05
-"""Relative difference of values and root-mean-square distance of paths [rad] below which two gaits are one."""
 _BROKEN = 1e-2
 """Violation of a row beyond which a gait is not compared with others."""
-_FOLLOWED, _FOLLOWED_LOOPS, _PROMISING, _CLOSE = 3, 2, 0.8, 0.01
+FOLLOWED, _FOLLOWED_LOOPS, PROMISING, _CLOSE = 3, 2, 0.8, 0.01
 """How many gaits are followed to the final delta, and of those from small loops; the share of the best value that they need at
 the coarse one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
 _TURN, _HOP_SIZES, _HOP_SEED = 16, (0.2, 0.4, 0.8), 1
@@ -63,8 +61,6 @@ _SPARE = 8
 """Gaits of finite size that are followed at most, until one has not shrunk."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction."""
-_HARMONICS = 8
-"""Of the Fourier series by which gaits are told apart."""
 
 
 @dataclass(eq=False)
@@ -117,14 +113,15 @@ def begin_at(problem: Problem, gait: AnyGait) -> Optimum:
     return found
 
 
-def explore(problem: Problem, starts: int = STARTS, goes_on: Callable[[], bool] = lambda: True) -> Exploration:
-    """The best gaits of a problem's class that so many starts lead to.
+def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], bool] = lambda: True) -> Exploration:
+    """The best gaits of a problem's class that many starts lead to.
 
     Parameters
     ----------
     problem : Problem
-    starts : int
-        At least: they go on while they lead on, to three times as many at most.
+    starts : int, optional
+        At least so many: they go on while they lead on, to three times as many at most. By default 32, or fewer once eight of
+        them have met the best gait.
     goes_on : callable
         Whether there is time for another start, and another gait to be followed.
 
@@ -175,18 +172,18 @@ def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
 
 def same_gait(problem: Problem, a: Optimum, b: Optimum) -> bool:
     """Whether two gaits are one, modulo start phase and the symmetries of body and friction."""
-    if abs(a.objective - b.objective) > _SAME_VALUE * max(abs(a.objective), abs(b.objective)):
-        return False
-    one, other = (fourier_through(f.gait, Harmonic(_HARMONICS, problem.gait.symmetry)) for f in (a, b))
-    return distance(one, other, problem.body, problem.friction) < _SAME_GAIT
+    if abs(a.objective - b.objective) > SAME_VALUE * max(abs(a.objective), abs(b.objective)):
+        return False  # before the paths are transformed
+    one, other = ((f.objective, fourier_series(problem, f.gait)) for f in (a, b))
+    return are_one(one, other, problem.body, problem.friction)
 
 
-def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
+def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
     """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
-    run = this_run()
+    run, count = this_run(), asked or STARTS
     coarse = problem.with_(intervals=min(problem.intervals, max(problem.gait.coarse_intervals(problem.body.n_joint), _FEWEST)))
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)  # compared where friction is nearly dry
-    deltas = [max(delta, problem.delta) for delta in (problem.delta_start, _NEARLY_DRY * usual)]
+    deltas = [max(delta, problem.delta) for delta in (problem.delta_start, FACTOR * usual)]
     # where friction is as dry for a loop as slow as may be
     dry = max(deltas[-1] * (1.0 if problem.gait.unit_speed else problem.smallest_shape_speed), problem.delta)
     with suppress(CollocError):  # something to show from the first second on
@@ -196,8 +193,13 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tup
     for loop in run.kept("small loops", (problem,), lambda: small_loops(problem)):
         with suppress(CollocError):
             _follow(*space_about(coarse, closed_gait(coarse, loop, dry)), _LOOP, [dry], [loops])
-    starts, last, tried, best = starting_gaits(problem), count - 1, 0, 0.0
-    while tried == 0 or (tried <= min(last, _MOST * count - 1) and goes_on()):
+    starts, tried, better, best = starting_gaits(problem), 0, -_PATIENCE, 0.0
+
+    def knows() -> bool:
+        enough = tried >= count or (asked is None and _met_best(known[-1]) >= _AGREE)
+        return enough and tried > better + _PATIENCE
+
+    while tried == 0 or (tried < _MOST * count and not knows() and goes_on()):
         start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
@@ -207,8 +209,8 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tup
                 shaken = _shaken(problem, min((c.optimum for c in known[-1]), key=lambda f: f.objective).gait, start)
                 _follow(*space_about(coarse, shaken), start, deltas[-1:], known[-1:])
         before, best = best, min((c.optimum.objective for c in known[-1]), default=0.0)
-        if start > 0 and best < before - _SAME_VALUE * abs(before):
-            last = max(last, start + _PATIENCE)
+        if start > 0 and best < before - SAME_VALUE * abs(before):
+            better = start
         run.told("explore", tried, max(tried, count), _best([c.optimum for c in (*known[-1], *loops)]))
 
     for candidate in (ends := [*known[-1], *loops]):
@@ -219,6 +221,12 @@ def candidates(problem: Problem, count: int, goes_on: Callable[[], bool]) -> tup
 def objective_at(delta: float, optimum: Optimum) -> float:
     """Minus the value of a gait at another delta, as it is; inf where it has none."""
     return float(np.nan_to_num(ReducedProgram(optimum.space, delta).objective(optimum.v), nan=np.inf))
+
+
+def _met_best(candidates: Sequence[Candidate]) -> int:
+    """How many starts met the best gait so far."""
+    best = min(candidates, key=lambda c: c.optimum.objective, default=None)
+    return 0 if best is None else len(best.starts)
 
 
 def _best(optima: Sequence[Optimum]) -> Optimum | None:
@@ -276,9 +284,9 @@ def _followed_to_the_end(
     Gaits of finite size may shrink on the way, so they are followed until one has not.
     """
     run, ends = this_run(), list[tuple[Optimum, Candidate]]()
-    least = -known[0].dry - (1 - _PROMISING) * abs(known[0].dry)
+    least = -known[0].dry - (1 - PROMISING) * abs(known[0].dry)
     promising = [c for c in known if -c.dry >= least]
-    queue = [c for c in promising if not c.is_loop][:_FOLLOWED] + [c for c in promising if c.is_loop][:_FOLLOWED_LOOPS]
+    queue = [c for c in promising if not c.is_loop][:FOLLOWED] + [c for c in promising if c.is_loop][:_FOLLOWED_LOOPS]
     spare = [c for c in known if is_finite(c.optimum) and c not in queue][:_SPARE]
     for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(optimum) for optimum, _ in ends)):

@@ -79,10 +79,8 @@ class NlpResult:
 
 
 OPTIMAL_TOLERANCE = 1e-6
-_REGIONS, _ALIKE, _WIDEST = 20, 3, 1.0
-"""Trust regions that may follow each other, and how many of them have the first one's radius. A gait that still moves then is
-not near its optimum at all (paths of three joints, whose basins end between deltas, go 2 rad and more), so regions double,
-up to the widest [rad]."""
+_REGIONS = 20
+"""Trust regions that may follow each other. Paths of three joints, whose basins end between deltas, go 2 rad and more."""
 _INSIDE = 0.999
 """A point nearer to the edge of its trust region than this is on it: the barrier keeps off an active bound by its tolerance
 over the multiplier, which is small where efficiency is flat."""
@@ -120,17 +118,11 @@ class Solver:
         """
         result = self.solve_within(x, delta, multipliers, radius)
         own = self.transcription.layout.parameters[:, 0]
-        here, widest = radius, _WIDEST
-        for count in range(_REGIONS):
-            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * here:
+        for _ in range(_REGIONS):
+            if not result.optimal or np.abs(result.x[own] - x[own]).max() < _INSIDE * radius:
                 return result
             x = result.x
-            if count >= _ALIKE:
-                here = max(radius, min(2 * here, widest))
-            result = self.solve_within(x, delta, None, here).accumulated(result)
-            if not result.optimal and here > radius:
-                here = widest = radius  # kinks are too many further out
-                result = self.solve_within(x, delta, None, here).accumulated(result)
+            result = self.solve_within(x, delta, None, radius).accumulated(result)
         return replace(result, complementarity=np.inf, status="still moving")
 
     def solve_within(

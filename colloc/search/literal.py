@@ -21,12 +21,13 @@ from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS
 from colloc.search.descend import levels
 from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.ipopt import NlpResult, Solver
+from colloc.search.refine import MESHES
 from colloc.search.run import this_run
 from colloc.system.errors import ProblemError
 from colloc.verification.refinement import planned_mesh
 
-_MESHES, _ITERATIONS = 8, 1500
-"""Meshes at the final delta, and iterations of IPOPT on each, at most: from a guess it may need five hundred."""
+_ITERATIONS = 1500
+"""Of IPOPT on each mesh, at most: from a guess it may need five hundred."""
 
 
 def literal_answer(problem: Problem) -> Answer:
@@ -60,8 +61,8 @@ def literal_answer(problem: Problem) -> Answer:
             return replace(answer, history=history)
         parameters, radius = answer.x[program.layout.parameters[:, 0]], NEXT_RADIUS
     kept = np.empty(0)
-    for done in range(_MESHES if problem.mesh_tolerance > 0 else 0):
-        this_run().told("refine", done, _MESHES)
+    for done in range(MESHES if problem.mesh_tolerance > 0 else 0):
+        this_run().told("refine", done, MESHES)
         gait = program.member(parameters)
         mesh = program.phase_mesh(gait)
         plan = planned_mesh(problem, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)

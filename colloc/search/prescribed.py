@@ -16,9 +16,8 @@ from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.answer import PRESCRIBED, REALISED, Answer, Step
+from colloc.search.refine import MESHES
 from colloc.verification.refinement import planned_mesh
-
-_MESHES = 4
 
 
 def prescribed_answer(problem: Problem) -> Answer:
@@ -26,7 +25,7 @@ def prescribed_answer(problem: Problem) -> Answer:
     begin, gait = time.perf_counter(), problem.gait.member(np.empty(0), problem.body.n_joint)
     mesh, message = Mesh(scheme(problem.scheme), problem.gait.edges(problem.intervals)), ""
     kept = np.array(problem.gait.stages)
-    for _ in range(_MESHES if problem.mesh_tolerance > 0 else 0):
+    for _ in range(MESHES if problem.mesh_tolerance > 0 else 0):
         plan = planned_mesh(problem, mesh, gait, problem.delta, problem.mesh_tolerance, kept=kept)
         if plan is None:
             break

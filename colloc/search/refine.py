@@ -12,13 +12,14 @@ import numpy as np
 
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_of
+from colloc.search.certify import NOWHERE
 from colloc.search.converge import NEXT_RADIUS, REMESH_RADIUS, converged
 from colloc.search.optimum import FINE, ROUGH, Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
-_MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
+MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
 """Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
 half, then a quarter of it, and keep all their knots."""
 _GROWTH, _FEW_POINTS = 3, 300
@@ -26,11 +27,9 @@ _GROWTH, _FEW_POINTS = 3, 300
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
 """Panels of a smooth body, and how much they grow at once, at most; error that they may leave, over what the mesh may. Every
 doubling was seen to leave a sixth or less, with a point at rest that moves over the panels."""
-NOWHERE = 1e-4
-"""Value of the objective on a slope up to which a gait goes nowhere: relative to that no mesh is fine enough."""
 
 
-@dataclass
+@dataclass(eq=False)
 class _Meshes:
     """The meshes tried so far, and the phases that have to stay knots."""
 
@@ -73,15 +72,15 @@ def refine(optimum: Optimum) -> Optimum:
     problem, run = optimum.problem, this_run()
     refines, meshes = problem.mesh_tolerance > 0, _Meshes()
     if problem.slope is not None and optimum.objective > -NOWHERE:
-        return optimum
+        return optimum  # relative to nothing no mesh is fine enough
     while True:
-        run.told("refine", meshes.count, _MESHES, optimum)
+        run.told("refine", meshes.count, MESHES, optimum)
         finer = on_more_panels(optimum) if refines else None
         plan = meshes.plan(optimum) if refines and finer is None else None
         if finer is None and plan is None and optimum.effort == FINE:
             return optimum
-        if meshes.count == _MESHES:
-            lacks = f"refinement ended after {_MESHES} meshes: the gait still moves with the mesh."
+        if meshes.count == MESHES:
+            lacks = f"refinement ended after {MESHES} meshes: the gait still moves with the mesh."
             return replace_keeping_space(optimum, lacks=lacks)
         space, v, radius, effort = optimum.space, optimum.v, NEXT_RADIUS, FINE
         if finer is not None:

@@ -26,7 +26,7 @@ from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, converged
 from colloc.search.descend import levels
-from colloc.search.explore import Exploration, starting_gaits
+from colloc.search.explore import FOLLOWED, PROMISING, Exploration, starting_gaits
 from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum
 from colloc.search.prescribed import realised
 from colloc.search.realise import kept_inside, realised_gaits, relaxed_certificate
@@ -37,14 +37,14 @@ RELAXED_STARTS = 8
 """Starts where none are asked for."""
 _COARSE, _MOST = 0.4, 0.7
 """Pieces on which starts are told apart, and are followed, as shares of those of the answer."""
-_FOLLOWED, _PROMISING, _SAME = 3, 0.8, 4e-3
-"""Starts followed; the share of the best efficiency that they need, and the relative difference by which they are others."""
+_SAME = 4e-3
+"""Relative difference of efficiencies below which two gaits on few pieces are the same."""
 _DIRECTIONS, _SEED = 72, 1
 _IDLE = 1e-7
 _MESHES, _GAIN = 3, 2e-5
 """At the final delta, and what one must gain to be followed by another."""
-_SKETCH, _ROUGH = replace(SKETCH, rounds=2), replace(ROUGH, rounds=2)
-"""For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value: two rounds do."""
+_ROUGH = replace(ROUGH, rounds=SKETCH.rounds)
+"""For small delta slopes jump wherever a link begins to stick, and SQP creeps for a few 1e-4 of the value."""
 
 
 def directions_tried(n_joint: int) -> np.ndarray:
@@ -167,9 +167,9 @@ def _tried(problem: Problem, gait: AnyGait, pieces: int) -> Optimum:
         pieces = len(gait.durations)
     space = MixtureSpace(problem, pieces)
     first, *others = levels(problem, problem.delta_start)
-    found = converged(space, space.parameters(gait), first, FIRST_RADIUS, _SKETCH)
+    found = converged(space, space.parameters(gait), first, FIRST_RADIUS, SKETCH)
     for delta in others[:1]:
-        found = converged(*with_turned_directions(found, pieces), delta, NEXT_RADIUS, _SKETCH).after(*found.history)
+        found = converged(*with_turned_directions(found, pieces), delta, NEXT_RADIUS, SKETCH).after(*found.history)
     return found
 
 
@@ -177,7 +177,7 @@ def _promising(known: list[Optimum]) -> list[Optimum]:
     """The best few that differ in efficiency."""
     chosen: list[Optimum] = []
     for found in known:
-        if found.objective > _PROMISING * known[0].objective or len(chosen) == _FOLLOWED:
+        if found.objective > PROMISING * known[0].objective or len(chosen) == FOLLOWED:
             break
         if not any(_alike(found, other) for other in chosen):
             chosen.append(found)
@@ -191,7 +191,7 @@ def descend_relaxed(found: Optimum) -> Optimum:
     for count, delta in enumerate(below):
         run.told("descend", count, len(below), found)
         # where friction is smoothest the mixture is found, below it follows
-        effort: Effort = _SKETCH if count else _ROUGH
+        effort: Effort = SKETCH if count else _ROUGH
         ready = with_turned_directions(found, round(_MOST * problem.intervals))
         found = converged(*ready, delta, NEXT_RADIUS, effort).after(*found.history)
     return found

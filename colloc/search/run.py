@@ -36,7 +36,7 @@ EVERY = 2.0
 _PROBLEM = "problem"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Progress:
     """How far a solve has come.
 
@@ -106,7 +106,10 @@ class Run:
             [*stages, Optimality, Realised, Relaxation, *GAITS],
             {Problem: Own(self._changes, self._with_changes)},
         )
-        rows = read_rows(self.path, ROWS).values
+        try:
+            rows = read_rows(self.path, ROWS).values
+        except StoreError as error:
+            raise StoreError(f"{error} It was left by an interrupted run; --fresh begins again.") from None
         if rows.pop(_PROBLEM, self.problem.hash) != self.problem.hash:
             raise StoreError(f"{self.path} was left by a run of another problem of that name; --fresh begins again.")
         self._known = rows

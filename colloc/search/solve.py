@@ -20,12 +20,12 @@ from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import space_about
 from colloc.results.answer import Answer
 from colloc.results.solution import Solution
-from colloc.search.certify import certify
-from colloc.search.choose import Certified, choose, is_trivial, promised, solution_of
+from colloc.search.certify import SADDLE, Certified, certify, is_trivial
+from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is
 from colloc.search.descend import FACTOR, below_saddle, descend
-from colloc.search.explore import STARTS, Exploration, begin_at, explore, is_finite
+from colloc.search.explore import Exploration, begin_at, explore, is_finite
 from colloc.search.literal import literal_answer
 from colloc.search.optimum import Optimum
 from colloc.search.prescribed import prescribed_answer
@@ -49,8 +49,6 @@ _EXPLORING = 0.6
 """The share of the time allowed that is spent on starts; the rest is for the answer."""
 _ROUGHLY = 1e-3
 """Relative error to which a gait is replayed that is no optimum: exactly may take minutes."""
-_SADDLE = 1e-2
-"""Curvature from which the certificate calls a gait a saddle (`colloc.search.certify.SADDLE`)."""
 
 
 def solve(
@@ -68,8 +66,8 @@ def solve(
     ----------
     problem : Problem
     starts : int, optional
-        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops. With 1 the guess alone. By default
-        32, of relaxed gaits 8.
+        The guess, known gaits and seeded samples (`colloc.search.explore`), and small loops: at least so many. With 1 the guess
+        alone. By default 32, or fewer once eight have met the best gait; of relaxed gaits 8.
     seconds : float
         Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless its certificate holds.
     search : {"reduced", "full"}
@@ -120,14 +118,14 @@ def _solved(problem: Problem, starts: int | None, search: str, until: float) -> 
         explored = explore_relaxed(problem, starts or RELAXED_STARTS, goes_on)
         solution = realised_solution(explored.optima[0])
     else:
-        explored = _explored(problem, starts or STARTS, goes_on)
+        explored = _explored(problem, starts, goes_on)
         solution = choose(problem, _certified_best(problem, explored))
     solution.starts, solution.others = explored.starts, explored.others
     return solution
 
 
-def _explored(problem: Problem, starts: int, goes_on: Callable[[], bool]) -> Exploration:
-    if starts > 1:
+def _explored(problem: Problem, starts: int | None, goes_on: Callable[[], bool]) -> Exploration:
+    if starts != 1:
         try:
             return explore(problem, starts, goes_on)
         except NotConvergedError:
@@ -166,18 +164,19 @@ def finished(optimum: Optimum) -> Certified:
     delta: what is slow enough for a large gait is not for a small one.
     """
     for _ in range(_DRIER + 1):
-        found = certified(_confirmed(optimum))
+        found = certified(confirmed(optimum))
         if not _is_small_and_viscous(found):
             break
         optimum = _at_smaller_delta(optimum)
     return found
 
 
-def _confirmed(optimum: Optimum) -> Answer:
+def confirmed(optimum: Optimum) -> Answer:
+    """An optimum through the stages to the answer, which has no certificate yet."""
     optimum = refine(descend(optimum))
     answer = confirm(optimum)
     for _ in range(_SADDLES):
-        if not answer.second_order.smallest + answer.second_order.error < -_SADDLE:
+        if not answer.second_order.smallest + answer.second_order.error < -SADDLE:
             break
         below = below_saddle(optimum)
         if below is None:

@@ -212,7 +212,8 @@ def multistart(
     told = _told(verbose, progress)
     kept = None if archive is None else open_archive(problem, archive)
     done = {} if kept is None else kept.of_search(sampler, seed)
-    todo = [k for k in range(starts) if k not in done]
+    before = frozenset(done)  # starts that end meanwhile are added to `done`
+    todo = (k for k in range(starts) if k not in before)
     try:
         settings = {"sampler": sampler, "seed": seed, "workers": workers, "time_limit": time_limit}
         for outcome in run_starts(problem, todo, **settings, executor=pool_for):  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, TRIVIAL, Outcome
 from colloc.results.solution import Solution
-from colloc.search.choose import is_trivial
+from colloc.search.certify import is_trivial
 from colloc.search.run import Progress
 from colloc.search.solve import FULL, REDUCED, solve
 from colloc.system.errors import ProblemError
@@ -89,7 +89,8 @@ def run_starts(
     ----------
     problem : Problem
     starts : iterable of int
-        Start numbers; a start depends only on the problem, the sampler, the seed and its number.
+        Start numbers, each taken when a worker is free for it. A start depends only on the problem, the sampler, the seed and
+        its number.
     sampler : {"latin-hypercube", "perturbed"}
     seed : int
     workers : int
@@ -110,7 +111,6 @@ def run_starts(
     """
     if not problem.gait.free:
         raise ProblemError("a prescribed motion is the same from every start; colloc solve measures it.")
-    starts = list(starts)
     waiting = iter(starts)
 
     def ready() -> Task | None:

@@ -53,7 +53,7 @@ def read_journal(folder: Path) -> Journal:
     if old is not None:
         raise StoreError(f"{old} was written by an older colloc, which this one does not read; choose another --output.")
     rows = read_rows(folder / NAME, KIND)
-    found = Journal(damaged=rows.damaged)
+    found = Journal(damaged=len(rows.damaged))
     for entry in rows.values.values():
         try:
             found.records.append(_record_from(entry))

@@ -13,7 +13,7 @@ from filelock import FileLock, SoftFileLock, Timeout
 
 from colloc.system.errors import StoreError
 
-_NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
+NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
 """What a file system without locks says: results are still replaced whole, but two runs are not kept apart."""
 
 
@@ -44,6 +44,6 @@ def locked(path: Path, *, wait: bool = False) -> Iterator[None]:
             holder = path.read_text(encoding="utf-8", errors="replace")[:200].strip() or "another process"
             raise StoreError(f"{path.parent} is in use by {holder}; wait for it, or choose another --output.") from None
         except OSError as error:
-            if error.errno not in _NO_LOCKS:
+            if error.errno not in NO_LOCKS:
                 raise StoreError(f"cannot write {path}: {error.strerror or error}; choose another --output.") from None
         yield

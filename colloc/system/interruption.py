@@ -35,7 +35,11 @@ _DEADLINE: ContextVar[float] = ContextVar("deadline", default=float("inf"))
 
 def interrupted() -> bool:
     """Whether Ctrl-C came, or a `time_limit` is over, for code within `interruptible` that can stop by itself."""
-    return (_heard.asked and _in_main_thread()) or time.monotonic() > _DEADLINE.get()
+    return (_heard.asked and _in_main_thread()) or _time_is_over()
+
+
+def _time_is_over() -> bool:
+    return time.monotonic() > _DEADLINE.get()
 
 
 def heeded() -> None:
@@ -122,7 +126,7 @@ def interruptible(*, polled: bool = True) -> Iterator[None]:
     handler = signal.getsignal(signal.SIGINT) if _in_main_thread() else None
     if handler not in (signal.default_int_handler, end_at_once, _hear):
         yield
-        if polled and interrupted():
+        if polled and _time_is_over():
             raise KeyboardInterrupt
         return
     outermost = handler is not _hear

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from colloc.system.errors import StoreError
+from colloc.system.file_lock import NO_LOCKS
 
 try:
     import fcntl
@@ -35,10 +36,11 @@ _PATIENCE = 60.0
 
 @dataclass(frozen=True)
 class Rows:
-    """What was read: values by key in the order in which the keys came, and how many rows were damaged."""
+    """What was read: values by key in the order in which the keys came, and the keys of damaged rows, as far as they can be
+    read."""
 
     values: dict[str, Any] = field(default_factory=dict)
-    damaged: int = 0
+    damaged: tuple[str, ...] = ()
 
 
 def hash_of(value: Any) -> str:
@@ -58,7 +60,7 @@ def _has_locks(folder: Path) -> bool:
             if fcntl is not None:
                 fcntl.lockf(probe, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        return isinstance(error, PermissionError)  # a folder to read from
+        return error.errno not in NO_LOCKS  # a folder to read from, or a full one, says nothing of locks
     return True
 
 
@@ -91,7 +93,8 @@ def _table(kind: str) -> str:
 def read_rows(path: Path, kind: str) -> Rows:
     """All rows of a file; none if there is no such file. `StoreError` if the file cannot be read, is too large, of another
     kind, or damaged beyond single rows."""
-    values, damaged = {}, 0
+    values: dict[str, Any] = {}
+    damaged: list[str] = []
     try:
         if not path.exists():
             return Rows()
@@ -110,12 +113,12 @@ def read_rows(path: Path, kind: str) -> Rows:
                         raise ValueError("wrong sum")
                     values[key.decode()] = json.loads(text)
                 except (TypeError, ValueError, RecursionError):
-                    damaged += 1
+                    damaged.append(bytes(key).decode("utf-8", "replace") if isinstance(key, bytes) else "a row without a key")
     except StoreError:
         raise
     except (sqlite3.Error, OSError, UnicodeDecodeError) as error:  # the last one: of a message of SQLite's
         raise StoreError(f"{path} cannot be read as a {kind} ({error}); move it away, or have sqlite3 recover it.") from None
-    return Rows(values, damaged)
+    return Rows(values, tuple(damaged))
 
 
 def put_rows(path: Path, kind: str, rows: Mapping[str, Any]) -> None:

@@ -45,12 +45,10 @@ class Replay:
     ----------
     distance, work : float
         The distance is that of the centre of mass.
-    rotation : float
-        Net rotation over the period [rad].
+    rotation, length : float
+        Net rotation over the period, and length of the path in shape space [rad].
     lever : float
         Largest distance of a point of the body from its centre of mass [body lengths].
-    length : float
-        Of the path in shape space [rad].
     driven_work : float
         Of the actuators where none takes energy back (`colloc.mechanics.driven_power`); NaN if it was not asked for.
     actuator_work : float
@@ -96,9 +94,13 @@ class Replay:
     other_rotation: float
     shares: np.ndarray = field(compare=False)
     instants: int
-    tail: tuple[np.ndarray, np.ndarray] = field(repr=False, compare=False)
+    tail: tuple[np.ndarray, np.ndarray] = field(compare=False)
     objective: Objective = EFFICIENCY
     across: float = 0.0
+
+    def __repr__(self) -> str:
+        value = f"{self.objective.short} = {self.value:.6g} +- {self.error * abs(self.value):.0e}"
+        return f"<Replay at {self.instants} instants: {value}, d = {self.distance:.6g}, W = {self.work:.6g}>"
 
     def tail_velocity(self, t: np.ndarray) -> np.ndarray:
         """Tail velocities ``(3, n_time)`` at phases t, between those of the replay: good to start a solve from."""

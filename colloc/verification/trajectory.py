@@ -40,7 +40,14 @@ class Trajectory:
     """Seconds; a whole number of samples."""
 
 
-def timed(path: Path, rate: float, period: float | None = None, limits: np.ndarray | float | None = None) -> Trajectory:
+def timed(
+    path: Path,
+    rate: float,
+    period: float | None = None,
+    limits: np.ndarray | float | None = None,
+    *,
+    keep_pace: bool = False,
+) -> Trajectory:
     """Sample a path at `rate`, with a period in seconds and joint speed limits.
 
     Parameters
@@ -53,6 +60,8 @@ def timed(path: Path, rate: float, period: float | None = None, limits: np.ndarr
         Seconds, rounded up to a whole number of samples; by default the shortest that the limits allow.
     limits : (n_joint,) or float, optional
         Largest joint speeds [rad/s].
+    keep_pace : bool
+        Whether the pace has to remain that of the gait; limits then make the period longer.
 
     Raises
     ------
@@ -67,6 +76,8 @@ def timed(path: Path, rate: float, period: float | None = None, limits: np.ndarr
     moved = np.abs(np.diff(vertices, axis=1)) * (t.size - 1)
     most = np.full(len(moved), np.inf) if limits is None else _one_each(limits, len(moved))
     slowest = (moved / most[:, None]).max(axis=0)
+    if keep_pace:
+        slowest = np.full_like(slowest, slowest.max())
     shortest = float(slowest.mean())
     if period is None and limits is None:
         raise ProblemError("a trajectory needs a period in seconds or joint speed limits.")
@@ -74,7 +85,10 @@ def timed(path: Path, rate: float, period: float | None = None, limits: np.ndarr
     if not np.isfinite(wanted) or wanted <= 0:
         raise ProblemError(f"the period must be positive, not {wanted:g} s.")
     if wanted < shortest * (1 - 1e-9):
-        raise ProblemError(f"a period of {wanted:g} s is too short for the joint speed limits; use at least {shortest:.6g} s.")
+        kept = " at the gait's own pace, which matters here" if keep_pace else ""
+        raise ProblemError(
+            f"a period of {wanted:g} s is too short for the joint speed limits{kept}; use at least {shortest:.6g} s."
+        )
     count = int(np.ceil(wanted * rate - 1e-9))
     if not 4 <= count <= _MOST_SAMPLES:
         raise ProblemError(f"{count} samples a period are too {'few' if count < 4 else 'many'}; change the rate or the period.")

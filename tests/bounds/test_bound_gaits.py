@@ -159,12 +159,12 @@ def test_shapes_at_which_few_directions_do_not_close_are_passed_over(monkeypatch
     def failing(body, friction, shape, *settings):
         if settings and shape[0] > 0:
             raise NotConvergedError("infeasible")
-        return small_gait(body, friction, shape, 60, 4, 0)
+        return SmallGait(1.0 + float(shape[0]), 0.0, np.empty((2, 0)), np.empty(0))
 
     monkeypatch.setattr(infinitesimal, "small_gait", failing)
     best, shape = best_small_gait(Chain(), Friction(), 2.5, steps=4, refined=1)
-    assert shape[0] <= 0
-    assert best.efficiency > 0
+    assert shape[0] == pytest.approx(0.0, abs=1e-2)
+    assert best.efficiency == 1.0 + shape[0]
 
 
 def test_the_start_of_a_search_counts_where_it_is_better_than_its_end(monkeypatch):
@@ -194,6 +194,7 @@ def test_small_gaits_of_many_joints_begin_with_directions_where_joints_and_links
     assert small_gait(Chain((0.2,) * 5), Friction(), np.zeros(4)).efficiency == pytest.approx(0.8640, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_the_best_small_gait_is_found_along_a_ridge_that_no_axis_follows():
     """At (3, 1, 1) it lies on the line where both ends are bent alike; a search along the axes ends at 0.188 beside it."""
     best, shape = best_small_gait(Chain(), Friction(3.0, 1.0, 1.0), 2.5)

@@ -232,6 +232,27 @@ def test_cell_bounds_hold_at_random_motions_inside(potential, body, friction, si
 
 
 @needs_kernel
+@pytest.mark.parametrize("way", ["by_convexity", "by_loads"])
+def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_raises_the_bound(potential, monkeypatch, way):
+    """By just as much, whichever way it is known; a motion that may cost nothing has no bound."""
+    cells, other = boxes(potential, 0.01, 100, 41), ({"by_convexity", "by_loads"} - {way}).pop()
+
+    def bound_with(gain, power):
+        allowed = enclosure.Allowance(*(np.full(cells.low.shape[1], 0.0) + value for value in (gain, power)))
+        unknown = enclosure.Allowance(*(np.full(cells.low.shape[1], np.inf) for _ in range(2)))
+        monkeypatch.setattr(guaranteed, way, lambda *_: allowed)
+        monkeypatch.setattr(guaranteed, other, lambda *_: unknown)
+        return cell_bounds(BODY, UNIT, potential, cells, 0.0)
+
+    motions = corner_motions(BODY, UNIT, cells)
+    power = (motions.potential - DELTA)[cells.at]
+    gain = potential.corner_gain(cells, motions)[cells.at] + potential.trial_error(cells, motions)[:, None]
+    for more, less in ((0.0, 0.0), (0.02, 0.0), (0.0, 0.1 * power.min()), (0.02, 0.9 * power.min())):
+        np.testing.assert_allclose(bound_with(more, less), ((gain + more) / (power - less)).max(axis=1), rtol=1e-12)
+    assert (bound_with(0.0, 0.5 * (power.min(axis=1) + power.max(axis=1))) == np.inf).all()
+
+
+@needs_kernel
 @pytest.mark.parametrize("steps", [0, 1, 3])
 def test_cell_bounds_hold_for_whatever_the_solver_returns(potential, monkeypatch, steps):
     """Far from balance the corners prove less, but nothing false."""
@@ -386,7 +407,7 @@ def test_halves_of_cells_fill_them_and_thin_ones_keep_their_rates():
         k = of.astype(int)
         assert np.all((inside >= low[:, k] - 1e-15) & (inside + extent <= low[:, k] + size[:, k] + 1e-15))
         np.add.at(volume, k, extent.prod(axis=0))
-        thin = finer.history[2] == 0
+        thin = finer.levels[2] == 0
         assert np.all((size[2, k] < 0.5 * size[:2, k].min(axis=0)) == thin)
         np.testing.assert_allclose(extent[2], size[2, k] * (1.0 if thin else 0.5))
     np.testing.assert_allclose(volume, size.prod(axis=0))

@@ -13,7 +13,7 @@ from colloc.bounds import cutting_plane, potential
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental, swaps_ends, two_resting
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.infinitesimal import small_gait
-from colloc.bounds.optimality_gap import upper_bound
+from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain, largest_ratios
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, usual_harmonics
 from colloc.bounds.sampling import Domain
@@ -322,7 +322,9 @@ def test_more_joints_have_coarser_potentials_by_default(monkeypatch):
     assert all(50 < efficiency_bound(Chain((1 / n,) * n), Friction()) < 250 for n in (3, 4, 5))
 
 
-@pytest.mark.parametrize(("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((1 / 6,) * 6), 2.0, "five links")])
+@pytest.mark.parametrize(
+    ("body", "limit", "match"), [(Chain(), 4.0, "joint_limit"), (Chain((1 / 6,) * 6), 2.0, "at most 5 links")]
+)
 def test_impossible_requests_are_refused(body, limit, match):
     with pytest.raises(ProblemError, match=match):
         efficiency_bound(body, Friction(), limit)
@@ -406,3 +408,15 @@ def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_pa
     assert upper_bound(problem, tmp_path, compute=False) is None
     with pytest.raises(ProblemError, match="chains of links under Coulomb friction, or the elliptic law, only"):
         upper_bound(problem, tmp_path, compute=True)
+
+
+def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(tmp_path, monkeypatch):
+    monkeypatch.setattr("colloc.bounds.optimality_gap.efficiency_bound", lambda *domain, cache: "computed")
+    for body in (Chain(), Chain((0.2,) * 5), Chain((1 / 6,) * 6), Chain((1 / 9,) * 9), ModalBody(2)):
+        problem = Problem("other", body=body, gait=Harmonic(1, "antipodal"))
+        try:
+            computed = upper_bound(problem, tmp_path, compute=True) == "computed"
+        except ProblemError:
+            computed = False
+        offered = "--bound" in gap_line(problem, 0.1, None)
+        assert offered == computed == (isinstance(body, Chain) and body.n_link <= 5), body

@@ -18,7 +18,10 @@ from colloc.bounds.sampled import Domain, bound_key
 from colloc.commands.ending import exit_code
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
+from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import read_problem_file
+from colloc.mechanics.chain import Chain
 from colloc.results.store import load, save
 from colloc.system.row_file import CACHE, put_rows
 
@@ -112,13 +115,13 @@ def test_a_full_disk_behind_standard_output_is_said_once(words, buffered, result
 def test_letters_that_an_encoding_lacks_are_printed_as_words(encoding, shown, three_link, monkeypatch):
     printed = io.BytesIO()
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(printed, encoding=encoding))
-    assert exit_code(lambda: print("\n".join(summary_lines(three_link, None))) or 0) == 0
+    assert exit_code(lambda: print("\n".join(summary_lines(three_link, None, verbose=True))) or 0) == 0
     assert shown in printed.getvalue().decode(encoding)
 
 
 def test_a_solve_ends_well_on_a_terminal_without_greek(quick, tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
-    done = command("solve", quick, "--no-figure", "--output", f"{tmp_path}/", env=environment)
+    done = command("solve", quick, "--no-figure", "--verbose", "--output", f"{tmp_path}/", env=environment)
     assert done.returncode in (0, 4)
     assert b"cos 2 pi t" in done.stdout
     assert done.stderr == b""
@@ -220,15 +223,18 @@ def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(quick, tmp_path, c
     assert printed.err.count("No bound is taken from it") == 1
 
 
-def test_a_bound_that_cannot_be_computed_costs_no_summary(quick, tmp_path, capsys):
-    text = QUICK.replace(
-        "ellipse(0.0, 1.4, 0.8)", "Fourier([0] * 5, [[0.6], [0.3], [0], [-0.3], [-0.6]], [[0.6], [0.3], [0.2], [0.3], [0.6]])"
-    )
-    (tmp_path / "p.py").write_text(text.replace('"quick",', '"quick", body=Chain((1 / 6,) * 6), guess='))
-    assert colloc(["solve", str(tmp_path / "p.py"), "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
+def test_a_bound_that_cannot_be_computed_costs_no_summary(quick, tmp_path, capsys, monkeypatch):
+    six = Problem("six", body=Chain((1 / 6,) * 6), gait=Harmonic(1, "antipodal"))
+
+    def refused(*_, **__):
+        return upper_bound(six, tmp_path, compute=True)
+
+    monkeypatch.setattr("colloc.bounds.optimality_gap.upper_bound", refused)
+    assert colloc(["solve", quick, "--bound", "--no-figure", "--output", f"{tmp_path}/"]) == 2
     printed = capsys.readouterr()
     assert "quick:" in printed.out
-    assert "no bound: bounds are computed for at most five links" in printed.err
+    assert "no bound: upper bounds are computed for at most 5 links, not 6" in printed.err
+    assert "--bound" not in printed.out  # nobody is sent to ask again
 
 
 def test_a_figure_that_cannot_be_drawn_costs_no_summary(quick, tmp_path, capsys):
@@ -301,10 +307,10 @@ def test_many_intervals_are_announced(quick, tmp_path, capsys, monkeypatch):
     class _Begun(Exception):
         pass
 
-    def begun(*_):
+    def begun(*_, **__):
         raise _Begun
 
-    monkeypatch.setattr("colloc.commands.solve._solved", begun)
+    monkeypatch.setattr("colloc.studies.saved.solved_and_saved", begun)
     for intervals, said in ((5000, "5000 intervals will take about 1 min 40 s"), (60, "")):
         with pytest.raises(_Begun):
             colloc(["solve", quick, "--mesh", str(intervals), "--output", f"{tmp_path}/"])

@@ -3,15 +3,21 @@
 import csv
 import json
 
+import h5py
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
 from colloc.commands.export import main
-from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.commands.summary import summary_lines
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.problem import Problem
+from colloc.laws.viscous import Viscous
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.pictures.report_page import report_page
 from colloc.results.store import save
+from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 from colloc.verification.trajectory import timed
@@ -120,6 +126,49 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     capsys.readouterr()
     assert main([str(file)]) == 2
     assert "needs a period in seconds" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"friction": Viscous(normal=2, tangential=1), "objective": "towing"},
+        {"power_limit": 10.0},
+    ],
+    ids=["drag", "power limit"],
+)
+def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hold(changes, unsolved, tmp_path):
+    solution = unsolved(Problem("paced", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **changes))
+    problem, limits = solution.problem, np.array([2.0, 1.5])
+    stated = solution.export(tmp_path / "x.json", max_speed=limits, rate=400)
+    written = json.loads((tmp_path / "x.json").read_text())
+    made = replay(problem.body, problem.friction, path_through(np.array(written["angles_rad"])), 1e-2)
+    assert made.work == pytest.approx(stated["work_per_period_weight_times_length"], rel=2e-4)
+    assert made.distance == pytest.approx(stated["distance_per_period_body_lengths"], rel=2e-4)
+    speeds = np.abs(written["speeds_rad_per_s"]).max(axis=1) / limits
+    assert 0.99 < speeds.max() <= 1 + 1e-9  # the period is the shortest
+    assert "the gait's own" in stated["pace"]
+    with pytest.raises(ProblemError, match=r"too short for the joint speed limits at the gait's own pace.*use at least"):
+        solution.export(tmp_path / "x.json", max_speed=limits, period=0.99 * stated["period_s"])
+
+
+def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
+    guess = Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
+    solution = unsolved(Problem("soft", guess, ModalBody(2, panels=4), Friction(3), Harmonic(1, "antipodal"), intervals=6))
+    assert str(solution.gait).startswith("mode 1: ")
+    assert repr(solution.gait) == "<Fourier of 2 modes>"
+    solution.export(tmp_path / "soft.csv", period=4)
+    header = next(line for line in (tmp_path / "soft.csv").read_text().splitlines() if not line.startswith("#"))
+    assert header == "time_s,mode_1_rad,mode_2_rad,mode_1_rad_per_s,mode_2_rad_per_s"
+    data = solution.to_xarray()
+    assert data.modes.dims == data.mode_rates.dims == ("mode", "t")
+    assert data.mode.values.tolist() == [1, 2]
+    columns = [name for name in solution.to_dataframe() if "mode" in name]
+    assert columns == ["modes_1", "modes_2", "mode_rates_1", "mode_rates_2"]
+    with h5py.File(save(solution, tmp_path / "soft.h5")) as file:
+        held = [*file["motion"], *file["gait"]]
+        assert {"modes", "mode_rates", "mode"} <= set(held)
+    told = [*data.variables, *solution.to_dataframe(), *held, report_page(solution), *summary_lines(solution, None)]
+    assert not [text for text in told if "joint" in str(text).replace("joint_limit", "")]  # a field, of any body
 
 
 def test_a_corner_where_every_joint_rests_does_not_stop_the_clock():

@@ -15,9 +15,9 @@ from colloc.results.solution import Solution
 from colloc.results.store import load, save
 
 
-def changed(solution, certificate=None, levels=None):
+def changed(solution, certificate=None, answer=None):
     return Solution(
-        solution.problem, levels or solution.history, certificate or solution.certificate, solution.seconds, solution.source
+        solution.problem, answer or solution.answer, certificate or solution.certificate, solution.seconds, solution.source
     )
 
 
@@ -48,10 +48,9 @@ def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp
     assert not report["certified"]
     assert "is off by" in report["complaint"]
 
-    last = three_link.last
-    x = last.x.copy()
+    x = three_link.answer.x.copy()
     x[three_link.layout.parameters[1, 0]] += 0.05
-    file = save(changed(three_link, levels=[*three_link.history[:-1], replace(last, x=x)]), tmp_path / "gait.h5")
+    file = save(changed(three_link, answer=replace(three_link.answer, x=x)), tmp_path / "gait.h5")
     assert recheck.main([str(file)]) == 4
     assert "NOT CERTIFIED" in capsys.readouterr().out
 
@@ -78,7 +77,7 @@ def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_pat
     offset = solved("three_link_offset")[0]
     a, b = save(three_link, tmp_path / "a.h5"), save(offset, tmp_path / "b.h5")
     mirror = three_link.problem.with_(intervals=30)
-    other = save(Solution(mirror, three_link.history, three_link.certificate), tmp_path / "c.h5")
+    other = save(Solution(mirror, three_link.answer, three_link.certificate), tmp_path / "c.h5")
     assert compare.main([str(a), str(b)]) == 1
     printed = capsys.readouterr().out
     assert "different: efficiencies differ by 20" in printed

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, shifted
+from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, harmonics_within, shifted
 from colloc.system.errors import ProblemError
 
 T = np.linspace(0, 1, 37)
@@ -31,6 +31,23 @@ def test_members_have_the_symmetry_of_their_class(n_joint, symmetry, harmonics):
         np.testing.assert_allclose(gait.angles(T + 0.5), -gait.angles(T), atol=1e-12)
     else:
         assert gait.sin[0, 0] == 0
+
+
+@pytest.mark.parametrize("harmonics", [2, 6])
+def test_an_even_harmonic_that_antipodal_gaits_cannot_have_is_refused(harmonics):
+    with pytest.raises(ProblemError, match=rf"odd harmonics only.*ask for {harmonics - 1} or {harmonics + 1}"):
+        Harmonic(harmonics, "antipodal")
+    assert harmonics_within(harmonics, "antipodal") == Harmonic(harmonics - 1, "antipodal")
+
+
+@pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
+@pytest.mark.parametrize("n_joint", [1, 2, 3])
+@pytest.mark.parametrize("harmonics", [1, 2, 3, 4])
+def test_every_class_that_can_be_made_has_gaits_of_its_highest_harmonic(harmonics, n_joint, symmetry):
+    gait_class = harmonics_within(harmonics, symmetry)
+    rng = np.random.default_rng(5)
+    gait = gait_class.fourier(rng.normal(size=gait_class.size(n_joint)), n_joint)
+    assert np.hypot(gait.cos[:, -1], gait.sin[:, -1]).max() > 0.01
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])

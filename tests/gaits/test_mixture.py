@@ -86,6 +86,25 @@ def test_a_mixture_taken_apart_is_the_polygon_and_its_mean_follows_the_same_shap
     assert np.allclose(gait.mean.shapes, gait.shapes, atol=1e-12)
 
 
+@pytest.mark.parametrize("n_joint", [2, 3])
+def test_loops_run_counter_clockwise_or_clockwise_as_asked(n_joint):
+    """Three directions that add up to nothing make one loop: it encloses the same area with either sign."""
+    turn = 2 * np.pi * np.array([0.3, 2.3, 1.3]) / 3  # neither order of the directions as they are stated
+    plane = np.linalg.qr(np.random.default_rng(7).standard_normal((n_joint, n_joint)))[0][:2] if n_joint > 2 else np.eye(2)
+    directions = np.stack([np.cos(turn), np.sin(turn)], axis=1) @ plane
+    gait = Mixture([[0.2, 0.2, 0.2]], [directions], np.zeros(n_joint))
+
+    def area(sense):
+        x, y = plane @ gait.unmixed(1, sense).shapes
+        return 0.5 * np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
+
+    triangle = 0.2**2 * np.sqrt(3) / 4
+    if n_joint == 2:
+        assert (area(1), area(-1)) == pytest.approx((triangle, -triangle))
+    else:  # which side of their plane is above is not said
+        assert sorted((area(1), area(-1))) == pytest.approx([-triangle, triangle])
+
+
 def test_splitting_pieces_changes_no_motion():
     gait = mixture("bilateral")
     finer = gait.split(17)

@@ -87,7 +87,7 @@ def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, del
         return
     assert solution.status == CERTIFICATE_FAILED
     assert "replay gap" in solution.message
-    error = abs(solution.efficiency / solution.certificate.efficiency - 1)
+    error = abs(solution.answer.efficiency / solution.certificate.efficiency - 1)
     assert error > 1e-4
     # what the certificate itself reports is right: an independent, finer replay agrees with it
     again = replayed(solution.gait, delta, instants=4800, tolerance=1e-7)

@@ -247,7 +247,9 @@ def test_the_power_law_ends_in_drag_and_in_coulomb_friction():
     mu = {"mu_t": 2.0, "mu_f": 1.0, "mu_b": 1.0}
 
     def power(law, delta=1e-6):
-        return body.motion(law, angles, rates, delta, body.solve(law, angles, rates, delta).require()).power
+        with numpy_instead():  # six laws of other powers would be compiled
+            z = body.solve(law, angles, rates, delta).require()
+            return body.motion(law, angles, rates, delta, z).power
 
     drag, dry = power(Viscous(2.0, 1.0)), power(Friction(**mu))
     np.testing.assert_allclose(power(PowerLaw(1.0, **mu)), drag, rtol=1e-12)

@@ -97,7 +97,7 @@ def test_purcells_swimmer_is_solved_certified_kept_and_read(tmp_path):
     read = load(save(solution, tmp_path / "purcell.h5"))
     assert read.problem.hash == solution.problem.hash
     assert read.problem.friction == LAW
-    assert "as work depends on the pace under drag (2, 1)" in "\n".join(summary_lines(solution, None))
+    assert "as work depends on the pace under drag (2, 1)" in "\n".join(summary_lines(solution, None, verbose=True))
     assert "the work depends on the pace" in report_page(solution)
     assert "no upper bound" in gap_line(solution.problem.with_(objective="efficiency"), 0.1, None)
 

@@ -82,6 +82,25 @@ def test_the_forces_of_the_full_program_obey_the_law_where_the_body_is_balanced(
     np.testing.assert_allclose(net_force(now.posture, now.force), 0.0, atol=1e-10)
 
 
+@pytest.mark.parametrize("mu", [(1, 1, 3), (1, 3, 1), (3, 1, 2)], ids=str)
+def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_themselves_or_turn_about_an_end(mu):
+    """A straight body that slides as a whole, forwards, backwards and sideways; couples by a turn about a link's own end."""
+    body, law, straight, delta = Chain(LENGTHS, weights=WEIGHTS), Friction(*mu), np.zeros((2, 3)), 1e-9
+    most = body.largest_forces(law).ravel()
+    along, across, couples = np.split(most, 3)
+    ways = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    found = np.abs(body.forces(law, straight, np.zeros((2, 3)), ways, delta))
+    np.testing.assert_allclose(found[:3, :2].max(axis=1), along)
+    np.testing.assert_allclose(found[3:6, 2], across)
+    np.testing.assert_allclose(along, max(mu[1:]) * np.array(WEIGHTS))
+    # a link that turns about its middle pushes back alike on both halves: the couple is that of half its weight a quarter away
+    spinning = np.abs(body.forces(law, straight[:, :1], np.zeros((2, 1)), np.array([[0.0], [-LENGTHS[0] / 2], [1.0]]), delta))
+    assert spinning[6, 0] == pytest.approx(couples[0])
+    angles, rates = random_instants(200)
+    z = np.random.default_rng(1).normal(size=(3, 200))
+    assert (np.abs(body.forces(law, angles, rates, z, 1e-9)) <= most[:, None] * (1 + 1e-12)).all()
+
+
 def test_the_replay_is_that_of_a_program_of_its_own():
     gait = Fourier([0.2, -0.1], [[1.2], [0.3]], [[0.2], [1.0]])
     theirs = played(Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS), lambda t: (gait.angles(t), gait.rates(t)), 1e-2, 1e-5)

@@ -15,7 +15,6 @@ from colloc.mechanics.friction import Friction
 from colloc.pictures.animation import pictures
 from colloc.pictures.movie import write_movie
 from colloc.pictures.publication import save_panels
-from colloc.results.solution import Solution
 from colloc.results.store import save
 
 
@@ -98,12 +97,6 @@ def test_impossible_wishes_are_refused(options, three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
     assert main([str(file), *options]) == 2
     assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_a_solve_without_levels_has_nothing_to_show(three_link, tmp_path, capsys):
-    file = save(Solution(three_link.problem, []), tmp_path / "x.h5")
-    assert main([str(file)]) == 2
-    assert "holds no gait" in capsys.readouterr().err
 
 
 def test_publication_figures_are_pdf_and_png_of_journal_width(three_link, tmp_path):

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from shared.readable import assert_readable
 
 from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
@@ -18,6 +19,7 @@ from colloc.pictures.figure import draw_filmstrip, forbidden, strips
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
 from colloc.pictures.style import save
+from colloc.smooth.modal_body import ModalBody
 from scripts.gallery import picture
 
 
@@ -81,6 +83,30 @@ def test_forbidden_shapes_are_the_exact_set_of_the_three_link_body():
     # per sign: the triangle-like region min(2a+b, a+2b) > 2 pi in [0, pi]^2 has area pi^2 / 6
     assert area(np.pi) == pytest.approx(2 * np.pi**2 / 6, rel=0.03)
     assert area(np.pi / 2) == pytest.approx(3 * np.pi**2, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("body", "limit", "plane", "share"),
+    [
+        (Chain(), 2.5, (0, 1), None),
+        (Chain((0.25,) * 4), (1.0, 2.0, 3.0), (1, 2), 1 - 2.0 * 3.0 / np.pi**2),
+        (Chain((0.2,) * 5), np.pi, (2, 3), 0.0),
+        (ModalBody(2, panels=4), 0.8, (0, 1), None),
+        (ModalBody(3, panels=4), 0.8, (1, 2), 0.0),
+    ],
+    ids=["three links", "limits of each joint", "five links", "two modes", "three modes"],
+)
+def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
+    grid, excess = forbidden(body, limit, *plane)
+    if share is not None:
+        assert (excess > 0).mean() == pytest.approx(share, abs=0.01)
+    shapes = np.random.default_rng(7).uniform(-np.pi, np.pi, (body.n_joint, 20000))
+    shapes = np.concatenate([shapes, 0.4 * shapes], axis=1)
+    stretched, most = under_one_limit(shapes, limit)
+    allowed = shapes[:, (body.largest_angles(stretched) <= most) & (body.crossing_depth(shapes) == 0)]
+    assert allowed.shape[1] > 100
+    column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)
+    assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])  # no deeper than the nearest point of the grid may be
 
 
 def test_only_the_kinds_asked_for_are_written_and_nobodys_settings_change(tmp_path):

@@ -21,13 +21,14 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.pictures.motion_frames import frames
+from colloc.pictures.motion_frames import frames, lab_outline
 from colloc.pictures.report_page import PLAIN, environment, report_page
 from colloc.pictures.style import INK
-from colloc.results import certificate
 from colloc.results.checks import Check
 from colloc.results.solution import Solution
 from colloc.results.store import save
+from colloc.search import certify as certificate
+from colloc.search.certify import certify
 
 BROWSER = next((path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path), None)
 VOID = {"meta", "br", "hr", "input", "img", "link"}
@@ -122,9 +123,10 @@ EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&<!--"
 
 def test_everything_from_the_file_is_escaped(three_link):
     checks = (Check(EVIL, 1.0, 0.0, EVIL), *three_link.certificate.checks)
-    levels = [replace(three_link.history[0], status=EVIL, optimal=False), *three_link.history]
+    history = (*three_link.history, replace(three_link.history[0], status=EVIL, optimal=False))
+    answer = replace(three_link.answer, history=history)
     versions = {EVIL: EVIL, "colloc": EVIL}
-    evil = Solution(three_link.problem, levels, replace(three_link.certificate, checks=checks), 1.0, EVIL, EVIL, versions)
+    evil = Solution(three_link.problem, answer, replace(three_link.certificate, checks=checks), 1.0, EVIL, EVIL, versions)
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
     seen = outline(page)
     assert "<img" not in page
@@ -172,15 +174,15 @@ def test_pictures_take_colour_and_font_from_the_page_and_do_not_style_it(page):
         assert "#ffffff" not in picture.replace("fill: #ffffff; stroke", "")  # no white background
 
 
-def test_failures_show_in_red_and_a_solve_without_levels_has_a_page_too(three_link):
+def test_failures_show_in_red_and_an_interrupted_solve_has_a_page_too(three_link):
     bad = replace(three_link.certificate, checks=(Check("replay gap", 0.1, 1e-4, "x"), *three_link.certificate.checks))
-    text = " ".join(outline(report_page(Solution(three_link.problem, three_link.history, bad))).text)
+    text = " ".join(outline(report_page(Solution(three_link.problem, three_link.answer, bad))).text)
     assert "✗ fails" in text
     assert "✗ certificate failed" in text
-    empty = Solution(three_link.problem, [], message="no first level.")
-    text = " ".join(outline(report_page(empty)).text)
-    assert "✗ not converged" in text
-    assert "no first level." in text
+    ended = Solution(three_link.problem, three_link.answer, message="ended early.", interrupted=True)
+    text = " ".join(outline(report_page(ended)).text)
+    assert "✗ interrupted" in text
+    assert "ended early." in text
 
 
 @pytest.mark.parametrize("n_link", [2, 3, 5, 8])
@@ -205,7 +207,58 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     # points only, between them z is interpolated: hence the loose bound on a mesh of eight intervals
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
-    np.testing.assert_allclose(shown.step, shown.centre[:, -1] - shown.centre[:, 0])
+
+
+@pytest.fixture(scope="module")
+def turning(unsolved):
+    """A gait that turns, asked for the angle by which it does, with a replay; not an optimum."""
+    guess = Fourier(mean=[0.5, 0.9], cos=[[1.0], [0.2]], sin=[[0.0], [1.1]])
+    free = unsolved(crawler(3, rotation=None, guess=guess, intervals=40, mesh_tolerance=0))
+    assert abs(free.rotation) > 0.1
+    problem = free.problem.with_(rotation=free.rotation)
+    asked = replace(free, problem=problem, answer=replace(free.answer, problem=problem))
+    return replace(asked, certificate=certify(asked.answer))
+
+
+def test_periods_of_a_turning_gait_are_drawn_one_after_the_other_as_it_turns(turning):
+    shown = frames(turning, count=25, periods=4)
+    for period, before in enumerate(shown.before):
+        motion = turning.sample(period + shown.t)
+        outline = lab_outline(turning.problem.body, motion.angles, motion.theta, motion.tail)
+        np.testing.assert_allclose(before.of(shown.ends), outline, atol=1e-12)
+        np.testing.assert_allclose(before.of(shown.centre), motion.centre, atol=1e-12)
+
+
+def test_the_page_of_a_turning_gait_states_angle_and_radius_and_claims_no_straight_way(turning):
+    text = re.sub(r"\s+", " ", " ".join(outline(report_page(turning)).text))
+    words = f"turns {abs(np.degrees(turning.rotation)):.4g}° "
+    assert f"{np.degrees(turning.rotation):+.2f}° turned a cycle" in text
+    assert f"{turning.turning_radius:.4g} radius of the circle it crawls" in text
+    assert words in text
+    assert "turned by the angle that was asked for" in text
+    assert "straight" not in text
+    assert words in " ".join(outline(turning._repr_html_()).text)
+    assert turning.to_xarray().attrs["turning_radius"] == turning.turning_radius
+
+
+@needs_browser
+def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path):
+    tell = """<script>
+      const seen = [], arc = CanvasRenderingContext2D.prototype.arc, slider = document.getElementById("phase");
+      CanvasRenderingContext2D.prototype.arc = function (x, y, ...rest) { seen.push([x, y]); arc.call(this, x, y, ...rest); };
+      for (const place of [100, 500, 900]) { slider.value = place; slider.dispatchEvent(new Event("input")); }
+      document.documentElement.dataset.seen = JSON.stringify(seen);
+    </script></body>"""
+    result = browsed(report_page(turning).replace("</body>", tell), tmp_path)
+    seen = np.array(json.loads(unescape(re.search('data-seen="([^"]*)"', result.stdout).group(1))))
+    motion = turning.sample(np.array([0.3, 1.5, 2.7]))
+    joints = lab_outline(turning.problem.body, motion.angles, motion.theta, motion.tail)[:, 1:]  # hinges, then the head
+    x, y = np.concatenate([joints, motion.centre[:, None]], axis=1).transpose(0, 2, 1).reshape(2, -1)
+    one, none = np.ones_like(x), np.zeros_like(x)
+    rows = np.concatenate([np.stack([x, one, none]), np.stack([-y, none, one])], axis=1).T
+    pixels = seen.T.ravel()
+    fitted = rows @ np.linalg.lstsq(rows, pixels, rcond=None)[0]  # a scale and a shift of the canvas, the same for all
+    np.testing.assert_allclose(pixels, fitted, atol=1.0)
 
 
 def test_the_dot_of_a_plane_is_placed_in_the_coordinates_of_its_picture(unsolved):
@@ -233,24 +286,29 @@ def test_the_command_writes_the_page_beside_the_result(three_link, tmp_path, cap
     assert main([str(tmp_path / "none.h5")]) == 2
 
 
-@needs_browser
-def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
-    page = tmp_path / "page.html"
-    # frames by the clock: a browser without a screen may draw none before it is done
-    clock = "<script>window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 16);</script></head>"
-    page.write_text(report_page(three_link).replace("</head>", clock), encoding="utf-8")
+def browsed(page, folder):
+    """What a browser makes of a page: its document as standard output, its complaints as standard error."""
+    file = folder / "page.html"
+    file.write_text(page, encoding="utf-8")
     options = "headless no-sandbox disable-gpu disable-quic no-first-run disable-background-networking disable-component-update"
     command = [
         BROWSER,
         *(f"--{option}" for option in options.split()),
         "--disable-sync",
-        f"--user-data-dir={tmp_path / 'profile'}",
+        f"--user-data-dir={folder / 'profile'}",
         "--enable-logging=stderr",
         "--virtual-time-budget=1500",
         "--dump-dom",
-        f"file://{page}",
+        f"file://{file}",
     ]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+
+
+@needs_browser
+def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
+    # frames by the clock: a browser without a screen may draw none before it is done
+    clock = "<script>window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 16);</script></head>"
+    result = browsed(report_page(three_link).replace("</head>", clock), tmp_path)
     assert "CONSOLE" not in result.stderr, [line for line in result.stderr.splitlines() if "CONSOLE" in line]
     assert 'data-ready="yes"' in result.stdout
     phase = float(re.search(r"t = ([0-9.]+)</output>", result.stdout).group(1))
@@ -269,7 +327,7 @@ def test_a_notebook_shows_a_card(three_link):
     text = " ".join(card.text)
     for words in ("three_link", "solved", "0.26003", "checks, all hold", "distance d"):
         assert words in text
-    failed = Solution(three_link.problem, [], message="no first level.")
+    failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)
 
 
@@ -284,9 +342,9 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
 
 def test_levels_on_the_way_do_not_alarm_and_the_last_one_does(three_link):
     rough = replace(three_link.history[0], optimal=False, status="not stationary")
-    good = replace(three_link, levels=[rough, *three_link.history[1:]])
+    good = replace(three_link, answer=replace(three_link.answer, history=(rough, *three_link.history[1:])))
     text = " ".join(outline(report_page(good)).text)
     assert "on the way" in text
     assert "✗" not in text
-    bad = replace(three_link, levels=[*three_link.history[:-1], rough])
+    bad = replace(three_link, answer=replace(three_link.answer, history=(*three_link.history[:-1], rough)))
     assert "✗ not stationary" in " ".join(outline(report_page(bad)).text)

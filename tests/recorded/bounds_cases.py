@@ -131,7 +131,7 @@ def cells_of_a_potential():
     potential = PotentialRange(space, _free(space))
     bounds = gain_bound({k: np.exp(1j * k * np.arange(9.0)) / k for k in (1, 3)})
     proved = certify(Domain(THREE, ISOTROPIC, np.pi), space, _free(space), 3.0, deepest=1, part=(7, 400))
-    found = proved.guaranteed, proved.open_cells, proved.cells, proved.history
+    found = proved.guaranteed, proved.open_cells, proved.cells, proved.levels
     return (
         potential.corner_gain(cells, motions),
         potential.trial_error(cells, motions),

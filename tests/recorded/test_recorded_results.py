@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from colloc.mechanics.native_kernel import native_kernel
-from tests.recorded import bounds_cases, mechanics_cases, results_cases, smooth_cases, verification_cases
+from tests.recorded import bounds_cases, mechanics_cases, smooth_cases, verification_cases
 from tests.recorded.digest import assert_same, digest
 
 CASES = {
     f"{part.__name__.rpartition('.')[2].removesuffix('_cases')}: {name}": (case, part.PRECISION, part.FLOOR)
-    for part in (mechanics_cases, smooth_cases, bounds_cases, verification_cases, results_cases)
+    for part in (mechanics_cases, smooth_cases, bounds_cases, verification_cases)
     for name, case in vars(part).items()
     if callable(case) and getattr(case, "__module__", "") == part.__name__ and not name.startswith("_")
 }

@@ -11,9 +11,10 @@ from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near, transcribed
 from colloc.results.solution import Solution
-from colloc.search.confirm import answer, level_found
-from colloc.search.converge import FINE, Found, settled
-from colloc.search.solve import optimum
+from colloc.search.confirm import confirm, unconfirmed
+from colloc.search.converge import as_it_is, converged
+from colloc.search.optimum import FINE
+from tests.shared.stages import answer_near
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 WAVE = {**FOUR, "guess": Fourier(np.zeros(3), [[0.9], [0.0], [-0.9]], [[0.2], [0.9], [-0.2]])}
@@ -47,6 +48,13 @@ def near_start(case, shake=1e-2):
     v = v + shake * np.random.default_rng(0).normal(size=v.size)
     space.move_checks(v)
     return space, v, ReducedProgram(space, DELTA)
+
+
+def test_least_values_and_the_rotation_are_asked_for_as_they_are_stated():
+    stated = Problem("p", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.3, at_least={"distance": 0.21, "-work": -0.4})
+    program = ReducedProgram(space_near(stated, stated.guess)[0], DELTA)
+    np.testing.assert_array_equal(program.row_lower[:3], [0.3, 0.21, -0.4])
+    np.testing.assert_array_equal(program.row_upper[:3], [0.3, np.inf, np.inf])
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -96,7 +104,7 @@ def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
     space, v = space_near(problem, problem.guess)
     edges = space.mesh.edges
     space, v = space_near(problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))]))
-    solution = Solution(problem, [level_found(Found.at(space, v, problem.delta))])
+    solution = Solution(problem, unconfirmed(as_it_is(space, v, problem.delta)))
     again = load(save(solution, tmp_path / "path.h5"))
     np.testing.assert_array_equal(again.answer.knots, edges)
     np.testing.assert_array_equal(again.gait.shapes, solution.gait.shapes)
@@ -108,14 +116,14 @@ def test_arcs_and_mesh_come_back_from_a_file(tmp_path):
 def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
     """Tail velocities and link forces among the variables, the balance among the constraints; two programs, one solution."""
     problem = Problem("p", ellipse(1.0, 0.7, 1.1), friction=Friction(1.7, 1, 1.3), gait=gait, intervals=24, delta=3e-3)
-    solution = optimum(problem.with_(mesh_tolerance=0.0))
-    found, answer = solution.history[-2:]
+    answer = answer_near(problem.with_(mesh_tolerance=0.0))
+    found = answer.history[-2]
     assert (found.program, answer.program) == ("reduced", "full")
     assert max(answer.kkt_error, answer.violation, answer.complementarity) < 1e-8
     assert answer.iterations <= 15
-    assert answer.efficiency == pytest.approx(found.efficiency, rel=1e-7)
-    assert solution.layout.forces.size == 9 * solution.mesh.n_point
-    assert solution.message == ""
+    assert answer.value == pytest.approx(found.value, rel=1e-7)
+    assert answer.layout.forces.size == 9 * answer.mesh.n_point
+    assert answer.message == ""
 
 
 def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since():
@@ -124,11 +132,11 @@ def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since()
     ends = space.member(v).phases
     graded = np.concatenate([a + (b - a) * np.linspace(0, 1, 9)[:-1] ** 2 for a, b in pairwise(ends)] + [ends[-1:]])
     space = space.remeshed(space.member(v), graded, "gauss-3")
-    found = settled(space, space.parameters(space.member(v)), 3e-2, 0.5, FINE)
-    level, message = answer(found)
-    assert message == ""
+    found = converged(space, space.parameters(space.member(v)), 3e-2, 0.5, FINE)
+    answer = confirm(found)
+    assert answer.message == ""
     assert np.abs(found.gait.phases - ends).max() > 1e-6
-    np.testing.assert_allclose(level.edges, space.phase_mesh(found.gait).edges, atol=1e-4)
+    np.testing.assert_allclose(answer.edges, space.phase_mesh(found.gait).edges, atol=1e-4)
 
 
 def test_amplitudes_of_modes_may_exceed_the_bound_on_the_tangent():

@@ -8,7 +8,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import space_near
-from colloc.search.solve import optimum
+from tests.shared.stages import answer_near
 
 PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)
 SADDLE = ellipse(0.0, 0.30734, 0.76781)
@@ -166,10 +166,10 @@ def test_the_gait_between_two_ways_of_bending_is_a_saddle():
 
 
 def test_an_optimum_is_better_than_its_neighbours():
-    solution = optimum(PROBLEM.with_(friction=Friction(10, 1, 1), intervals=20))
-    space, v = space_near(solution.problem, solution.gait, solution.answer.edges, solution.answer.scheme)
+    answer = answer_near(PROBLEM.with_(friction=Friction(10, 1, 1), intervals=20))
+    space, v = space_near(answer.problem, answer.gait, answer.edges, answer.scheme)
     space.move_checks(v)
-    program = ReducedProgram(space, solution.answer.delta)
+    program = ReducedProgram(space, answer.delta)
     found = curvature(program, v)
     assert found.n_free == v.size
     assert found.smallest > 100 * found.error

@@ -10,7 +10,8 @@ from colloc.gaits.starts import latin_hypercube_gait
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
-from colloc.search.converge import FINE, at_rest
+from colloc.search.converge import at_rest
+from colloc.search.optimum import FINE
 
 BODIES = {"none": Chain((0.3, 0.2, 0.15, 0.35)), "bilateral": Chain((0.3, 0.2, 0.2, 0.3)), "antipodal": Chain()}
 

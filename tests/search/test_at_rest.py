@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from colloc import Harmonic, NotConvergedError, Polygon, Problem, ellipse
-from colloc.numerics.sqp import stationarity
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.search.confirm import RADIUS, answer
-from colloc.search.converge import FINE, Found, at_rest, kink_or_not, searched
+from colloc.search.confirm import RADIUS, confirm
+from colloc.search.converge import at_rest, conditions_on_kink
+from colloc.search.optimum import FINE
+from tests.shared.stages import optimum_near
 
 PROBLEM = Problem("plain", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=40, mesh_tolerance=0)
 
@@ -54,18 +55,19 @@ def test_a_gait_that_swings_between_two_instants_is_left_to_finer_cells():
 
 @pytest.fixture(scope="module")
 def found():
-    return searched(PROBLEM, PROBLEM.guess, lambda level: None)[0]
+    return optimum_near(PROBLEM)
 
 
 @pytest.mark.parametrize(("beyond", "kept"), [(0.0, False), (1e-7, False), (1e-4, True)])
 def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(found, monkeypatch, beyond, kept):
     """Up to what a certificate lets pass; else the gait of the search is, if it satisfies the first-order conditions."""
-    monkeypatch.setattr(ReducedProgram, "place_rows", lambda program, v: beyond)
-    level, text = answer(found)
-    assert level.optimal
-    assert ("beyond its limits" in text) == kept
-    assert (level.status == "stationary") == kept
-    assert abs(level.value + found.objective) < RADIUS
+    place = ReducedProgram.place_rows
+    monkeypatch.setattr(ReducedProgram, "place_rows", lambda program, v: (place(program, v), beyond)[1])
+    answer = confirm(found)
+    assert answer.optimal
+    assert ("beyond its limits" in answer.message) == kept
+    assert (answer.status == "stationary") == kept
+    assert abs(answer.value + found.objective) < RADIUS
 
 
 @pytest.mark.parametrize(
@@ -78,10 +80,7 @@ def test_a_kink_may_be_missed_by_more_where_the_slopes_beside_it_are_small(slope
         lower=-np.ones(1), upper=np.ones(1), row_lower=none, row_upper=none, rows=lambda v: none,
         row_slopes=lambda v: np.empty((0, 1)), objective=lambda v: slope * abs(v[0]), gradient=lambda v: slope * np.sign(v),
     )  # fmt: skip
-    v = np.array([missed])
-    found = Found(PROBLEM, v, 1e-4, vee.objective(v), stationarity(vee, v), FINE, 0, 0, 0.0, program=vee)
-    assert not found.optimal
-    assert kink_or_not(found).on_kink == kink
+    assert (conditions_on_kink(vee, np.array([missed]), FINE) is not None) == kink
 
 
 def test_a_gait_that_a_finer_mesh_finds_no_member_near_goes_on_from_about_it(monkeypatch):
@@ -95,6 +94,6 @@ def test_a_gait_that_a_finer_mesh_finds_no_member_near_goes_on_from_about_it(mon
         return member(space, gait)
 
     monkeypatch.setattr(PathSpace, "parameters", near_once)
-    found, lacks = searched(problem, problem.guess, lambda level: None)
+    found = optimum_near(problem)
     assert len(asked) > 1
-    assert (found.optimal, lacks) == (True, "")
+    assert (found.optimal, found.lacks) == (True, "")

@@ -1,4 +1,4 @@
-"""Chains of 2 to 8 links: self-contact of all pairs, the two-link body, and the problem files."""
+"""Chains of 2 to 8 links: self-contact of all pairs, and the two-link body."""
 
 import numpy as np
 import pytest
@@ -7,13 +7,12 @@ from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import shape_checks
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
-from colloc.commands.solve import main
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import CLEARANCE_SMOOTHING, clearance, crossing_depth, far_pairs, passing_depth
 from colloc.mechanics.friction import Friction
-from colloc.search.far_contact import crossing_pairs, last_free
+from colloc.search.converge import crossing_pairs, last_free
 from colloc.search.ipopt import Solver
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
@@ -163,11 +162,11 @@ def test_scallop_theorem(lengths, friction):
         return 0.3 + 1.5 * np.sin(phase)[None], 1.5 * (np.cos(phase) * rate)[None]
 
     for delta in (1e-1, 1e-4):
-        fine = replay(body, friction, even, delta, instants=400, tolerance=1)
+        fine = replay(body, friction, even, delta, instants=100, most_instants=100)
         assert fine.distance < 1e-10
         assert fine.work > 0.1
     # regularised friction depends on speed a little: different speeds there and back leave a distance of order delta
-    viscous, dry = (replay(body, friction, uneven, delta, instants=800, tolerance=1).distance for delta in (3e-1, 3e-3))
+    viscous, dry = (replay(body, friction, uneven, delta, instants=400, most_instants=400).distance for delta in (3e-1, 3e-3))
     assert dry < 3e-3
     assert dry < viscous / 3
 
@@ -191,10 +190,3 @@ def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_fricti
     assert abs(sweep[np.argmax(values)] - abs(solution.gait.cos[0, 0])) < 0.15
     assert solution.certificate.efficiency == pytest.approx(max(values), rel=5e-3)
     assert solution.certificate.efficiency >= max(values) * (1 - 1e-6)
-
-
-@pytest.mark.parametrize("name", ["two_link", "four_link", "five_link"])
-def test_problem_files_of_chains_solve_and_are_certified(name, tmp_path):
-    arguments = [f"problems/{name}.py", "--delta", "1e-3", "--mesh-tolerance", "1e-4", "--no-figure", "--quiet"]
-    assert main([*arguments, "--output", str(tmp_path)]) == 0
-    assert (tmp_path / f"{name}.h5").exists()

@@ -16,7 +16,7 @@ from colloc.mechanics.bodies import FORMULATIONS
 from colloc.mechanics.chain import Chain
 from colloc.reduced.spaces import transcribed
 from colloc.results.checks import UNCERTIFIED
-from colloc.search import optimise
+from colloc.search import solve
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.ipopt import Solver
 
@@ -127,6 +127,6 @@ def test_rows_of_a_slope_have_a_meaning():
 def test_what_is_no_optimum_is_replayed_roughly(unsolved, monkeypatch):
     """It cannot be certified, and its mesh may ask for a replay of minutes."""
     asked = {}
-    monkeypatch.setattr(optimise, "certify", lambda solution, **settings: asked.update(settings) or UNCERTIFIED)
-    optimise._certified(unsolved(Problem("guess", gait=Harmonic(1, "bilateral"), delta=1e-2)))
+    monkeypatch.setattr(solve, "certify", lambda answer, **settings: asked.update(settings) or UNCERTIFIED)
+    solve.certified(unsolved(Problem("guess", gait=Harmonic(1, "bilateral"), delta=1e-2)).answer)
     assert asked == {"tolerance": 1e-3, "instants": 1600}

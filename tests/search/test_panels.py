@@ -8,23 +8,25 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
+from colloc.results.solution import Solution
 from colloc.results.store import load, save
-from colloc.search.converge import Found, finer_body
-from colloc.search.solve import optimum
+from colloc.search.converge import as_it_is
+from colloc.search.refine import on_more_panels
 from colloc.smooth.modal_body import ModalBody
 from colloc.verification.replay import replay
+from tests.shared.stages import answer_near
 
 GAIT = Fourier([0.0, 0.0], [[0.4562], [0.0]], [[0.0], [-1.429]])
 
 
 def found(panels, friction=Friction(), delta=1e-2, **changes):
     stated = Problem("two-modes", GAIT, ModalBody(2, panels=panels), friction, Harmonic(1, "antipodal"), intervals=8, **changes)
-    return Found.at(*space_near(stated, GAIT), delta)
+    return as_it_is(*space_near(stated, GAIT), delta)
 
 
 def test_panels_are_added_where_a_point_at_rest_moves_over_them():
     coarse = found(8)
-    finer, v = finer_body(coarse)
+    finer, v = on_more_panels(coarse)
     exact = -found(96).objective
     assert 8 < finer.problem.body.panels <= 32  # at most fourfold at a time
     before, after = (abs(-objective - exact) for objective in (coarse.objective, ReducedProgram(finer, 1e-2).objective(v)))
@@ -33,24 +35,25 @@ def test_panels_are_added_where_a_point_at_rest_moves_over_them():
 
 
 def test_panels_stay_where_they_do_not_matter():
-    assert finer_body(found(16, delta=0.5)) is None
-    assert finer_body(found(8, Friction(100.0, 1.0, 1.0), mesh_tolerance=1e-2)) is None
+    assert on_more_panels(found(16, delta=0.5)) is None
+    assert on_more_panels(found(8, Friction(100.0, 1.0, 1.0), mesh_tolerance=1e-2)) is None
 
 
 def test_a_chain_has_none_to_add():
     stated = Problem("chain", gait=Harmonic(1, "antipodal"))
-    assert finer_body(Found.at(*space_near(stated, stated.guess), 0.1)) is None
+    assert on_more_panels(as_it_is(*space_near(stated, stated.guess), 0.1)) is None
 
 
 @pytest.mark.slow
 def test_a_gait_on_more_panels_is_replayed_and_kept(tmp_path):
     stated = Problem("two-modes", GAIT, ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), delta=0.1, delta_start=0.1)
-    solution = optimum(stated.with_(intervals=8))
+    stated = stated.with_(intervals=8)
+    solution = Solution(stated, answer_near(stated))
     gait = solution.gait
     again = replay(stated.body, stated.friction, lambda t: (gait.angles(t), gait.rates(t)), 0.1, instants=80, tolerance=1e-5)
-    assert solution.answer.panels > 4
+    assert solution.answer.problem.body.panels > 4
     assert abs(solution.efficiency / again.efficiency - 1) < 1e-4
     read = load(save(solution, tmp_path / "two.h5"))
-    assert (read.answer.panels, read.problem.body) == (solution.answer.panels, stated.body)
+    assert (read.answer.problem.body, read.problem.body) == (solution.answer.problem.body, stated.body)
     _, now = read.at_points()
     assert np.abs(now.force).max() < 1e-6

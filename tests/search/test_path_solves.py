@@ -55,6 +55,7 @@ def test_jacobian_and_hessian_against_differences(case, formulation):
     assert transcription.velocity.solves > 0 or formulation == FULL
 
 
+@pytest.mark.slow
 def test_a_bilateral_triangle_shrinks_to_the_certified_two_fifths(solved):
     solution, _ = solved("three_link_polygon")
     assert solution.status == "solved"

@@ -7,11 +7,12 @@ import colloc
 from colloc import Friction, Problem, ProblemError, Relaxed, replay, solve
 from colloc.gaits.relaxed import Mixture
 from colloc.reduced.mixture_space import MixtureSpace
-from colloc.results import realisation
 from colloc.results.relaxation import Optimality
-from colloc.search.converge import VERY_ROUGH, Found, settled
+from colloc.search import realise
+from colloc.search.converge import as_it_is, converged
+from colloc.search.optimum import SKETCH
 from colloc.search.realise import finite_certificate, kept_inside, realised_gaits, relaxed_certificate
-from colloc.search.relaxed import prices, readied
+from colloc.search.relaxed import prices, with_turned_directions
 from scripts import few_corners
 from scripts.few_corners import polygon_near
 
@@ -43,7 +44,7 @@ def test_what_finite_gaits_lose_falls_with_the_number_of_repeats(solution):
 
 
 def test_repeats_are_doubled_where_finite_gaits_stay_far_from_what_they_tend_to(solution, monkeypatch):
-    monkeypatch.setattr(realisation, "_MOST_CORNERS", 600)
+    monkeypatch.setattr(realise, "_MOST_CORNERS", 600)
     near = realised_gaits(solution.problem, solution.relaxed.gait, (1,), 0.9 * solution.relaxed.certificate.efficiency)
     assert [r.repeats for r in near] == [1]
     far = realised_gaits(solution.problem, solution.relaxed.gait, (1,), 2 * solution.relaxed.certificate.efficiency)
@@ -70,18 +71,18 @@ def test_prices_name_a_direction_that_helps_where_one_is_missing(solution):
     # the best polygon of as many pieces leaves something to be mixed in
     alone = problem(directions=1)
     space = MixtureSpace(alone, 14)
-    found = settled(space, space.parameters(alone.guess), 1e-2, 1.0, VERY_ROUGH)
-    better = Found.at(MixtureSpace(problem(), 14), _with_idle(found.gait, problem()), 1e-2)
+    found = converged(space, space.parameters(alone.guess), 1e-2, 1.0, SKETCH)
+    better = as_it_is(MixtureSpace(problem(), 14), _with_idle(found.gait, problem()), 1e-2)
     assert prices(better)[0].min() < -1e-2
-    ready, v = readied(better, 14)
-    again = settled(ready, v, 1e-2, 1.0, VERY_ROUGH)
+    ready, v = with_turned_directions(better, 14)
+    again = converged(ready, v, 1e-2, 1.0, SKETCH)
     assert again.objective < found.objective - 1e-3
 
 
 def prices_of(gait, directions):
     stated = problem(directions)
     space = MixtureSpace(stated, len(gait.durations))
-    return prices(Found.at(space, space.parameters(gait), stated.delta))[0]
+    return prices(as_it_is(space, space.parameters(gait), stated.delta))[0]
 
 
 def _with_idle(gait, stated):
@@ -164,9 +165,9 @@ def test_a_polygon_of_few_corners_is_nearly_as_good_as_one_of_many(solution, mon
     assert simple.efficiency > solution.relaxed.certificate.efficiency - 0.3 * (
         solution.relaxed.certificate.efficiency - mean.efficiency
     )
-    assert len(heard) > 3
+    assert len(heard) > 1
 
 
 def test_other_searches_say_that_relaxed_gaits_are_not_for_them():
-    with pytest.raises(ProblemError, match="search of their own"):
+    with pytest.raises(ProblemError, match="no full program"):
         solve(problem(), search="full")

@@ -1,17 +1,19 @@
 """A start with more symmetry than its class may end on a saddle; the search goes on from there."""
 
 import pytest
-from colloc.search.saddles import below_saddle
 from scipy.optimize import root
 
-from colloc import Harmonic, Problem, ellipse, solve
+from colloc import Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.reduced.spaces import space_near
-from colloc.search.confirm import level_found
-from colloc.search.converge import Found, searched
+from colloc.search.confirm import confirm
+from colloc.search.converge import as_it_is
+from colloc.search.descend import below_saddle
+from colloc.search.solve import finished
+from tests.shared.stages import optimum_near
 
-PROBLEM = Problem("symmetric", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=60)
+PROBLEM = Problem("symmetric", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=60, mesh_tolerance=0)
 SADDLE = ellipse(0.0, 0.30734, 0.76781)
 
 
@@ -20,7 +22,7 @@ def saddle():
     """Without an offset the gait is its own mirror image, and the gradient has no part that would give it one."""
     space, v = space_near(PROBLEM, SADDLE)
     v = root(ReducedProgram(space, PROBLEM.delta).gradient, v, tol=1e-9).x
-    return Found.at(space, v, PROBLEM.delta)
+    return as_it_is(space, v, PROBLEM.delta)
 
 
 def smallest(found):
@@ -36,15 +38,14 @@ def test_below_a_saddle_lies_an_optimum(saddle):
     assert below.objective < 2 * saddle.objective
 
 
-def test_a_solve_that_comes_to_a_saddle_goes_on_from_there(saddle):
-    heard = []
-    solution = solve(PROBLEM.with_(mesh_tolerance=0), heard.append, [level_found(saddle)], 1)
-    assert [level.value for level in heard[:1]] == [pytest.approx(0.04614, abs=2e-5)]
-    assert solution.status == "solved"
-    assert solution.efficiency > -4 * saddle.objective
-    assert [level.value for level in solution.history[1:]] == [level.value for level in heard]
+def test_a_search_that_comes_to_a_saddle_goes_on_from_there(saddle):
+    assert confirm(saddle).second_order.smallest < 0
+    found = finished(saddle)
+    assert found.holds
+    assert found.answer.second_order.smallest > 0
+    assert found.answer.value > -4 * saddle.objective
+    assert found.answer.history[0].value == pytest.approx(0.04614, abs=2e-5)
 
 
 def test_nothing_lies_below_an_optimum():
-    found, _ = searched(PROBLEM, PROBLEM.guess, lambda level: None)
-    assert below_saddle(found) is None
+    assert below_saddle(optimum_near(PROBLEM)) is None

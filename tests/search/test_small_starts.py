@@ -57,8 +57,8 @@ def test_viscous_drag_has_none():
 def test_a_small_gait_at_the_fold_is_found_where_it_is_the_best():
     """Two harmonics, joints up to pi: 0.37 at the fold, 0.35 for gaits of any size."""
     problem = Problem("fold", gait=Harmonic(2))
-    known, _ = candidates(problem, 8, lambda: True, lambda step: None)
-    best = known[0].found.gait
+    known, _ = candidates(problem, 8, lambda: True)
+    best = known[0].optimum.gait
     assert -known[0].dry > 0.36
     assert best.shape_speed < 2 * problem.smallest_shape_speed
     assert np.sort(np.abs(best.mean)) == pytest.approx([0, np.pi], abs=0.2)

@@ -86,7 +86,7 @@ class Samples:
             return found.seconds, found.problem.hash, found.answer.x.tobytes(), found.certificate
         if kind == "archive":
             found = open_archive(problem(), path.with_suffix(".h5"))
-            return {name: o.efficiency for name, o in found.outcomes.items()}, found.damaged
+            return {name: o.efficiency for name, o in found.outcomes.items()}, len(found.damaged)
         if kind == "arrays":
             return {k: v.tolist() for k, v in read_arrays(path).items()}
         if kind == "study":
@@ -96,4 +96,4 @@ class Samples:
             text = read_journal(path.parent)
             return sorted(r.attempts[0].key for r in text.records), text.damaged
         found = read_rows(path, CACHE)
-        return found.values, found.damaged
+        return found.values, len(found.damaged)

@@ -14,7 +14,8 @@ from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
-from colloc.search.converge import ROUGH, settled
+from colloc.search.converge import converged
+from colloc.search.optimum import SKETCH
 from colloc.search.prescribed import realised
 from colloc.search.solve import solve
 from colloc.smooth.concertina import Concertina
@@ -92,7 +93,7 @@ def test_optimising_beats_the_paper_s_crawler():
     guess = Corners(body.concertina(1.499), "antipodal")
     space, v = space_near(Problem("crawler", guess, body, gait=Polygon(8, "antipodal"), intervals=8), guess)
     paper = -ReducedProgram(space, 1e-3).objective(v)
-    found = settled(space, v, 1e-3, 1.0, ROUGH, rounds=2)
+    found = converged(space, v, 1e-3, 1.0, SKETCH)
     assert 0.5 < paper + 0.005 < -found.objective < 1.0
 
 
@@ -101,9 +102,10 @@ def test_the_problem_file_is_certified_beats_the_paper_s_crawler_and_is_kept(tmp
     found = solve(runpy.run_path("problems/crawler.py")["PROBLEM"], 1)
     assert found.status == "solved", found.message
     assert found.certificate.efficiency_at_zero_delta > 0.9069  # what equal sides of the path allow
-    assert found.answer.panels > found.problem.body.panels
+    panels = found.answer.problem.body.panels
+    assert panels > found.problem.body.panels
     read = load(save(found, tmp_path / "crawler.h5"))
-    assert (read.problem.hash, read.answer.panels) == (found.problem.hash, found.answer.panels)
+    assert (read.problem.hash, read.answer.problem.body.panels) == (found.problem.hash, panels)
     np.testing.assert_array_equal(read.sample(0.3).tail, found.sample(0.3).tail)
 
 
@@ -120,7 +122,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     problem = Problem(
         "paper", guess, body=body, friction=Friction(), gait=Polygon(8, "antipodal"), delta=1e-3, delta_start=1e-3
     )
-    solution = Solution(problem, [replace(realised(problem, guess), program="", knots=None)])
+    solution = Solution(problem, replace(realised(problem, guess, ()), program="guess"))
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
         ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps", "5", "--periods", "1")),
@@ -131,7 +133,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     assert (tmp_path / "paper.csv").read_text().count("coordinate_3_rad") == 2
     assert "the same optimum" in capsys.readouterr().out
     dataset = solution.to_xarray()
-    assert dict(dataset.sizes) == {"t": 401, "joint": 3, "velocity": 3, "axis": 2}
+    assert dict(dataset.sizes) == {"t": 401, "coordinate": 3, "velocity": 3, "axis": 2}
     ahead = dataset.centre.isel(t=-1) - dataset.centre.isel(t=0)
     assert float(ahead.sel(axis="x")) == pytest.approx(solution.distance, rel=1e-9)
 

@@ -1,6 +1,8 @@
 """Many starts: admissible reproducible samples, gaits that are the same, archives, and runs that nothing stops."""
 
+import itertools
 import json
+import tracemalloc
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -23,16 +25,19 @@ from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
+from colloc.results.checks import UNCERTIFIED
 from colloc.results.distinct_optima import basins
 from colloc.results.equivalence import distance, images, phase_distance, reversed_in_time
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
-from colloc.results.solution import SOLVED
-from colloc.search import optimise
+from colloc.results.solution import SOLVED, Solution
+from colloc.search import certify
+from colloc.search.certify import is_trivial
 from colloc.search.solve import solve
-from colloc.studies import campaign
+from colloc.studies import calls, campaign
 from colloc.system.errors import ProblemError, StoreError
 from colloc.verification.replay import replay
 from scripts.continue_delta import resolution_warning, value_at_zero_delta
+from tests.shared.stages import answer_near
 
 REVERSIBLE, IRREVERSIBLE = Friction(3, 1, 1), Friction(0.5, 1, 5)
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
@@ -124,17 +129,17 @@ def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, 
 
 def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
     stated = problem(gait=Harmonic(1, "none"), intervals=20)
-    solution = optimum(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
-    assert solution.answer.optimal
-    assert not is_trivial(solution)
-    assert phase_distance(solution.gait, reversed_in_time(solution.gait)) > 0.1
+    answer = answer_near(stated.with_(guess=start_gait(stated, SAMPLERS[0], 0, 0)))
+    assert answer.optimal
+    assert not is_trivial(answer)
+    assert phase_distance(answer.gait, reversed_in_time(answer.gait)) > 0.1
 
 
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
-    monkeypatch.setattr(optimise, "TRIVIAL_EFFICIENCY", 2.0)
+    monkeypatch.setattr(certify, "TRIVIAL_EFFICIENCY", 2.0)
     solution = solve(problem(), 1)
-    assert is_trivial(solution)
+    assert is_trivial(solution.answer)
     assert solution.status != SOLVED
     assert "goes nowhere" in solution.message
 
@@ -144,9 +149,9 @@ def test_a_start_that_reached_no_optimum_is_told_with_what_its_replay_measured(m
     problem = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=10)
 
     def stopped(*asked, **how):
-        solution = solve(*asked, **how, 1)
-        solution.history[:] = [replace(level, optimal=False) for level in solution.history]
-        return solution
+        solution = solve(*asked, **how)
+        steps = tuple(replace(step, optimal=False) for step in solution.history)
+        return replace(solution, answer=replace(solution.answer, optimal=False, history=steps))
 
     monkeypatch.setattr(campaign, "solve", stopped)
     outcome = campaign.run_guess(problem, lambda: problem.guess, 3, np.inf)
@@ -193,7 +198,7 @@ def test_an_archive_comes_back_as_it_was_written(tmp_path):
     archive = open_archive(problem(), path)
     archive.add({names[4]: outcome(4, efficiency=1 / 3), names[1]: outcome(1, efficiency=np.nan, status=ERROR)})
     back = open_archive(problem(), path)
-    assert (sorted(back.outcomes), back.damaged) == (sorted(names.values()), 0)
+    assert (sorted(back.outcomes), back.damaged) == (sorted(names.values()), ())
     for name in ("status", "efficiency", "iterations", "cpu_seconds", "delta"):
         assert getattr(back.outcomes[names[4]], name) == getattr(archive.outcomes[names[4]], name)
     assert np.isnan(back.outcomes[names[1]].efficiency)
@@ -247,19 +252,17 @@ def test_xarray_opens_an_archive_with_named_dimensions(tmp_path):
 
 
 def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
-    def solve(stated, watch, **how):
-        solve.calls += 1
-        if solve.calls == 2:
+    def watched(stated, starts, *, seconds, **how):
+        watched.calls += 1
+        if watched.calls == 2:
             raise ZeroDivisionError("one bad start")
-        solution = optimum(stated, watch)
-        if solve.calls == 3:
-            monkeypatch.setattr(campaign.time, "perf_counter", lambda: 1e12)
-            watch(solution.answer)
-        return solution
+        found = solve(stated, starts, **how)
+        return replace(found, interrupted=True, certificate=UNCERTIFIED) if watched.calls == 3 else found
 
-    solve.calls = 0
-    monkeypatch.setattr(campaign, "solve", solve)
-    found = list(campaign.run_starts(problem(), range(3), executor=ThreadPoolExecutor))
+    watched.calls = 0
+    monkeypatch.setattr(campaign, "solve", watched)
+    monkeypatch.setattr(campaign.time, "perf_counter", itertools.count(0, 1000).__next__)
+    found = list(campaign.run_starts(problem(), range(3), time_limit=500, executor=ThreadPoolExecutor))
     assert [o.start for o in found] == [0, 1, 2]
     assert found[0].iterations > 0
     assert (found[1].status, found[1].message) == (ERROR, "ZeroDivisionError: one bad start")
@@ -371,7 +374,7 @@ def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
 
 def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
     stated = Problem("p", ellipse(0.1, 2.0, 1.0), gait=Polygon(3, "bilateral"), delta=1e-2, intervals=24, mesh_tolerance=0.0)
-    solution = optimum(stated)
+    solution = Solution(stated, answer_near(stated))
     gait = solution.gait
     path = lambda t: (gait.angles(t), gait.rates(t))  # noqa: E731
     exact = replay(stated.body, stated.friction, path, stated.delta * gait.length, breaks=gait.corner_phases, tolerance=1e-8)
@@ -380,7 +383,8 @@ def test_the_mesh_error_of_a_path_is_measured_at_its_delta_per_period():
 
 
 def test_a_coarse_mesh_draws_a_warning_that_says_where(three_link):
-    coarse = optimum(problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait))
+    stated = problem(delta=1e-4, delta_start=1e-4, intervals=5, guess=three_link.gait)
+    coarse = Solution(stated, answer_near(stated))
     assert "under-resolved by 5 intervals" in resolution_warning(coarse)
     with pytest.raises(ValueError, match="at least two converged levels"):
         value_at_zero_delta(coarse)
@@ -425,3 +429,40 @@ def test_known_gaits_take_the_place_of_samples():
     stated, near = problem(), ellipse(0.1, 1.3, 0.8)
     (found,) = campaign.run_starts(stated, [7], executor=ThreadPoolExecutor, known={7: near})
     assert phase_distance(found.guess, near) < 1e-7
+
+
+class _Enough(Exception):
+    pass
+
+
+def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(tmp_path, capsys, monkeypatch):
+    """In a pipe too: a line for every start as it ends."""
+    path = tmp_path / "quick.py"
+    path.write_text(FILE, encoding="utf-8")
+    many = 10**6  # a list of them takes 40 MB
+
+    def solved(function, ready, **settings):
+        for _ in range(3):
+            task = ready()
+            yield task, outcome(task.key, ellipse(0.2, 1.2, 0.8))
+        raise _Enough
+
+    monkeypatch.setattr(campaign, "completed", solved)
+    words = [str(path), "--starts", str(many), "--output", f"{tmp_path}/"]
+    with pytest.raises(_Enough):
+        multistart.main(words)
+    told = capsys.readouterr().out
+    assert f"0 starts done already, {many} to go" in told
+    assert told.count("  solved\n") == 3
+    with pytest.raises(_Enough):
+        multistart.main(words)
+    told = capsys.readouterr().out
+    assert f"3 starts done already, {many - 3} to go" in told
+    assert [line.split()[0] for line in told.splitlines() if line.endswith("solved")] == ["3", "4", "5"]
+    tracemalloc.start()
+    for begun in (lambda: multistart.main([*words, "--quiet"]), lambda: calls.multistart(problem(), many)):
+        with pytest.raises(_Enough):
+            begun()
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 5e6

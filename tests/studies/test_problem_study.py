@@ -1,5 +1,6 @@
 """Studies: where starts travel, that nothing depends on workers, what is kept, and one file that xarray opens."""
 
+import dataclasses
 import json
 import random
 import signal
@@ -20,7 +21,7 @@ from colloc.mechanics.friction import Friction
 from colloc.results.outcome import CRASHED, Outcome
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
-from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, start_key
+from colloc.studies.cell import GUESS, RESCUE, WARM, Attempt, Work, start_key
 from colloc.studies.gait_class import DIRECT, RETROGRADE, gait_class, wave_direction, winding
 from colloc.studies.journal import Record, append_records, read_journal
 from colloc.studies.run import StudyRun
@@ -254,6 +255,41 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
     assert len(StudyRun(grid(problem=stated), tmp_path, retry=True).missing) == 9
     with pytest.raises(ProblemError, match="no problem in any cell"):
         StudyRun(grid(problem=lambda x, y: 3), tmp_path)
+
+
+def test_what_was_solved_stays_when_the_rest_is_tried_again(fake, tmp_path, monkeypatch):
+    """The landscape has one cell that never converges, which is no failure of the machine: it is left alone too."""
+    finished(StudyRun(grid(cold_starts=0), tmp_path))
+    died = Attempt(GUESS, "0", outcome(0, ellipse(0.0, 1.2, 0.4), ellipse(0.0, 1.2, 0.4), np.nan, CRASHED))
+    append_records(tmp_path, [Record(grid().problem_at((0, 0)).hash, (died,))])
+    kept, forgotten = (StudyRun(grid(cold_starts=0), tmp_path, retry=retry) for retry in (False, True))
+    assert forgotten.missing == []
+    for cell, state in kept.cells.items():
+        left = [a.key for a in state.attempts if a is not state.attempts[-1] or cell != (0, 0)]
+        assert [a.key for a in forgotten.cells[cell].attempts] == left
+    assert forgotten.cells[0, 0].best.key == kept.cells[0, 0].best.key
+
+
+def test_a_start_that_was_tried_is_never_solved_again_in_its_cell(fake, tmp_path, monkeypatch):
+    solved = []
+
+    def counted(stated, start_from, start, time_limit):
+        solved.append((stated.hash, stated.delta_start, start_key(start_from())))
+        return landscape(stated, start_from, start, time_limit)
+
+    monkeypatch.setattr(study_cell, "run_guess", counted)
+    run = StudyRun(grid(cold_starts=2), tmp_path)
+    finished(run)
+    assert len(solved) == len(set(solved)) == sum(len(state.attempts) for state in run.cells.values())
+    # a visit that is told what was tried solves what is left, be it the guess, a start of its own or a gait from elsewhere
+    stated, elsewhere = problem(), ellipse(0.0, 1.9, 0.7)
+    work = Work((0,), stated, True, (), (elsewhere,), (0,), 0.0, frozenset(), 1, 1e-2, 300.0, 1)
+    first = study_cell.visit(work, {})
+    assert {a.origin for a in first.attempts} == {GUESS, "cold", WARM}
+    for attempt in first.attempts:
+        told = dataclasses.replace(work, tried=frozenset({attempt.key}))
+        again = {a.key for a in study_cell.visit(told, {}).attempts}
+        assert again == {a.key for a in first.attempts} - {attempt.key}
 
 
 def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeypatch):

@@ -1,14 +1,12 @@
-"""Ctrl-C: what was reached is kept, the same command goes on from there, and compiled code does not swallow it."""
+"""Ctrl-C, and time that is over: a block ends in one KeyboardInterrupt, and compiled code does not swallow it."""
 
 import contextlib
-import re
 import signal
-import subprocess
 import sys
+import threading
 import time
 import weakref
 
-import numpy as np
 import pytest
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
@@ -16,57 +14,8 @@ from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
-from colloc.results.store import load
 from colloc.search.ipopt import Solver
-from colloc.system.interruption import interrupted, interruptible
-
-PROBLEM = """
-from colloc import *
-PROBLEM = Problem(name="long", gait=Harmonic(1, "bilateral"), guess=ellipse(0.3, 1.0, 0.5), intervals=80,
-                  mesh_tolerance=1e-5)
-"""
-QUICK = """
-from colloc import *
-PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
-"""
-
-
-def test_ctrl_c_keeps_the_levels_and_the_same_command_goes_on(tmp_path):
-    (tmp_path / "long.py").write_text(PROBLEM, encoding="utf-8")
-    out = tmp_path / "out"
-    command = [sys.executable, "-m", "colloc", "solve", str(tmp_path / "long.py"), "--output", str(out), "--no-figure"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    limit = time.monotonic() + 120
-    while not (begun := (out / "long.partial.h5").exists()) and process.poll() is None and time.monotonic() < limit:
-        time.sleep(0.01)
-    assert begun, f"no level ended: {process.communicate()[1] if process.poll() is not None else 'still at the first'}"
-    time.sleep(0.1)  # into the next level, where Ctrl-C meets IPOPT
-    process.send_signal(signal.SIGINT)
-    printed, complaint = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert printed == ""
-    kept = out / "long.partial.h5"
-    assert re.fullmatch(
-        rf"colloc: interrupted; \d levels are kept in {kept}; the same command goes on from there.\n", complaint
-    )
-    assert not (out / "long.h5").exists()
-    partial = load(out / "long.partial.h5")
-    assert partial.status == "not converged"
-    assert partial.history[0].optimal
-
-    again = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert f"going on from {out / 'long.partial.h5'}" in again.stdout
-    assert {path.name for path in out.iterdir()} == {"long.h5"}
-    solution = load(out / "long.h5")
-    assert solution.status == "solved"
-    # what was optimal is not solved again
-    last = max(k for k, level in enumerate(partial.history) if level.optimal)
-    kept = partial.history[: last + 1]
-    for old, new in zip(kept, solution.history, strict=False):
-        assert new.seconds == old.seconds
-        np.testing.assert_array_equal(new.x, old.x)
-    assert len(solution.history) > len(kept)
-    assert solution.certificate.efficiency == pytest.approx(0.26003, abs=2e-5)
+from colloc.system.interruption import heeded, interrupted, interruptible, time_limit
 
 
 def pressed(times, seen, **options):
@@ -182,23 +131,35 @@ def test_a_handler_of_somebody_else_is_left_alone():
     assert heard == [signal.SIGINT]
 
 
-def test_a_damaged_partial_file_is_named_and_fresh_begins_again(tmp_path, capsys):
-    from colloc.commands.solve import main
-
-    (tmp_path / "quick.py").write_text(QUICK, encoding="utf-8")
-    (tmp_path / "quick.partial.h5").write_text("no levels")
-    command = [str(tmp_path / "quick.py"), "--output", str(tmp_path), "--no-figure"]
-    assert main(command) == 2
-    assert "--fresh begins again" in capsys.readouterr().err
-    assert main([*command, "--fresh"]) in (0, 4)
-    assert not (tmp_path / "quick.partial.h5").exists()
+def test_a_time_limit_ends_a_block_as_ctrl_c_does():
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), interruptible(polled=False), time_limit(0.2):
+        time.sleep(10)
+    assert time.monotonic() - begin < 5
+    heeded()
+    with interruptible():
+        assert not interrupted()
 
 
-def test_levels_of_another_problem_are_not_taken_over(tmp_path, capsys, three_link):
-    from colloc.commands.solve import main
-    from colloc.results.store import save
+def test_in_another_thread_a_time_limit_ends_what_asks_for_it():
+    ended = []
 
-    (tmp_path / "quick.py").write_text(QUICK, encoding="utf-8")
-    save(three_link, tmp_path / "quick.partial.h5")
-    main([str(tmp_path / "quick.py"), "--output", str(tmp_path), "--no-figure"])
-    assert "going on" not in capsys.readouterr().out
+    def work():
+        try:
+            with time_limit(0.05), interruptible():
+                while not interrupted():
+                    time.sleep(0.01)
+        except KeyboardInterrupt:
+            ended.append(True)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join(timeout=10)
+    assert ended == [True]
+
+
+def test_a_limit_that_is_not_reached_leaves_nothing_behind():
+    with interruptible(polled=False), time_limit(0.05):
+        pass
+    time.sleep(0.1)
+    assert not interrupted()

@@ -108,7 +108,7 @@ def kept(kind, folder):
         return facts
     if kind == "multistart":
         found = open_archive(read_problem_file(folder / "p.py").problem, folder / "tiny.starts.h5")
-        assert found.damaged == 0
+        assert found.damaged == ()
         if (folder / "tiny.starts.h5").exists():
             check_seal(folder / "tiny.starts.h5", 10**7, "archive")
         return start_facts(found.outcomes)

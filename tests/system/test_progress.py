@@ -4,13 +4,9 @@ import io
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
 import pytest
 
-from colloc.commands.solve import levels_left
-from colloc.gaits.harmonic import ellipse
-from colloc.gaits.problem import Problem
 from colloc.system.progress import StatusLine, duration
 
 WIPED = "\x1b[1A\x1b[2K"
@@ -78,10 +74,3 @@ def test_nothing_is_loaded_to_draw_where_nobody_watches():
         [sys.executable, "-c", code + "print('rich' in sys.modules)"], capture_output=True, text=True, check=True
     )
     assert (said.stdout, said.stderr) == ("False\n", "")
-
-
-def test_levels_left_counts_decades_and_a_refined_mesh(three_link):
-    problem = Problem("x", ellipse(0.0, 1.4, 0.8), delta=1e-4, delta_start=0.1)
-    levels = [replace(three_link.last, delta=delta) for delta in (0.1, 0.01, 0.003, 1e-3, 1e-4)]
-    assert [levels_left(problem, level) for level in levels] == [4, 3, 3, 2, 1]
-    assert levels_left(problem.with_(mesh_tolerance=0.0), levels[0]) == 3

@@ -2,6 +2,8 @@
 
 import contextlib
 import errno
+import glob
+import io
 import multiprocessing
 import os
 import resource
@@ -15,8 +17,9 @@ import numpy as np
 import pytest
 from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, record
 
+from colloc.commands import open as show_archive
 from colloc.commands import sweep as sweep_study
-from colloc.results.archive import StartName, open_archive
+from colloc.results.archive import StartName, archive_at, open_archive
 from colloc.studies.journal import append_records, read_journal
 from colloc.system.errors import CollocError, StoreError
 from colloc.system.file_lock import locked
@@ -120,6 +123,32 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(samples, tmp
     assert Path(tempfile.gettempdir()).stat().st_mode == temporary
 
 
+def test_an_archive_is_read_where_nothing_can_be_written_and_its_damaged_rows_are_named(tmp_path, tmp_path_factory):
+    folder = tmp_path / "published"
+    kept = open_archive(problem(), folder / "a.h5")
+    kept.add({StartName("sobol", 3, k): outcome(k, (4 + k) / 8) for k in range(4)})
+    rows = folder / "a.sqlite"
+    rows.write_bytes(rows.read_bytes().replace(b"0.75,", b"0.76,"))
+    folder.chmod(0o755)
+    before = sorted(p.name for p in folder.iterdir())
+
+    def shown():
+        if os.geteuid() == 0:
+            os.setuid(65534)
+        else:
+            os.chmod(folder, 0o555)
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            code = show_archive.main([str(folder / "a.h5")])
+        told = f"1 damaged rows of {rows} were left out: start 2 (sobol 3)"
+        return 10 * (code == 0) + (told in said.getvalue()) + ("3 starts: 3 solved" in said.getvalue())
+
+    with open_to_others(tmp_path, tmp_path_factory.getbasetemp()):
+        assert in_child(shown) == 12
+    assert sorted(p.name for p in folder.iterdir()) == before
+    assert archive_at(folder / "a.h5").damaged == ("sobol 3 2",)
+
+
 def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
     (tmp_path / "s.py").write_text(STUDY)
     folder = tmp_path / "out" / "tiny.study"
@@ -128,6 +157,20 @@ def test_two_runs_of_a_study_in_one_folder_are_kept_apart(tmp_path, capsys):
     assert f"in use by process {os.getpid()} on" in capsys.readouterr().err
     with locked(folder / "lock"):
         pass
+
+
+def test_a_lock_keeps_other_processes_out_until_its_holder_lets_go(tmp_path):
+    def attempt():
+        try:
+            with locked(tmp_path / "lock"):
+                return 20
+        except StoreError as refused:
+            return 10 if f"in use by process {os.getppid()} on" in str(refused) else 0
+
+    with locked(tmp_path / "lock"):
+        assert in_child(attempt) == 10
+    assert in_child(attempt) == 20
+    assert [path.name for path in tmp_path.iterdir()] == ["lock"]
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="two users need the superuser")
@@ -214,16 +257,52 @@ def test_readers_see_the_old_file_or_the_new_one_while_it_is_replaced(samples):
     assert len(seen) > 1
 
 
-def test_what_killed_processes_left_behind_is_swept_after_an_hour(tmp_path):
-    old, new, other = (tmp_path / f".{name}.part" for name in ("x[1].h5.aaa", "x[1].h5.bbb", "y.h5.ccc"))
-    for path in (old, new, other):
+def unfinished(path):
+    """Temporary files of `path` that are there."""
+    return sorted(path.parent.glob(f".{glob.escape(path.name)}.*.part"))
+
+
+def die_while_writing(path):
+    with replaced_file(path):
+        os._exit(9)
+
+
+def test_what_a_killed_process_left_is_swept_by_the_next_that_writes_there_and_what_another_writes_is_not(tmp_path):
+    killed, mine, under_way = tmp_path / "x[1].h5", tmp_path / "y.h5", tmp_path / "z.h5"
+    assert in_child(die_while_writing, killed) == 9
+    assert len(unfinished(killed)) == 1
+    with replaced_file(under_way) as other:
+        with replaced_file(mine) as name:
+            Path(name).write_bytes(b"whole")
+        assert unfinished(killed) == []
+        assert unfinished(under_way) == [Path(other)]
+        Path(other).write_bytes(b"whole too")
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == {"y.h5": b"whole", "z.h5": b"whole too"}
+
+
+def test_what_processes_elsewhere_left_is_swept_after_an_hour_and_what_is_not_ours_never(tmp_path):
+    elsewhere = {age: tmp_path / f".x.h5.00000000-{os.getpid()}-0000{age}.part" for age in ("0a", "0b")}
+    foreign = tmp_path / ".movie.mp4.part"
+    for path, age in ((elsewhere["0a"], 3605), (elsewhere["0b"], 3590), (foreign, 1e6)):
         path.write_bytes(b"left")
-    for path, age in ((old, 3605), (new, 3590), (other, 1e6)):
         os.utime(path, (time.time() - age,) * 2)
-    with replaced_file(tmp_path / "x[1].h5") as name:
+    with replaced_file(tmp_path / "x.h5") as name:
         Path(name).write_bytes(b"whole")
-    assert [p.exists() for p in (old, new, other)] == [False, True, True]
-    assert (tmp_path / "x[1].h5").read_bytes() == b"whole"
+    assert [p.exists() for p in (*elsewhere.values(), foreign)] == [False, True, True]
+
+
+@pytest.mark.parametrize("moment", ["close", "fsync", "replace"])
+def test_ctrl_c_at_any_moment_leaves_no_temporary_file(moment, tmp_path, monkeypatch):
+    def pressed(*_):
+        raise KeyboardInterrupt
+
+    (tmp_path / "x").write_text("old")
+    monkeypatch.setattr(f"colloc.system.replaced_file.os.{moment}", pressed)
+    with pytest.raises(KeyboardInterrupt), replaced_file(tmp_path / "x") as name:
+        Path(name).write_text("new")
+    monkeypatch.undo()
+    assert [p.name for p in tmp_path.iterdir()] == ["x"]
+    assert (tmp_path / "x").read_text() == "old"
 
 
 def test_an_error_of_the_disk_when_a_file_is_flushed_is_reported(tmp_path, monkeypatch):

@@ -26,7 +26,7 @@ def test_a_changed_row_is_left_out_and_counted(tmp_path):
     put_rows(path, KIND, {f"key{k}": {"efficiency": 0.25} for k in range(3)})
     path.write_bytes(path.read_bytes().replace(b"0.25", b"0.26", 1))
     found = read_rows(path, KIND)
-    assert (len(found.values), found.damaged) == (2, 1)
+    assert (len(found.values), len(found.damaged)) == (2, 1)
     assert all(value == {"efficiency": 0.25} for value in found.values.values())
 
 
@@ -59,7 +59,7 @@ def test_rows_of_forged_types_are_left_out(tmp_path):
     path = tmp_path / "x.sqlite"
     forged(path, f"""INSERT INTO "{KIND}" VALUES (NULL, 1, 2), ('b', x'00', NULL), ('c', 'd', 'e')""")
     found = read_rows(path, KIND)
-    assert (found.values, found.damaged) == ({"a": 1}, 3)
+    assert (found.values, len(found.damaged)) == ({"a": 1}, 3)
 
 
 def test_endless_and_nested_rows_are_met_in_bounded_memory(tmp_path):
@@ -68,7 +68,7 @@ def test_endless_and_nested_rows_are_met_in_bounded_memory(tmp_path):
     digest = row_file._sum(b"n", nested.encode()).decode()
     forged(path, f"""INSERT INTO "{KIND}" VALUES ('n', '{digest}', '{nested}')""")
     found = read_rows(path, KIND)
-    assert (found.values, found.damaged) == ({"a": 1}, 1)
+    assert (found.values, len(found.damaged)) == ({"a": 1}, 1)
     forged(path, f"""INSERT INTO "{KIND}" VALUES ('long', '', zeroblob({2 * LARGEST_ROW}))""")
     with pytest.raises(StoreError, match="too big"):
         read_rows(path, KIND)

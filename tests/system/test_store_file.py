@@ -156,7 +156,7 @@ def test_readers_touch_no_data_of_variable_length(samples, kind, monkeypatch):
 @pytest.mark.parametrize(
     ("kind", "name"),
     [
-        ("solution", "levels/000/x"),
+        ("solution", "answer/x"),
         ("solution", "problem"),
         ("arrays", "a/b"),
         ("study", "status"),

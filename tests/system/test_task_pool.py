@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import threading
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -15,6 +16,8 @@ from shared.dask_cluster import DaskProcesses
 from colloc.system.dask_pool import connected
 from colloc.system.errors import ProblemError
 from colloc.system.task_pool import EngineGone, Lost, Task, completed, process_pool
+
+ENDED = threading.Event()
 
 
 def listed(tasks):
@@ -35,8 +38,10 @@ def dying_once(x, folder):
     return 2 * x
 
 
-def slowly_doubled(x):
-    time.sleep(x)
+def doubled_in_the_end(x):
+    """At once for 0, else when the test is over."""
+    if x:
+        ENDED.wait(30)
     return 2 * x
 
 
@@ -154,8 +159,10 @@ def test_workers_do_not_outlive_a_parent_that_is_killed():
 def cluster():
     """A Dask cluster in this process, without workers; its port is one that is free."""
     distributed = pytest.importorskip("distributed")
+    ENDED.clear()
     with distributed.LocalCluster(n_workers=0, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster:
         yield cluster
+        ENDED.set()  # the thread of a worker is waited for
 
 
 def test_a_dask_scheduler_without_workers_is_waited_for_a_stated_time_only(cluster):
@@ -169,8 +176,8 @@ def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_ta
     cluster.scale(1)
     executor, workers = connected(cluster.scheduler_address, 1, patience=1.0)
     assert workers == 1
-    run = completed(slowly_doubled, listed([Task(0, (0.0,)), Task(1, (0.0,)), Task(2, (30.0,))]), workers=1, executor=executor)
-    assert [next(run)[1] for _ in range(2)] == [0.0, 0.0]
+    run = completed(doubled_in_the_end, listed([Task(0, (0,)), Task(1, (0,)), Task(2, (1,))]), workers=1, executor=executor)
+    assert [next(run)[1] for _ in range(2)] == [0, 0]
     cluster.scale(0)
     with pytest.raises(EngineGone, match="no workers for 1 s"):
         list(run)
@@ -179,8 +186,8 @@ def test_a_dask_cluster_that_loses_all_its_workers_ends_the_run_and_blames_no_ta
 def test_a_dask_scheduler_that_gives_no_answer_ends_the_run_and_blames_no_task(cluster):
     cluster.scale(1)
     executor, _ = connected(cluster.scheduler_address, 1, patience=1.0)
-    run = completed(slowly_doubled, listed([Task(0, (0.0,)), Task(1, (30.0,))]), workers=1, executor=executor)
-    assert next(run)[1] == 0.0
+    run = completed(doubled_in_the_end, listed([Task(0, (0,)), Task(1, (1,))]), workers=1, executor=executor)
+    assert next(run)[1] == 0
     cluster.scheduler.handlers["ncores"] = lambda **_: asyncio.sleep(60)
     with pytest.raises(EngineGone, match="gave no answer for 1 s"):
         list(run)

@@ -79,10 +79,12 @@ def test_halves_carry_on_and_know_what_halving_their_panel_changed():
     np.testing.assert_allclose(changed[:, WORK].sum(), 15 * abs(increments(WHOLE, panels, 1)[2].sum() - np.e + 1), rtol=0.01)
 
 
-def test_changes_are_those_of_the_distance_when_one_panel_is_halved():
-    """The rest of the path turns with the panel."""
+@pytest.mark.parametrize("steady", [False, True])
+def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
+    """The rest of the path turns with the panel, which is all that changes where a panel goes straight on at one speed."""
     rng, n = np.random.default_rng(3), 8
     z, centre = rng.normal(size=(n, 5, 3)), rng.normal(size=(n, 5)) + 1j * rng.normal(size=(n, 5))
+    centre[:] = centre[:, :1] if steady else centre
     z[..., 2] *= 1e-3  # to first order in the turn
     values = [rng.uniform(1, 2, (n, 5)) for _ in range(6)]
     panels = Panels(
@@ -97,7 +99,7 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved():
         turn, move = twice[0].copy(), twice[1].copy()
         turn[k], move[k] = once[0][k], once[1][k]
         change = abs(distance(turn, move) - distance(*twice[:2]))
-        assert changes(panels)[0][k, 1] == pytest.approx(change, rel=1e-3, abs=1e-9)
+        assert changes(panels)[0][k, 1] == pytest.approx(change, rel=3e-2 if steady else 1e-3, abs=1e-9)
 
 
 OPTIMA = {

@@ -10,7 +10,7 @@
   const arrows = document.getElementById("arrows");
   const trails = document.getElementById("trails");
   const context = canvas.getContext("2d");
-  const frames = data.t.length - 1, total = frames * data.periods;
+  const frames = data.t.length - 1, periods = data.before.length, total = frames * periods;
   const box = data.window;
   let scale, width, height, unit, left, low, colours;
   const px = x => left + unit * (x - box[0]), py = y => height - low - unit * (y - box[2]);
@@ -32,11 +32,18 @@
     draw();
   }
 
-  // a value between two frames; column k of the period it falls in
-  function at(rows, frame, axis) {
-    const period = Math.min(Math.floor(frame / frames), data.periods - 1), inside = frame - period * frames;
-    const k = Math.min(Math.floor(inside), frames - 1), part = inside - k, shift = axis < 0 ? 0 : period * data.step[axis];
-    return rows.map(row => (1 - part) * row[k] + part * row[k + 1] + shift);
+  const period = frame => Math.min(Math.floor(frame / frames), periods - 1);
+
+  // values between two frames of the period that a frame falls in
+  function at(rows, frame) {
+    const inside = frame - period(frame) * frames, k = Math.min(Math.floor(inside), frames - 1), part = inside - k;
+    return rows.map(row => (1 - part) * row[k] + part * row[k + 1]);
+  }
+
+  // points [x, y] as the periods before turn and shift them; forces are only turned
+  function placed(xRows, yRows, frame, shifted = true) {
+    const [c, s, dx, dy] = data.before[period(frame)], x = at(xRows, frame), y = at(yRows, frame), shift = shifted ? [dx, dy] : [0, 0];
+    return [x.map((value, k) => c * value - s * y[k] + shift[0]), x.map((value, k) => s * value + c * y[k] + shift[1])];
   }
 
   function line(x, y, colour, thickness) {
@@ -97,8 +104,9 @@
     const x = [], y = [];
     for (let f = 0; f <= count; f++) {
       const frame = Math.min(f, position);
-      x.push(at([row[0]], frame, 0)[0]);
-      y.push(at([row[1]], frame, 1)[0]);
+      const [[px], [py]] = placed([row[0]], [row[1]], frame);
+      x.push(px);
+      y.push(py);
     }
     line(x, y, colour, thickness);
   }
@@ -108,7 +116,7 @@
     context.clearRect(0, 0, width, height);
     context.lineCap = context.lineJoin = "round";
     grid();
-    const x = at(data.x, position, 0), y = at(data.y, position, 1), last = x.length - 1;
+    const [x, y] = placed(data.x, data.y, position), last = x.length - 1;
     if (trails.checked) {
       trail([data.x[0], data.y[0]], "#56b4e9", 1);
       trail([data.x[last], data.y[last]], "#e69f00", 1);
@@ -117,10 +125,10 @@
     line(x, y, colours.ink, data.width * unit || 5);
     for (let k = data.hinges[0]; k < data.hinges[1]; k++) disc(x[k], y[k], 3.2, colours.paper, colours.ink);
     disc(x[last], y[last], 6, colours.ink);
-    disc(at([data.centre[0]], position, 0)[0], at([data.centre[1]], position, 1)[0], 3.5, red);
+    const [[centreX], [centreY]] = placed([data.centre[0]], [data.centre[1]], position);
+    disc(centreX, centreY, 3.5, red);
     if (arrows.checked) {
-      const ax = at(data.arrowX, position, 0), ay = at(data.arrowY, position, 1);
-      const fx = at(data.forceX, position, -1), fy = at(data.forceY, position, -1);
+      const [ax, ay] = placed(data.arrowX, data.arrowY, position), [fx, fy] = placed(data.forceX, data.forceY, position, false);
       ax.forEach((value, k) => arrow(value, ay[k], data.arrowScale * fx[k], data.arrowScale * fy[k]));
     }
     const phase = position / frames % 1;
@@ -129,11 +137,11 @@
     document.querySelectorAll(".cursor").forEach(mark => {
       mark.style.left = Number(mark.dataset.low) + phase * (Number(mark.dataset.high) - Number(mark.dataset.low)) + "%";
     });
-    const angles = at(data.angles, position, -1);
+    const angles = at(data.angles, position);
     document.querySelectorAll(".dot").forEach(mark => {
       // percent of left, right, top and bottom, which show these angles
       const side = mark.dataset.sides.split(",").map(Number), limit = mark.dataset.limits.split(",").map(Number);
-      const part = (joint, k) => (angles[Number(joint)] - limit[k]) / (limit[k + 1] - limit[k]);
+      const part = (axis, k) => (angles[Number(axis)] - limit[k]) / (limit[k + 1] - limit[k]);
       mark.style.left = side[0] + part(mark.dataset.first, 0) * (side[1] - side[0]) + "%";
       mark.style.top = side[3] - part(mark.dataset.second, 2) * (side[3] - side[2]) + "%";
     });

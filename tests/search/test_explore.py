@@ -11,7 +11,8 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.starts import on_speed_floor
 from colloc.results.store import load, save
-from colloc.search import explore, solve
+from colloc.search import explore
+from colloc.search import solve as stages
 from colloc.search.explore import candidates
 from colloc.search.solve import solve
 
@@ -19,20 +20,20 @@ UNEQUAL = Problem("unequal", body=Chain((0.3, 0.2, 0.15, 0.35)), friction=Fricti
 
 
 @pytest.mark.slow
-def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside_it(tmp_path):
+def test_the_answer_is_the_best_gait_of_finite_size_and_a_better_one_that_shrank_is_kept_beside_it(tmp_path):
     solution = solve(UNEQUAL)
-    assert on_speed_floor(solution.problem, solution.gait)
-    assert solution.finite is not None
-    assert solution.finite.status == "solved"
-    assert not on_speed_floor(solution.problem, solution.finite.gait)
-    assert f"{solution.finite.certificate.efficiency:.6f}" in solution.message
+    assert solution.status == "solved"
+    assert not on_speed_floor(solution.problem, solution.gait)
+    assert solution.shrunk.status == "solved"
+    assert on_speed_floor(solution.problem, solution.shrunk.gait)
+    assert solution.shrunk.value > solution.value
+    assert f"{solution.shrunk.value:.6f}" in solution.message
     again = load(save(solution, tmp_path / "unequal.h5"))
     assert again.message == solution.message
     assert again.standing == solution.standing
-    assert "best of 32 starts" in again.standing[0]
     # no distinct gait is told twice, and none of finite size is better than the one that is given
     finite = [other.value for other in again.others if not other.on_speed_floor and other.delta == solution.problem.delta]
-    assert max(finite) == pytest.approx(solution.finite.efficiency, rel=1e-3)
+    assert max(finite) == pytest.approx(solution.value, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -55,7 +56,7 @@ def test_a_gait_that_shrinks_to_the_bound_has_the_best_one_of_finite_size_beside
 )
 def test_the_answer_does_not_depend_on_what_the_search_is_given(changed, starts):
     """Before, options decided: 0.234, 0.493 and 0.647 were each called solved."""
-    solution = solve(UNEQUAL.with_(**changed), starts)
+    solution = solve(UNEQUAL.with_(shrinking=True, **changed), starts)
     assert solution.status == "solved"
     assert solution.efficiency == pytest.approx(0.64685, rel=2e-4)
 
@@ -63,15 +64,10 @@ def test_the_answer_does_not_depend_on_what_the_search_is_given(changed, starts)
 @pytest.mark.parametrize(("violation", "kept"), [(1e-3, True), (0.5, False)])
 def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch, violation, kept):
     """What breaks the rows of its class may have any value."""
-    settled = explore.settled_apart
-
-    def off(*arguments):
-        found = settled(*arguments)
-        return replace(found, conditions=replace(found.conditions, violation=violation))
-
-    monkeypatch.setattr(explore, "settled_apart", off)
+    converged = explore.converged
+    monkeypatch.setattr(explore, "converged", lambda *arguments: replace(converged(*arguments), violation=violation))
     problem = Problem("one_start", gait=Harmonic(1, "bilateral"))
-    known, tried = candidates(problem, 1, lambda: True, lambda step: None)
+    known, tried = candidates(problem, 1, lambda: True)
     assert tried == 1
     assert bool(known) == kept
 
@@ -95,9 +91,9 @@ def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, coun
 
     monkeypatch.setattr(explore, "_follow", follow)
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
-    found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True, lambda step: None)
+    found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True)
     assert number == tried
-    assert found[0].found.objective == -max(better.values())
+    assert found[0].optimum.objective == -max(better.values())
 
 
 def test_more_starts_go_wherever_fewer_do(monkeypatch):
@@ -112,9 +108,9 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
     monkeypatch.setattr(explore, "_follow", follow)
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     problem = Problem("turns", gait=Harmonic(1, "bilateral"))
-    candidates(problem, 18, lambda: True, lambda step: None)
+    candidates(problem, 18, lambda: True)
     fewer, begun = begun, {}
-    candidates(problem, 40, lambda: True, lambda step: None)
+    candidates(problem, 40, lambda: True)
     del begun[-1], fewer[-1]  # small loops
     assert [deltas for _, deltas in begun.values()] == [2] * 16 + [1] * 16 + [2] * 8
     assert len(fewer) == 18
@@ -123,31 +119,59 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
         np.testing.assert_array_equal(v, begun[number][0])
 
 
+@pytest.mark.parametrize(("asked", "tried"), [(None, 8), (32, 32)], ids=["by default", "as many as were asked for"])
+def test_the_search_ends_once_eight_starts_have_met_the_best_gait_unless_more_are_asked_for(monkeypatch, asked, tried):
+    def follow(space, v, number, deltas, known):
+        if number < 0:
+            return
+        if not known[-1]:
+            known[-1].append(explore.Candidate(SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0)))
+        known[-1][0].joined(number)
+
+    monkeypatch.setattr(explore, "_follow", follow)
+    monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
+    assert candidates(Problem("same", gait=Harmonic(1, "bilateral")), asked, lambda: True)[1] == tried
+
+
+def certified(value, holds=True, finite=True):
+    """An answer with its certificate, as the choice among them sees it."""
+    gait = ellipse(0.0, 2.0, 1.0) if finite else ellipse(0.0, 0.1, 0.1)
+    answer = SimpleNamespace(value=value, problem=UNEQUAL, gait=gait)
+    return SimpleNamespace(answer=answer, certificate=None, holds=holds, is_finite=finite)
+
+
 @pytest.mark.parametrize(
-    ("ends", "answer", "solved_for"),
+    ("ends", "solved_for"),
     [
-        ([("solved", 1.0), ("solved", 0.9)], 0, 1),
-        ([("certificate failed", 1.0), ("solved", 0.9), ("solved", 0.8)], 1, 2),
-        ([("solved", 0.7), ("solved", 0.9), ("solved", 0.8)], 1, 2),
-        ([("solved", 0.7), ("certificate failed", 0.9), ("solved", 0.8)], 2, 3),
-        ([("certificate failed", 1.0), ("not converged", 0.9), ("certificate failed", 0.8), ("solved", 0.7)], 0, 3),
+        ([(1.0, True), (0.9, True)], 1),
+        ([(1.0, False), (0.9, True), (0.8, True)], 2),
+        ([(0.7, True), (0.9, True), (0.8, True)], 2),
+        ([(0.7, True), (0.9, False), (0.8, True)], 3),
+        ([(1.0, False), (0.9, False), (0.8, False), (0.7, True)], 3),
     ],
     ids=["the best", "the best certified", "the best once refined", "both", "none of the first three"],
 )
-def test_the_answer_is_the_best_gait_whose_certificate_holds(monkeypatch, ends, answer, solved_for):
+def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_more(monkeypatch, ends, solved_for):
     """Gaits promise 1, 0.9, 0.8, 0.7 before their meshes are refined."""
     asked = []
 
-    def solution(problem, on_level, levels):
-        asked.append(levels)
-        status, value = ends[len(asked) - 1]
-        return SimpleNamespace(status=status, value=value, message="", number=len(asked) - 1)
+    def finished(optimum):
+        asked.append(optimum)
+        return certified(*ends[len(asked) - 1])
 
-    monkeypatch.setattr(solve, "solve", solution)
-    contenders = [[SimpleNamespace(value=1.0 - 0.1 * k)] for k in range(len(ends))]
-    found = solve._best_certified(UNEQUAL, contenders, None, lambda: True)
-    assert (found.number, len(asked)) == (answer, solved_for)
-    assert bool(found.message) == (answer > 0 and ends[0][0] != "solved")
+    monkeypatch.setattr(stages, "finished", finished)
+    optima = [SimpleNamespace(value=1.0 - 0.1 * k) for k in range(len(ends))]
+    found = stages._tried(optima, lambda each: each.holds)
+    assert (len(found), len(asked)) == (solved_for, solved_for)
+
+
+def test_a_gait_of_finite_size_that_shrinks_after_all_makes_room_for_the_next_one(monkeypatch):
+    ends = iter([certified(0.5, finite=False), certified(0.4)])
+    monkeypatch.setattr(stages, "finished", lambda optimum: next(ends))
+    monkeypatch.setattr(stages, "is_finite", lambda optimum: True)
+    optima = tuple(SimpleNamespace(value=value) for value in (0.5, 0.45))
+    found = stages._certified_best(UNEQUAL, SimpleNamespace(optima=optima, starts=32))
+    assert [each.answer.value for each in found] == [0.5, 0.4]
 
 
 @pytest.mark.parametrize(
@@ -161,21 +185,6 @@ def test_the_answer_is_the_best_gait_whose_certificate_holds(monkeypatch, ends, 
 )
 def test_delta_is_lowered_for_gaits_near_the_bound_where_nothing_else_fails(speed, failed, small):
     checks = [SimpleNamespace(name=name) for name in failed]
-    solution = SimpleNamespace(
-        problem=UNEQUAL, gait=SimpleNamespace(shape_speed=speed), certificate=SimpleNamespace(failures=checks)
-    )
-    assert solve._is_small_and_viscous(solution) == small
-
-
-def test_where_a_gait_of_finite_size_shrinks_after_all_the_next_one_stands_beside_the_best(monkeypatch):
-    def solved(gait, value):
-        certificate = SimpleNamespace(value=value, value_error=1e-7)
-        return SimpleNamespace(problem=None, gait=gait, status="solved", value=value, certificate=certificate)
-
-    ends = {"first": solved("small", 0.5), "second": solved("large", 0.4)}
-    monkeypatch.setattr(solve, "solve", lambda problem, on_level, levels: ends[levels])
-    monkeypatch.setattr(solve, "on_speed_floor", lambda problem, gait: gait == "small")
-    solution = SimpleNamespace(problem=None, message="", starts=32, others=(), finite=None)
-    solve._add_finite(solution, ["first", "second"])
-    assert solution.finite is ends["second"]
-    assert "0.400000" in solution.message
+    answer = SimpleNamespace(problem=UNEQUAL, gait=SimpleNamespace(shape_speed=speed))
+    found = SimpleNamespace(answer=answer, certificate=SimpleNamespace(failures=checks))
+    assert stages._is_small_and_viscous(found) == small

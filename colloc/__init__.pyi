@@ -1,0 +1,38 @@
+# The one table of public names and where they live, in the order of use: for type checkers, and for colloc itself.
+__version__: str
+_HOME: dict[str, str]
+
+from colloc.gaits.problem import Problem as Problem
+from colloc.gaits.problem_file import Reference as Reference, load_problem as load_problem
+from colloc.gaits.objective import Objective as Objective
+from colloc.mechanics.chain import Chain as Chain
+from colloc.mechanics.actuators import ActuatorLimits as ActuatorLimits
+from colloc.smooth.modal_body import ModalBody as ModalBody
+from colloc.smooth.concertina import Concertina as Concertina
+from colloc.smooth.crawler_body import CrawlerBody as CrawlerBody
+from colloc.smooth.prescribed_body import Wave as Wave
+from colloc.mechanics.friction import Friction as Friction
+from colloc.laws.elliptic import Elliptic as Elliptic
+from colloc.laws.viscous import Viscous as Viscous
+from colloc.laws.power_law import PowerLaw as PowerLaw
+from colloc.laws.own_law import OwnLaw as OwnLaw
+from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
+from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
+from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
+from colloc.gaits.relaxed import Relaxed as Relaxed
+from colloc.studies.calls import solve as solve, multistart as multistart, Starts as Starts, sweep as sweep
+from colloc.studies.study import Study as Study, Axis as Axis
+from colloc.studies.pareto import pareto_front as pareto_front
+from colloc.results.solution import Solution as Solution
+from colloc.results.store import load as load, save as save
+from colloc.search.certify import certify as certify
+from colloc.verification.replay import replay as replay
+from colloc.verification.slope import slope_motion as slope_motion
+from colloc.verification.heading_map import heading_map as heading_map
+from colloc.mechanics.fixed_point import solve_balance as solve_balance
+from colloc.system.errors import (
+    CollocError as CollocError,
+    NotConvergedError as NotConvergedError,
+    ProblemError as ProblemError,
+    StoreError as StoreError,
+)

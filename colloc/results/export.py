@@ -1,0 +1,125 @@
+"""A gait's shape coordinates over time as a file for a robot: comma-separated values or JSON, with what a reader has to know.
+
+Where the pace of a gait matters (viscous drag, power limits), its own pace is kept, and limits on the speeds make the period
+longer: so the numbers of the result hold for what is written.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.gait_fields import fields
+from colloc.results.solution import Solution
+from colloc.system.errors import ProblemError
+from colloc.system.replaced_file import replaced_file
+from colloc.verification.trajectory import Trajectory, timed
+
+KINDS = ".csv", ".json"
+
+
+def write_export(
+    solution: Solution,
+    path: Path,
+    *,
+    period: float | None = None,
+    max_speed: float | Sequence[float] | None = None,
+    rate: float = 50.0,
+    periods: int = 1,
+) -> dict[str, Any]:
+    """Write joint angles (or amplitudes of modes) and their speeds at equal steps of time.
+
+    Parameters
+    ----------
+    solution : Solution
+    path : Path
+        Ends in ``.csv`` or ``.json``.
+    period : float, optional
+        Seconds a period takes, rounded up to a whole number of samples; by default the shortest that `max_speed` allows.
+    max_speed : float or (n_joint,), optional
+        Largest speeds [rad/s]. Under dry friction the path is run through as evenly as they allow; where the pace matters,
+        at the gait's own pace.
+    rate : float
+        Samples a second.
+    periods : int
+        How often the period is repeated.
+
+    Returns
+    -------
+    dict
+        What stands in the file about the samples, as plain numbers and strings.
+
+    Raises
+    ------
+    ProblemError
+        If neither `period` nor `max_speed` is given, the period is too short for the limits, a number or the ending of the
+        path is unusable, or the solution holds a prescribed motion.
+    """
+    if periods < 1:
+        raise ProblemError(f"periods must be at least 1, not {periods}.")
+    if path.suffix not in KINDS:
+        raise ProblemError(f"{path} should end in {' or '.join(KINDS)}.")
+    if not solution.problem.gait.free:
+        raise ProblemError(f"{solution.problem.name} is a prescribed motion of a smooth body: it has no joints to export.")
+    limits = None if max_speed is None else np.array(max_speed, dtype=float)
+    trajectory = timed(solution.gait, rate, period, limits, keep_pace=bool(solution.problem.paced_by))
+    facts = _about(solution, trajectory, rate, limits)
+    text = (_csv if path.suffix == ".csv" else _json)(facts, trajectory, periods, solution.gait.coordinate)
+    with replaced_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+    return facts
+
+
+def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None) -> dict[str, Any]:
+    measured, reason = solution.measured, solution.problem.paced_by
+    paced = {"pace": f"the gait's own, as {reason}; distance and work are those in a period of 1"} if reason else {}
+    return {
+        "name": solution.problem.name,
+        "status": solution.status,
+        "period_s": trajectory.period,
+        "rate_hz": float(rate),
+        "samples_per_period": trajectory.time.size,
+        "max_speed_rad_per_s": None if limits is None else np.ravel(limits).tolist(),
+        "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
+        "body": solution.problem.body.describe(),
+        "friction": fields(solution.problem.friction),
+        "efficiency": measured.efficiency,
+        "objective": solution.problem.objective.name,
+        "value": measured.value,
+        "distance_per_period_body_lengths": measured.distance,
+        "rotation_per_period_rad": solution.rotation,
+        "turning_radius_body_lengths": solution.turning_radius if solution.turning else None,
+        "work_per_period_weight_times_length": measured.work,
+        "problem_hash": solution.problem.hash,
+        **paced,
+    }
+
+
+def _repeated(trajectory: Trajectory, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, angles and speeds of several periods in a row."""
+    time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
+    return time, np.tile(trajectory.angles, periods), np.tile(trajectory.speeds, periods)
+
+
+def _csv(facts: dict[str, Any], trajectory: Trajectory, periods: int, coordinate: str) -> str:
+    """Comma-separated values, with the facts in '#' lines."""
+    time, angles, speeds = _repeated(trajectory, periods)
+    names = [f"{coordinate}_{j}_{unit}" for unit in ("rad", "rad_per_s") for j in range(1, len(angles) + 1)]
+    text = io.StringIO()
+    for key, value in facts.items():
+        text.write(f"# {key}: {json.dumps(value)}\n")
+    text.write(",".join(["time_s", *names]) + "\n")
+    np.savetxt(text, np.concatenate([time[None], angles, speeds]).T, fmt="%.9g", delimiter=",")
+    return text.getvalue()
+
+
+def _json(facts: dict[str, Any], trajectory: Trajectory, periods: int, coordinate: str) -> str:
+    """One JSON object."""
+    time, angles, speeds = _repeated(trajectory, periods)
+    arrays = {"time_s": time.tolist(), "angles_rad": angles.tolist(), "speeds_rad_per_s": speeds.tolist()}
+    return json.dumps({**facts, "coordinate": coordinate, **arrays}) + "\n"

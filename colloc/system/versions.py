@@ -1,0 +1,20 @@
+"""Versions of what a result depends on."""
+
+from __future__ import annotations
+
+import platform
+from importlib import metadata
+
+
+def version_of(library: str) -> str:
+    """Version of an installed library, or that it is a source tree which nobody installed."""
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
+        return "source tree"
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything a result depends on."""
+    names = ("colloc", "casadi", "numpy", "scipy", "h5py")
+    return {"python": platform.python_version(), **{name: version_of(name) for name in names}}

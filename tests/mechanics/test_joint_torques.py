@@ -1,0 +1,48 @@
+"""What joints have to do, and the limits of what they can: idling, braking, and torques of either sign."""
+
+import numpy as np
+import pytest
+from shared.instants import random_instants
+
+from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
+from colloc.collocation.point_equations import ACTUATORS
+from colloc.collocation.transcription import transcribe
+from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power, joint_moments
+
+ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
+BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)
+
+
+@pytest.mark.parametrize("law", [LAW, PowerLaw(0.5, 2.0, 1.0, 1.0), Viscous(2, 1)], ids=str)
+def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
+    """So the driven power is smooth there: half of it is gained with every bit of power, whichever way."""
+    (angles, rates), delta = random_instants(20), 1e-2
+    idle = law.largest * delta ** (1 + law.degree)
+    forces = BODY.forces(law, angles, rates, np.zeros((3, 20)), delta)
+
+    def driven(share):
+        return driven_power(BODY, law, angles, share * rates, forces, delta)[0]
+
+    np.testing.assert_allclose(driven(0.0), 2 * 0.5 * idle, rtol=1e-12)
+    h = 1e-5 * idle
+    slope = (driven(h) - driven(-h)) / (2 * h)
+    np.testing.assert_allclose(slope, 0.5 * actuator_powers(BODY, law, angles, rates, forces, delta).sum(axis=0), rtol=1e-6)
+
+
+def test_torques_are_limited_both_ways_and_powers_one_way():
+    """In the program's bounds, and in what a replay tells: a gait in a mirror needs the same torques the other way round."""
+    np.testing.assert_array_equal(ONE.least, [-1.0, -1.0, -np.inf, -np.inf])
+    program = transcribe(Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6))
+    rows = program.groups[ACTUATORS]
+    assert set(program.constraint_upper[rows]) == {1.0}
+    assert sorted(set(program.constraint_lower[rows])) == [-np.inf, -1.0]
+    assert np.mean(program.constraint_lower[rows] == -1.0) == 0.5
+    gait = Fourier([0.5, 0.2], [[1.2], [0.3]], [[0.2], [1.0]])
+    mirrored = Fourier(-gait.mean, -gait.cos, -gait.sin)
+    t = np.arange(400) / 400
+    at = LAW, gait.angles(t), gait.rates(t)
+    signed = joint_moments(BODY, LAW, at[1], BODY.forces(*at, BODY.solve(*at, 1e-2).z, 1e-2), 1e-2)
+    assert np.abs(signed.max(axis=1) + signed.min(axis=1)).max() > 0.01  # which is what makes a difference here
+    found, other = (replay(BODY, LAW, each, 1e-2, instants=400, limits=ONE, tolerance=1e-4).shares for each in (gait, mirrored))
+    np.testing.assert_allclose(found, other, rtol=1e-9)
+    np.testing.assert_allclose(found[:2], np.abs(signed).max(axis=1), rtol=1e-2)

@@ -1,0 +1,209 @@
+"""What a run keeps: everything between stages, exactly; so an interrupted solve ends as if nothing had happened."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+import colloc
+from colloc import Chain, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, Relaxed, ellipse
+from colloc.gaits.problem_file import read_problem_file
+from colloc.results.store import load
+from colloc.search.descend import descend
+from colloc.search.explore import begin_at
+from colloc.search.run import ROWS, Run
+from colloc.search.solve import solve
+from colloc.studies.saved import run_path
+from colloc.system.errors import ReadOnlyRunWarning, StoreError
+from colloc.system.row_file import put_rows, read_rows
+
+AT = {"delta": 1e-2, "delta_start": 0.1, "intervals": 12, "mesh_tolerance": 1e-3}
+QUICK = Problem("quick", gait=Harmonic(1, "bilateral"), **AT)
+FILE = """
+from colloc import *
+PROBLEM = Problem("quick", gait=Harmonic(1, "none"), friction=Friction(2, 1, 1.4), delta=1e-3)
+"""
+
+
+def contents(path):
+    """All numbers and texts of a result, times aside."""
+    found = {}
+
+    def seen(name, thing):
+        if isinstance(thing, h5py.Dataset) and "seconds" not in name:
+            found[name] = np.asarray(thing[()]).tobytes()
+        for key, value in thing.attrs.items():
+            if "seconds" not in key and key not in ("REFERENCE_LIST", "DIMENSION_LIST"):
+                found[f"{name} {key}"] = np.asarray(value).tobytes()
+
+    with h5py.File(path) as file:
+        file.visititems(seen)
+    return found
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """The problem, and the contents of the file that an undisturbed solve of it leaves."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    (folder / "quick.py").write_text(FILE, encoding="utf-8")
+    found = colloc.solve(folder / "quick.py", starts=4, output=folder / "quick.h5")
+    assert found.status == "solved", found.message
+    assert [path.name for path in folder.glob("quick.*") if path.suffix != ".py"] == ["quick.h5"]
+    return folder / "quick.py", contents(folder / "quick.h5")
+
+
+class Stop:
+    """Raises KeyboardInterrupt, once, as the kept value of a number appears."""
+
+    def __init__(self, number, monkeypatch):
+        self.left = number
+        kept = Run.kept
+
+        def stopping(run, stage, given, compute):
+            value = kept(run, stage, given, compute)
+            self.left -= 1
+            if self.left == 0:
+                raise KeyboardInterrupt
+            return value
+
+        monkeypatch.setattr(Run, "kept", stopping)
+
+
+@pytest.mark.parametrize("number", [1, 3, 8, 14])
+def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(undisturbed, tmp_path, monkeypatch, number):
+    file, wanted = undisturbed
+    path = tmp_path / "quick.h5"
+    with monkeypatch.context() as patch:
+        stop = Stop(number, patch)
+        first = colloc.solve(file, starts=4, output=path)
+    assert stop.left <= 0
+    assert first.status == "interrupted"
+    assert "best gait so far" in first.message
+    assert load(path.with_suffix(".interrupted.h5")).status == "interrupted"
+    assert not path.exists()
+    assert len(read_rows(run_path(path), ROWS).values) >= number
+    assert colloc.solve(file, starts=4, output=path).status == "solved"
+    assert contents(path) == wanted
+    assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
+
+
+@pytest.mark.parametrize("asked", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
+def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
+    file, wanted = undisturbed
+    command = [sys.executable, "-m", "colloc", "solve", file, "--starts", "4", "--output", f"{tmp_path}/", "--no-figure"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(1.0)
+    process.send_signal(asked)
+    said = process.communicate(timeout=60)[1]
+    if process.returncode == 130 and (tmp_path / "quick.interrupted.h5").exists():
+        assert "the same command goes on from there" in said
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "solved" in again.stdout
+    assert contents(tmp_path / "quick.h5") == wanted
+    assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
+
+
+def problems():
+    yield QUICK
+    yield Problem("series", series(), Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT)
+    yield Problem("path", ellipse(1.0, 0.7, 1.1), gait=FreePath(2.0, "bilateral"), **AT)
+    yield Problem("sides", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), **{**AT, "intervals": 24})
+    yield Problem("uphill", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), grade=0.1, **{**AT, "delta_start": None})
+    yield Problem("modes", body=ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), **{**AT, "delta": 0.1})
+
+
+def series():
+    return colloc.Fourier([0.2, 0.0, -0.1], [[1.0], [0.2], [-0.8]], [[0.3], [1.1], [0.5]])
+
+
+@pytest.mark.parametrize("problem", list(problems()), ids=lambda problem: problem.name)
+def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tmp_path):
+    path = tmp_path / "x.run.sqlite"
+    first = Run(path, problem)
+    with first.under_way(np.inf):
+        found = descend(begin_at(problem, problem.guess))
+    second = Run(path, problem)
+    with second.under_way(np.inf):
+        again = descend(begin_at(problem, problem.guess))
+    assert second.found_again == len(read_rows(path, ROWS).values) - 1 > 0
+    np.testing.assert_array_equal(again.v, found.v)
+    assert (again.objective, again.kkt_error, again.history) == (found.objective, found.kkt_error, found.history)
+    # its space is made anew, and its program says the same
+    assert again.program().objective(again.v) == found.program().objective(found.v)
+    np.testing.assert_array_equal(again.program().rows(again.v), found.program().rows(found.v))
+
+
+def test_a_relaxed_gait_is_kept_too(tmp_path):
+    problem = Problem("mixed", gait=Relaxed(3, "both"), delta=1e-2, joint_limit=2.5, intervals=8)
+    first = solve(problem, 1, keep=tmp_path / "x.run.sqlite")
+    again = solve(problem, 1, keep=tmp_path / "x.run.sqlite")
+    assert again.value == first.value
+    np.testing.assert_array_equal(again.gait.corners, first.gait.corners)
+
+
+def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_again(tmp_path, capsys):
+    from colloc.commands.solve import main
+
+    (tmp_path / "quick.py").write_text(FILE.replace("delta=1e-3", "delta=0.1"), encoding="utf-8")
+    run = run_path(tmp_path / "quick.h5")
+    put_rows(run, ROWS, {"problem": "another"})
+    command = [str(tmp_path / "quick.py"), "--output", f"{tmp_path}/", "--no-figure", "--starts", "1", "--quiet"]
+    assert main(command) == 2
+    assert "--fresh begins again" in capsys.readouterr().err
+    run.write_bytes(b"not SQLite" * 100)
+    assert main(command) == 2
+    assert "--fresh begins again" in capsys.readouterr().err
+    assert main([*command, "--fresh"]) in (0, 4)
+    assert not run.exists()
+
+
+def test_a_run_that_cannot_be_written_is_told_once_and_the_solve_goes_on(tmp_path, monkeypatch):
+    def full(*_):
+        raise StoreError("cannot write: no space left on device.")
+
+    monkeypatch.setattr("colloc.search.run.put_rows", full)
+    monkeypatch.setattr("colloc.search.run.EVERY", 0.0)
+    with pytest.warns(ReadOnlyRunWarning, match="no space left") as told:
+        solution = solve(QUICK, 2, keep=tmp_path / "x.run.sqlite")
+    assert solution.certificate.replayed
+    assert len(told) == 1
+
+
+def test_time_that_is_over_gives_the_best_gait_so_far():
+    links = 20
+    problem = Problem("long", body=Chain((1 / links,) * links), gait=Harmonic(1, "antipodal"))
+    begin = time.monotonic()
+    solution = solve(problem, seconds=2.0)
+    assert time.monotonic() - begin < 4.0
+    assert solution.status == "interrupted"
+    assert "2 s allowed are over" in solution.message
+    assert solution.value > 0
+    assert solution.sample(0.3).angles.shape == (links - 1, 1)
+
+
+def test_progress_is_told_from_the_first_moment_and_says_how_long():
+    seen = []
+    solution = solve(QUICK, 4, progress=seen.append)
+    assert (seen[0].stage, seen[0].done, seen[0].count) == ("explore", 0, 4)
+    assert seen[0].best.value > 0
+    tried = [news for news in seen if news.stage == "explore" and news.count == 4]
+    assert tried[-1].left == 0.0 < tried[1].left < np.inf
+    stages = list(dict.fromkeys(news.stage for news in seen))
+    assert [stage for stage in stages if stage != "descend"] == ["explore", "refine", "confirm", "certify"]
+    assert str(tried[-1]).startswith("explore, 4 of 4; best d/W = 0.")
+    assert solution.certificate.replayed
+
+
+def test_a_problem_file_says_how_many_starts(undisturbed):
+    assert read_problem_file(undisturbed[0]).starts is None
+
+
+def test_friction_of_any_size_is_kept_in_the_units_of_the_problem(tmp_path):
+    light = QUICK.with_(friction=Friction(1e-3, 1e-3, 1e-3))
+    solution = solve(light, 1, keep=tmp_path / "x.run.sqlite")
+    assert solution.value == solve(light, 1, keep=tmp_path / "x.run.sqlite").value
+    assert solution.value * 1e-3 == pytest.approx(solve(QUICK, 1).value, rel=1e-6)
