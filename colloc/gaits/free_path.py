@@ -170,7 +170,7 @@ class FreePath(ClassOfGaits):
 
     unit_speed = True
     delta_start = DELTA_START
-    of_arcs = True
+    of_arcs = without_cusps = True
 
     def __post_init__(self) -> None:
         check_positive(self, "curvature", of="gait.")

@@ -158,6 +158,8 @@ class ClassOfGaits:
     """Where a search begins in delta; None: where the body's usual one does."""
     moves_knots = False
     """Whether a planned mesh may move its knots a little, to be even."""
+    without_cusps = False
+    """Whether members come to rest nowhere, but for paths that are retraced."""
     of_arcs = False
     """Whether it has curvature, and arcs that meet."""
 

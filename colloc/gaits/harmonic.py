@@ -171,6 +171,11 @@ class Harmonic(ClassOfGaits):
                 f"{self.harmonics - 1}; ask for {self.harmonics - 1} or {self.harmonics + 1}."
             )
 
+    @property
+    def without_cusps(self) -> bool:  # type: ignore[override]
+        """Whether members come to rest nowhere, but for paths that are retraced: ellipses do not."""
+        return self.harmonics == 1
+
     def intervals(self, n_joint: int) -> int:
         """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
         return round(self.fraction * (30 + 10 * self.harmonics))

@@ -57,7 +57,7 @@ class ActuatorRows:
         lowered = np.zeros_like(here)
         for points in mesh.points.T:  # neighbours may share a point
             lowered[:, points] = np.maximum(lowered[:, points], between)
-        self.upper = 1.0 - lowered
+        self.upper = np.maximum(1.0 - lowered, 0.0)  # a gait may do several times what is allowed, between points alone
         self.lower = np.where(np.isfinite(self.lower), -self.upper, self.lower)
         self.placed = np.stack(np.nonzero(here > self.upper - _NEAR))
         excess = float(largest.max()) - 1.0

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.problem import Problem
+from colloc.reduced.actuator_demand import check_actuators_suffice
 from colloc.reduced.spaces import space_about
 from colloc.results.answer import Answer
 from colloc.results.solution import Solution
@@ -92,6 +93,7 @@ def solve(
     """
     if search not in SEARCHES:
         raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
+    check_actuators_suffice(problem)
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.under_way(seconds):

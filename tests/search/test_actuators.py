@@ -1,5 +1,7 @@
 """What joints have to do, and gaits of joints that cannot do everything."""
 
+import time
+
 import numpy as np
 import pytest
 from shared.instants import random_instants
@@ -20,10 +22,14 @@ from colloc import (
     load,
     replay,
     save,
+    solve,
 )
 from colloc.commands import verify
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power_in_balance, joint_moments
 from colloc.mechanics.balance import instant
+from colloc.reduced.actuator_demand import check_actuators_suffice, least_share, least_share_without_cusps
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near
 from colloc.search.solve import solve
 
 ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
@@ -172,11 +178,79 @@ def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_p
 
 
 @pytest.mark.slow
-def test_joints_too_weak_for_any_gait_are_named():
+def test_joints_too_weak_for_a_search_from_one_guess_are_named():
     found = solve(USUAL.with_(torque_limit=0.05), 1)
     assert found.status == "not converged"
     assert "the limit on the torque of joint" in found.message
     assert "allow the joints more" in found.message
+
+
+def largest_share(problem, gait):
+    delta = problem.delta * gait.delta_unit
+    limits = problem.actuator_limits
+    return replay(problem.body, problem.friction, gait, delta, limits=limits, tolerance=1e-3, instants=200).shares.max()
+
+
+DEMANDS = {
+    "three links": USUAL.with_(guess=None, torque_limit=1.0),
+    "four links": Problem("four", body=Chain((0.25,) * 4), gait=Harmonic(2), torque_limit=(1.0, 0.5, 1.0)),
+    "power": USUAL.with_(guess=None, gait=Harmonic(2), power_limit=1.0, smallest_shape_speed=0.5),
+    "drag": Problem("drag", friction=Viscous(2, 1), gait=Harmonic(1), objective="towing", torque_limit=1.0),
+}
+
+
+@pytest.mark.parametrize("case", DEMANDS)
+def test_no_gait_needs_less_than_what_every_gait_needs(case):
+    problem, rng = DEMANDS[case], np.random.default_rng(4)
+    least, across = least_share(problem), least_share_without_cusps(problem)
+    assert 0 < least < 0.1
+    assert (across > least) == (case == "three links")
+    for size in (0.15, 0.3, 0.6, 1.0):
+        size = max(size, 1.1 * problem.smallest_shape_speed)
+        for _ in range(3):
+            gait = problem.gait.fourier(rng.normal(size=problem.gait.size(problem.body.n_joint)), problem.body.n_joint)
+            needed = largest_share(problem, gait.scaled(size / gait.shape_speed))
+            assert needed > 0.99 * max(least, across)  # the smallest found may lie above the smallest there is
+
+
+def test_what_every_gait_needs_is_no_more_than_some_gaits_need():
+    problem = DEMANDS["three links"]
+    # both joints at once, in opposite senses, near the straight shape
+    there_and_back = ellipse(0.0, 0.15, 0.0)
+    assert largest_share(problem, there_and_back) == pytest.approx(least_share(problem), rel=0.05)
+    # of gaits that enclose something, one is solved for with 1.09 times of what all need
+    assert 0.9 < least_share_without_cusps(problem.with_(torque_limit=0.05)) < 1.0
+
+
+HOPELESS = {
+    "any gait": ({"torque_limit": 0.01}, r"no gait keeps torque_limit: .* about 2\.1 times"),
+    "but for retraced ones": ({"torque_limit": 0.03}, r"no gait that goes anywhere keeps torque_limit: .* about 1\.5 times"),
+    "power": ({"power_limit": 0.005}, "no gait keeps power_limit: "),
+    "both": ({"torque_limit": 0.06, "power_limit": 0.005}, "no gait keeps torque_limit and power_limit: "),
+    "as far": ({"power_limit": 0.1, "at_least": {"distance": 0.3}}, r"takes a power of 0\.3 .* may deliver 0\.2\."),
+}
+
+
+@pytest.mark.parametrize("case", HOPELESS)
+def test_joints_too_weak_for_any_gait_are_told_before_the_search(case):
+    changes, words = HOPELESS[case]
+    begin = time.perf_counter()
+    with pytest.raises(ProblemError, match=words):
+        solve(USUAL.with_(guess=None, **changes))
+    assert time.perf_counter() - begin < 5.0
+
+
+def test_what_may_be_kept_is_not_refused():
+    for changes in ({"torque_limit": 0.05}, {"torque_limit": 0.03, "friction": Friction(1, 1, 3)}, {"power_limit": 0.05}):
+        check_actuators_suffice(USUAL.with_(guess=None, **changes))
+
+
+def test_rows_have_bounds_in_order_for_gaits_that_do_many_times_what_is_allowed():
+    problem = USUAL.with_(torque_limit=1e-4)
+    space, v = space_near(problem, problem.guess)
+    program = ReducedProgram(space, problem.delta)
+    program.place_rows(v)
+    assert (program.row_lower <= program.row_upper).all()
 
 
 SIZED = ("guess", "joint_limit", "delta", "delta_start", "intervals", "formulation")
