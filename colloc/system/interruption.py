@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import _thread
 import contextlib
+import ctypes
 import signal
 import sys
 import threading
@@ -56,24 +57,32 @@ def _in_main_thread() -> bool:
 def time_limit(seconds: float) -> Iterator[None]:
     """A block that ends in KeyboardInterrupt, as by Ctrl-C, when so many seconds are over.
 
-    In the main thread it does so wherever the block is, if `interruptible` is around it; in others only in the parts that ask
-    `interrupted`.
+    It does so wherever the block is, in the main thread if `interruptible` is around it; compiled code that calls Python has to
+    ask `interrupted`.
     """
     if seconds == float("inf"):
         yield
         return
     token = _DEADLINE.set(time.monotonic() + seconds)
-    timer = threading.Timer(seconds, _again)
+    # signals reach the main thread alone
+    here = None if _in_main_thread() else threading.get_ident()
+    timer = threading.Timer(seconds, _again if here is None else lambda: _raise_in(here, KeyboardInterrupt))
     timer.daemon = True
-    if _in_main_thread():
-        timer.start()
+    timer.start()
     try:
         yield
     finally:
         _DEADLINE.reset(token)
-        if _in_main_thread():
-            timer.cancel()
-            timer.join()
+        timer.cancel()
+        timer.join()
+        if here is not None:
+            _raise_in(here, None)
+
+
+def _raise_in(thread: int, error: type[BaseException] | None) -> None:
+    """Let an exception come in a thread as soon as it runs Python; with None, let none come that has not come yet."""
+    value = None if error is None else ctypes.py_object(error)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), value)
 
 
 def _hear(number: int, frame: FrameType | None) -> None:

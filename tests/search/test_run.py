@@ -3,7 +3,9 @@
 import signal
 import subprocess
 import sys
+import threading
 import time
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -13,8 +15,12 @@ import colloc
 from colloc import Chain, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, Relaxed, ellipse
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.store import load
+from colloc.search.certify import certify
+from colloc.search.choose import Certified, choose
+from colloc.search.confirm import confirm
 from colloc.search.descend import descend
-from colloc.search.explore import begin_at
+from colloc.search.explore import begin_at, explore
+from colloc.search.refine import refine
 from colloc.search.run import ROWS, Run
 from colloc.search.solve import solve
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
@@ -107,6 +113,103 @@ def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("part", np.random.default_rng(3).uniform(0.05, 1.0, 5).round(3))
+def test_so_it_does_at_other_moments_and_if_it_is_stopped_twice(undisturbed, tmp_path, asked, part):
+    file, wanted = undisturbed
+    command = [sys.executable, "-m", "colloc", "solve", file, "--starts", "4", "--output", f"{tmp_path}/", "--no-figure"]
+    for seconds in (6.0 * part, 3.0 * part):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            process.send_signal(asked)
+        process.wait(60)
+    subprocess.run(command, capture_output=True, check=True)
+    assert contents(tmp_path / "quick.h5") == wanted
+    assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
+
+
+def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path, monkeypatch):
+    path, kept, computed = tmp_path / "x.run.sqlite", Run.kept, []
+
+    def counted(run, stage, given, compute):
+        value = kept(run, stage, given, lambda: (computed.append(stage), compute())[1])
+        if len(computed) - stops[-1] == 5:
+            stops.append(len(computed))
+            raise KeyboardInterrupt
+        return value
+
+    wanted, stops = solve(QUICK, 2), [0]
+    monkeypatch.setattr(Run, "kept", counted)
+    while (found := solve(QUICK, 2, keep=path)).status == "interrupted":
+        pass
+    assert len(stops) > 3
+    np.testing.assert_array_equal(found.answer.x, wanted.answer.x)
+    rows = [key.split(" ")[0] for key in read_rows(path, ROWS).values]
+    assert sum(stage == "converged" for stage in computed) == rows.count("converged")
+    assert computed.count("confirm") == computed.count("certify") == 1
+
+
+def test_ctrl_c_in_python_gives_a_solution_and_is_over_then():
+    def press(news):
+        if news.stage == "explore" and news.done == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    found = solve(QUICK, 4, progress=press)
+    assert found.status == "interrupted"
+    assert found.message.startswith("interrupted; this is the best gait so far.")
+    assert found.value > 0
+    assert solve(QUICK, 1).status != "interrupted"
+
+
+def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_solve():
+    solution = solve(QUICK, 2)
+    optimum = refine(descend(explore(QUICK, 2).optima[0]))
+    assert optimum.optimal
+    answer = confirm(optimum)
+    assert answer.optimal
+    certificate = certify(answer)
+    chosen = choose(QUICK, [Certified(answer, certificate)])
+    np.testing.assert_array_equal(chosen.answer.x, solution.answer.x)
+    assert (chosen.value, chosen.status) == (solution.value, solution.status)
+    assert [step.delta for step in answer.history] == [step.delta for step in solution.history]
+
+
+@pytest.mark.parametrize("shrinking", [False, True])
+def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_be(shrinking):
+    found = solve(QUICK.with_(delta=1e-3, mesh_tolerance=1e-5), 1)
+    assert found.success
+    big = Certified(found.answer, found.certificate)
+    stated = found.problem.with_(guess=found.gait, smallest_shape_speed=found.gait.shape_speed)
+    small = Certified(replace(found.answer, problem=stated, value=1.1 * found.answer.value), found.certificate)
+    assert big.is_finite
+    assert not small.is_finite
+    chosen = choose(found.problem.with_(shrinking=shrinking), [small, big])
+    if shrinking:
+        assert chosen.answer is small.answer
+        assert chosen.shrunk is None
+    else:
+        assert chosen.answer is big.answer
+        assert chosen.shrunk.answer is small.answer
+        assert "Smaller gaits do better still" in chosen.message
+    assert choose(found.problem, [small]).answer is small.answer
+
+
+def test_a_kept_value_that_was_damaged_is_found_anew(tmp_path):
+    path = tmp_path / "x.run.sqlite"
+    first = Run(path, QUICK)
+    first.kept("stage", (1,), lambda: (np.arange(3.0), QUICK))
+    first.write()
+    (key,) = (key for key in read_rows(path, ROWS).values if key != "problem")
+    for wrong in ({"kind": "Stranger", "of": {}}, {"array": "AAAA", "type": "<f8", "shape": [3]}):
+        put_rows(path, ROWS, {key: wrong})
+        again = Run(path, QUICK)
+        assert again.kept("stage", (1,), lambda: "anew") == "anew"
+        assert again.found_again == 0
+
+
 def problems():
     yield QUICK
     yield Problem("series", series(), Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT)
@@ -173,12 +276,20 @@ def test_a_run_that_cannot_be_written_is_told_once_and_the_solve_goes_on(tmp_pat
     assert len(told) == 1
 
 
-def test_time_that_is_over_gives_the_best_gait_so_far():
+@pytest.mark.parametrize("thread", ["main", "worker"])
+def test_time_that_is_over_gives_the_best_gait_so_far(thread):
+    """In a worker too, which no signal reaches: twenty links spend half a minute before SQP first asks."""
     links = 20
     problem = Problem("long", body=Chain((1 / links,) * links), gait=Harmonic(1, "antipodal"))
-    begin = time.monotonic()
-    solution = solve(problem, seconds=2.0)
+    begin, found = time.monotonic(), []
+    if thread == "main":
+        found.append(solve(problem, seconds=2.0))
+    else:
+        worker = threading.Thread(target=lambda: found.append(solve(problem, seconds=2.0)), daemon=True)
+        worker.start()
+        worker.join(10)
     assert time.monotonic() - begin < 4.0
+    (solution,) = found
     assert solution.status == "interrupted"
     assert "2 s allowed are over" in solution.message
     assert solution.value > 0
