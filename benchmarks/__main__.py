@@ -17,7 +17,7 @@ from pathlib import Path
 
 import casadi
 
-from colloc.system.versions import versions
+from colloc.system.late_binding import versions
 
 PARTS = {
     "link_integrals": "Friction on a link",

@@ -12,7 +12,7 @@ optimum that shares neither grid nor start phase with the certificate's. Latin-h
 equal links unless asked otherwise. Free paths start from two harmonics.
 
 Both symmetries are valid for every friction law: a bilateral gait closes its rotation for any mu_b / mu_f
-(`colloc.results.equivalence`), and the second half of an antipodal one is the mirror image of its first half for any friction.
+(`colloc.results.distinct_optima`), and the second half of an antipodal one is its first half mirrored, for any friction.
 
 The cases take turns, a few starts at a time, and every start is stored in results/robustness/ as soon as it is done:
 an interrupted run goes on where it stopped, and the tables in results/robustness.md and .json are even at any time.
@@ -40,7 +40,7 @@ from colloc.results.distinct_optima import basins
 from colloc.results.outcome import Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import process_pool, run_starts
-from colloc.system.versions import versions
+from colloc.system.late_binding import versions
 from colloc.verification.replay import replay
 
 Laws = tuple[tuple[float, float, float], ...]

@@ -24,7 +24,7 @@ import ast
 import importlib
 from pathlib import Path
 
-from colloc.system.late_binding import bind
+from colloc.system.late_binding import bind, version_of
 
 _HOME = {
     alias.name: node.module
@@ -43,7 +43,7 @@ bind(
         "plot_gait": "colloc.pictures.solution_figure:draw_gait",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
-        "export": "colloc.results.export:write_export",
+        "export": "colloc.pictures.export:write_export",
         "plot_front": "colloc.pictures.front_figure:front_figure",
     }
 )
@@ -59,5 +59,5 @@ def __getattr__(name: str) -> object:
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
     if name == "__version__":
-        return importlib.import_module("colloc.system.versions").version_of("colloc")
+        return version_of("colloc")
     raise AttributeError(f"module 'colloc' has no attribute {name!r}")

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from colloc.system.versions import versions
+from colloc.system.late_binding import versions
 
 COMMANDS = {
     "three_link.png": "python -m colloc.solve problems/three_link.py",

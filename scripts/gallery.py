@@ -25,7 +25,7 @@ from colloc.pictures.style import styled
 from colloc.results.solution import Solution
 from colloc.search.global_search import STARTS
 from colloc.search.optimise import best_gait
-from colloc.system.versions import versions
+from colloc.system.late_binding import versions
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"

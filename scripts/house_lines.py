@@ -41,7 +41,7 @@ NEW = {
     "a problem file begun, archives opened, the Tab key": "commands/init commands/open commands/completion",
     "commands as functions, for notebooks": "studies/calls system/late_binding system/arguments",
     "grids on a cluster": "system/dask_pool",
-    "Ctrl-C at any moment, folders of one's own": "system/early_interruption system/private_folder",
+    "Ctrl-C at any moment": "system/early_interruption",
 }
 """What could not be asked for before, and the modules of the library that do it."""
 

@@ -105,7 +105,7 @@ def test_what_is_bound_late_exists():
 
     assert colloc
     assert all(callable(late_binding.bound(name)) for name in late_binding._WHERE)
-    users = {name for name, path in modules().items() if "late_binding import bound\n" in path.read_text(encoding="utf-8")}
+    users = {name for name, path in modules().items() if "late_binding import bound" in path.read_text(encoding="utf-8")}
     assert users == {"results.solution", "studies.pareto"}
 
 

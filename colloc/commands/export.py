@@ -11,6 +11,7 @@ from pathlib import Path
 
 from colloc.commands.ending import OK, run
 from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
+from colloc.commands.verify import check_trusted
 from colloc.results.store import load
 
 _EPILOG = """\
@@ -48,6 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _export(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
+    check_trusted(solution, options.result)
     path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('csv', 'json'))}"))
     settings = {"period": options.period, "max_speed": options.max_speed, "rate": options.rate, "periods": options.periods}
     facts = solution.export(path, **settings)

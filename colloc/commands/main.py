@@ -57,7 +57,7 @@ def _command(words: list[str]) -> int:
         print(help_text())
         return OK if words else BAD_PROBLEM
     if words[0] == "--version":
-        from colloc.system.versions import versions
+        from colloc.system.late_binding import versions
 
         print(", ".join(f"{name} {version}" for name, version in versions().items()))
         return OK

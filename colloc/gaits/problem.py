@@ -29,6 +29,10 @@ from colloc.system.result_names import check_name
 SMALLEST_DELTA = 1e-14
 """Balances are verified down to it; at speeds of order 1, less is below the rounding of their differences."""
 
+MOST_COORDINATES = 100
+"""Of a shape: contact is looked for in every pair of links at thousands of phases, which takes 10 s at so many, and no search
+ends with more."""
+
 
 @named_arguments
 @dataclass(frozen=True)
@@ -128,6 +132,10 @@ class Problem:
     towards: float | None = None
 
     def __post_init__(self) -> None:
+        coordinates = getattr(self.body, "n_joint", 0)  # asked first: to look what else a body answers can take gigabytes
+        if is_whole(coordinates, MOST_COORDINATES + 1):
+            what = f"the body has {coordinates} {self.body.coordinate}s, and {MOST_COORDINATES} are allowed"
+            raise ProblemError(f"{what}: fewer links, or a smooth body of a few modes, come near it.")
         check_kind("body", self.body, gait_fields.BODIES, Body)
         schedule = self.body.schedule
         self._fill(gait=Prescribed(schedule, self.body.symmetries[0]) if schedule else Harmonic())

@@ -4,7 +4,7 @@ Symmetries of a gait q(t), phase t from 0 to 1 over a period, joints counted fro
 ``(S q)_j = -q_(n+1-j)``:
 
 - ``bilateral``: q(-t) = S q(t). The body at -t, seen from its head, has the shape it has at t. For any friction the net
-  rotation vanishes (paper, appendix A; `colloc.results.equivalence`) and the second half period repeats the first half's
+  rotation vanishes (paper, appendix A; `colloc.results.distinct_optima`) and the second half period repeats the first half's
   displacement and work. The path starts and ends its half on shapes with S q = q, with tangents that S reverses.
 - ``antipodal``: q(t + 1/2) = -q(t). The second half is the mirror image of the first, for any friction.
 - ``none``.

@@ -1,7 +1,8 @@
 """C sources as shared libraries, made by the system's compiler and kept in the user's cache folder. No CasADi.
 
 A library is kept under a name made of the content of its sources and its own: whoever edits, updates or shares an installation
-never meets an old one, nor a part of one, which would kill the process that loads it.
+never meets an old one, nor a part of one, which would kill the process that loads it. Nobody but the user, and the superuser,
+may have put anything into the folder.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import hashlib
 import os
 import platform
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -19,7 +21,6 @@ from pathlib import Path
 from platformdirs import user_cache_path
 
 from colloc.system.errors import StoreError
-from colloc.system.private_folder import is_private, make_private
 from colloc.system.replaced_file import replaced_file
 
 FOLDER, OFF = "COLLOC_CODE", "off"
@@ -136,3 +137,33 @@ def _compile(source: Path, flags: Sequence[str], library: Path) -> None:
         if failure:
             raise StoreError(f"the C compiler {command[0]} failed ({failure}); set CC to another, or do without compiled code.")
         os.chmod(unfinished, 0o600)  # whoever else could write it could have it run
+
+
+def trespass(path: Path) -> str:
+    """Who else could have written a file or folder: "belongs to another user", "can be written by others", or ""."""
+    if not hasattr(os, "geteuid"):  # Windows: folders of a user are closed to others
+        return ""
+    found = os.stat(path)
+    if not {found.st_uid, os.lstat(path).st_uid} <= {os.geteuid(), 0}:  # what a link leads to, and the link
+        return "belongs to another user"
+    return "can be written by others" if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
+
+
+def is_private(file: Path) -> bool:
+    """Whether neither the file nor its folder could have been written by anybody else."""
+    try:
+        return not (trespass(file.parent) or trespass(file))
+    except OSError:
+        return False
+
+
+def make_private(folder: Path) -> None:
+    """Make the folder for its user alone (0700), if it is not there. `StoreError` if it cannot be made, or is there and others
+    could write to it."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        wrong = trespass(folder)
+    except OSError as error:
+        raise StoreError(f"cannot write {folder}: {error.strerror or error}.") from None
+    if wrong:
+        raise StoreError(f"no code is kept in {folder}, since it {wrong}: chmod go-w it, or set COLLOC_CODE to another.")

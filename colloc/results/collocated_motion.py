@@ -66,9 +66,10 @@ class CollocatedMotion:
 
     @property
     def rotation(self) -> float:
-        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none."""
-        theta = self.x[self.layout.theta[0]]
-        return float(theta[-1] - theta[0]) if self.problem.gait.motion_symmetry == NONE else 0.0
+        """Net rotation over a period [rad], counter-clockwise; a symmetry of the motion leaves none, a slope allows none."""
+        problem, theta = self.problem, self.x[self.layout.theta[0]]
+        turns = problem.gait.motion_symmetry == NONE and problem.slope is None
+        return float(theta[-1] - theta[0]) if turns else 0.0
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers; periods follow each other, turned by the net rotation of those before.

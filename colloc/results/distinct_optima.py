@@ -1,17 +1,89 @@
-"""The distinct optima among the outcomes of many starts, with their frequencies."""
+"""When two gaits are the same (start phase, symmetries of body and friction), and the distinct optima among many starts.
+
+With X(s, t) the position of the body, the following map motions in balance to motions in balance with the same distance
+and work. All are statements about joint angles q_j, counted from the tail, n of them:
+
+- *phase*   q_j(t + a), for every body and friction.
+- *mirror*  -q_j(t), for every body and friction.
+- *reversal*  q_j(-t), if mu_b = mu_f: velocities and forces change sign.
+- *swap*    -q_(n+1-j)(t), the body named from its other end, if it reads the same from there and mu_b = mu_f.
+- *reversed swap*  -q_(n+1-j)(-t), if the body reads the same from both ends, for *every* friction: X(1 - s, -t) has the
+  opposite tangent and the opposite velocity, so every link slides forwards where it did and all forces change sign.
+
+The last one is why a gait of bilateral symmetry closes its rotation whatever mu_b / mu_f is: it is its own image, and
+the image turns the other way.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.results.equivalence import distance
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.law import Law
 from colloc.results.outcome import Outcome
 from colloc.results.solution import SOLVED
+
+Image = Callable[[Fourier], Fourier]
+_GRID = 64
+_NEWTON_STEPS = 6
+
+
+def reversed_in_time(gait: Fourier) -> Fourier:
+    """The gait run backwards, q(-t)."""
+    return Fourier(gait.mean, gait.cos, -gait.sin)
+
+
+def swapped(gait: Fourier, body: Body) -> Fourier:
+    """The same shapes with tail and head exchanged: of chains -q_(n+1-j)(t)."""
+    return Fourier(*(body.swapped(rows) for rows in (gait.mean, gait.cos, gait.sin)))
+
+
+def images(gait: Fourier, body: Body, friction: Law) -> list[Fourier]:
+    """The gait and all gaits that differ from it by a symmetry of body and friction, but for the start phase."""
+    result = []
+    for mirror, reversal, swap in product((False, True), repeat=3):
+        if swap and not body.symmetric:
+            continue
+        if reversal != swap and not friction.reversible:
+            continue
+        image = gait.scaled(-1.0) if mirror else gait
+        image = reversed_in_time(image) if reversal else image
+        result.append(swapped(image, body) if swap else image)
+    return result
+
+
+def phase_distance(a: Fourier, b: Fourier) -> float:
+    """Root-mean-square distance [rad] of two closed paths of joint angles, at the best relative start phase."""
+    n = max(a.n_harmonic, b.n_harmonic)
+    a, b = a.resized(n), b.resized(n)
+    k = np.arange(1, n + 1)
+    # sum over joints of conj(a_k) b_k: shifting b by phase x multiplies it by exp(i k x)
+    overlap = np.sum((a.cos + 1j * a.sin) * (b.cos - 1j * b.sin), axis=0)
+    x = 2 * np.pi * np.arange(_GRID * n) / (_GRID * n)
+    x = x[np.argmax((np.exp(1j * np.outer(x, k)) @ overlap).real)]
+    for _ in range(_NEWTON_STEPS):
+        wave = overlap * np.exp(1j * k * x)
+        slope, curvature = float((1j * k * wave).real.sum()), float(-(k**2 * wave).real.sum())
+        if curvature >= 0:
+            break
+        x -= slope / curvature
+    shift = np.exp(1j * k * x)
+    difference = (a.cos - 1j * a.sin) - (b.cos - 1j * b.sin) * shift
+    return float(np.sqrt(np.sum((a.mean - b.mean) ** 2) + 0.5 * np.sum(np.abs(difference) ** 2)))
+
+
+def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
+    """Root-mean-square distance [rad] of two gaits modulo start phase and the symmetries of body and friction."""
+    return min(phase_distance(a, image) for image in images(b, body, friction))
+
 
 SAME_VALUE, SAME_GAIT = 1e-3, 0.05
 """Two certified optima are the same if their values differ by less than this relative amount and their paths by less than
@@ -55,7 +127,7 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     """The distinct certified optima, best first.
 
     Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase and the
-    symmetries of body and friction (see `colloc.results.equivalence.images`).
+    symmetries of body and friction (see `images`).
     """
     solved = sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value)
     found: list[tuple[list[Outcome], Fourier]] = []

@@ -24,8 +24,7 @@ from colloc.results.motion import SAMPLES, Column, RigidMotion, SampledMotion, m
 from colloc.results.relaxation import Relaxation
 from colloc.results.steps import REALISED, Alternative, Level
 from colloc.system.errors import ProblemError
-from colloc.system.late_binding import bound
-from colloc.system.versions import versions
+from colloc.system.late_binding import bound, versions
 
 if TYPE_CHECKING:
     import pandas
@@ -254,7 +253,7 @@ class Solution:
 
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
         """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`: ``solution.export("mine.csv",
-        period=4)``; returns what the file says about them. Options as for `colloc.results.export.write_export`."""
+        period=4)``; returns what the file says about them. Options as for `colloc.pictures.export.write_export`."""
         return bound("export")(self, Path(path), **options)
 
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:

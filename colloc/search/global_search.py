@@ -28,7 +28,7 @@ from colloc.mechanics.chain import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_about, space_near
-from colloc.results.equivalence import distance
+from colloc.results.distinct_optima import distance
 from colloc.results.steps import Alternative, SearchStep
 from colloc.search.reduced_search import (
     FIRST_RADIUS,

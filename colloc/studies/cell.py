@@ -15,8 +15,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.spaces import space_near
-from colloc.results.distinct_optima import fourier_series
-from colloc.results.equivalence import phase_distance
+from colloc.results.distinct_optima import fourier_series, phase_distance
 from colloc.results.outcome import ERROR, Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import run_guess

@@ -14,7 +14,7 @@ import numpy as np
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.results.equivalence import phase_distance, reversed_in_time, swapped
+from colloc.results.distinct_optima import phase_distance, reversed_in_time, swapped
 
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
 _SAME, _STANDING = 0.02, 0.05

@@ -1,19 +1,22 @@
 """Results are rechecked without CasADi and compared as paths; tampering and differences show."""
 
+import dataclasses
 import json
 import subprocess
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
-from colloc.commands import compare
+from colloc.commands import compare, export
 from colloc.commands import verify as recheck
 from colloc.commands.main import SUBCOMMANDS, main
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.chain import Chain
+from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 
@@ -57,6 +60,48 @@ def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp
     file = save(changed(three_link, levels=[*three_link.levels[:-1], replace(last, x=x)]), tmp_path / "gait.h5")
     assert recheck.main([str(file)]) == 4
     assert "NOT CERTIFIED" in capsys.readouterr().out
+
+
+NUMBERS = [f.name for f in dataclasses.fields(Certificate) if f.name not in ("checks", "instants", "driven_work")]
+
+
+def by_another_program(path, change):
+    """Change the certificate of a result as anybody can."""
+    with h5py.File(path, "r+") as file:
+        change(file["certificate"])
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_every_number_of_a_certificate_is_held_against_a_new_one(name, three_link, tmp_path, capsys):
+    path = save(three_link, tmp_path / "x.h5")
+    by_another_program(path, lambda group: group.attrs.modify(name, 0.01 + 1.01 * group.attrs[name]))
+    assert recheck.main([str(path), "--json"]) == 4
+    told = json.loads(capsys.readouterr().out)
+    assert told["complaint"].startswith("the file certifies ")
+    assert export.main([str(path), "--period", "4"]) == 2
+    assert f"cannot be trusted: {told['complaint']}" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
+
+
+def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_path, capsys):
+    checks = three_link.certificate.checks
+    lax = tuple(replace(check, threshold=1.0) if check.name == "second order" else check for check in checks)
+    for other, said in ((lax, "allows 1e+00 for the check 'second order'"), (checks[:-1], "has not the checks of a new one")):
+        file = save(changed(three_link, certificate=replace(three_link.certificate, checks=other)), tmp_path / "x.h5")
+        assert recheck.main([str(file), "--json"]) == 4
+        assert said in json.loads(capsys.readouterr().out)["complaint"]
+
+
+def test_a_result_that_was_only_opened_is_still_exported(three_link, tmp_path, capsys):
+    path = save(three_link, tmp_path / "x.h5")
+    by_another_program(path, lambda group: None)
+    assert export.main([str(path), "--period", "4"]) == 0
+    assert (tmp_path / "x.csv").exists()
+
+
+def test_an_absurd_number_of_instants_in_a_file_costs_no_memory(three_link):
+    boast = replace(three_link.certificate, instants=10**12)
+    assert recheck.rechecked(changed(three_link, certificate=boast)).certificate.instants < 10**6
 
 
 def test_verify_refuses_what_is_no_result(tmp_path, capsys):

@@ -6,6 +6,7 @@ HDF5's own besides; both are read in processes with limits of memory and time.
 """
 
 import faulthandler
+import json
 import os
 import pickle
 import resource
@@ -313,4 +314,23 @@ def test_a_problem_that_is_too_large_to_check_is_refused(samples, tmp_path):
     begin = time.process_time()
     with pytest.raises(StoreError, match="too large"):
         load(path)
+    assert time.process_time() - begin < 2.0
+
+
+def test_a_body_of_ten_thousand_links_is_refused_before_memory_is_taken(samples, tmp_path):
+    """Every link is held against every other at thousands of phases: gigabytes."""
+    stated = samples.solution.problem.to_dict()
+    stated["body"] = {"lengths": [1e-4] * 10_000}
+    stated["guess"] = {"mean": [0.0] * 9_999, "cos": [[1e-3]] * 9_999, "sin": [[1e-3]] * 9_999}
+    path = save(samples.solution, tmp_path / "links.h5")
+    with h5py.File(path, "a") as file:
+        del file["problem"]
+        file["problem"] = np.bytes_(json.dumps(stated))
+    write_sealed(path, path.read_bytes())
+    begin = time.process_time()
+    tracemalloc.start()
+    with pytest.raises(StoreError, match="the body has 9999 joints, and 100 are allowed"):
+        load(path)
+    assert tracemalloc.get_traced_memory()[1] < 1e8
+    tracemalloc.stop()
     assert time.process_time() - begin < 2.0

@@ -7,7 +7,7 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous, replay
 from colloc.gaits.starts import seed_class
-from colloc.results.equivalence import distance
+from colloc.results.distinct_optima import distance
 from colloc.search.global_search import candidates
 from colloc.search.small_starts import small_loops
 

@@ -11,7 +11,7 @@ from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
 from colloc.reduced.harmonic_space import HarmonicSpace
-from colloc.results.equivalence import distance, reversed_in_time, swapped
+from colloc.results.distinct_optima import distance, reversed_in_time, swapped
 from colloc.results.store import load, save
 from colloc.search.optimise import maximise_efficiency
 from colloc.smooth.balance import solve_smooth
@@ -155,7 +155,7 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
 
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])
 def test_a_gait_seen_from_the_other_end_backwards_in_time_is_the_same_gait(basis):
-    """The reversed swap keeps distance and work under every friction (`colloc.results.equivalence`), also of smooth bodies."""
+    """The reversed swap keeps distance and work under every friction (`colloc.results.distinct_optima`), smooth bodies too."""
     body, friction, t = ModalBody(4, basis), Friction(2.0, 1.0, 3.0), np.arange(40) / 40
     gait = wave(body, 0.8)
     image = reversed_in_time(swapped(gait, body))

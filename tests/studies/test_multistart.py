@@ -24,8 +24,7 @@ from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import mesh_errors
 from colloc.results.archive import StartName, open_archive, row_path, save_archive
-from colloc.results.distinct_optima import basins
-from colloc.results.equivalence import distance, images, phase_distance, reversed_in_time
+from colloc.results.distinct_optima import basins, distance, images, phase_distance, reversed_in_time
 from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
 from colloc.results.solution import SOLVED
 from colloc.search import optimise

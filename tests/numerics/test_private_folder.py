@@ -4,8 +4,8 @@ import os
 
 import pytest
 
+from colloc.numerics.c_compiler import is_private, make_private, trespass
 from colloc.system.errors import StoreError
-from colloc.system.private_folder import is_private, make_private, trespass
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="POSIX permissions")
 
