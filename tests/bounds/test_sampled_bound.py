@@ -13,7 +13,7 @@ from colloc.bounds import cutting_plane, potential
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion, fundamental, swaps_ends, two_resting
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.infinitesimal import small_gait
-from colloc.bounds.optimality_gap import gap_line, upper_bound
+from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
 from colloc.bounds.potential import PotentialSpace, Samples, largest_gain, largest_ratios
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, usual_harmonics
 from colloc.bounds.sampling import Domain
@@ -418,3 +418,10 @@ def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(t
             computed = False
         offered = "--bound" in gap_line(problem, 0.1, None)
         assert offered == computed == (isinstance(body, Chain) and body.n_link <= 5), body
+
+
+@pytest.mark.parametrize("changed", [{"rotation": 0.3}, {"rotation": None}, {"objective": "speed"}])
+def test_no_bound_is_offered_of_gaits_that_turn_or_are_sought_for_something_else(changed):
+    usual = Problem("usual", gait=Harmonic(1))
+    assert refusal(usual) == ""
+    assert "of the efficiency, on the level, of gaits that do not turn" in refusal(usual.with_(**changed))

@@ -230,3 +230,11 @@ def test_fourier_modes_come_in_pairs():
 
 def test_a_modal_body_answers_every_question_of_a_body():
     assert isinstance(FOURIER, Body)
+
+
+@pytest.mark.parametrize("basis", ["legendre", "fourier"])
+def test_a_body_named_from_its_other_end_has_the_same_tangents_there(basis):
+    body, s = ModalBody(modes=4, basis=basis), np.linspace(0, 1, 31)[:, None]
+    amplitudes = np.random.default_rng(3).normal(size=(4, 1))
+    there = body.tangent(1 - s, amplitudes)
+    np.testing.assert_allclose(body.tangent(s, body.swapped(amplitudes)), there, atol=1e-12)
