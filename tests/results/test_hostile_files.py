@@ -323,8 +323,8 @@ def test_a_problem_that_is_too_large_to_check_is_refused(samples, tmp_path):
 def test_a_body_of_ten_thousand_links_is_refused_before_memory_is_taken(samples, tmp_path):
     """Every link is held against every other at thousands of phases: gigabytes."""
     stated = samples.solution.problem.to_dict()
-    stated["body"] = {"lengths": [1e-4] * 10_000}
-    stated["guess"] = {"mean": [0.0] * 9_999, "cos": [[1e-3]] * 9_999, "sin": [[1e-3]] * 9_999}
+    stated["body"] = {"kind": "Chain", "lengths": [1e-4] * 10_000}
+    stated["guess"] = {"kind": "Fourier", "mean": [0.0] * 9_999, "cos": [[1e-3]] * 9_999, "sin": [[1e-3]] * 9_999}
     path = save(samples.solution, tmp_path / "links.h5")
     with h5py.File(path, "a") as file:
         del file["problem"]

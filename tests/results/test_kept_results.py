@@ -131,14 +131,14 @@ def test_names_of_files_that_colloc_makes_beside_results_are_refused(name):
         Problem(name)
 
 
-@pytest.mark.parametrize("name", ["tiny.partial.2", "partial", "finite", "x.start", "x.former", "_", "3.5", "a--help"])
+@pytest.mark.parametrize("name", ["tiny.failed.2", "partial", "finite", "x.start", "x.former", "_", "3.5", "a--help"])
 def test_other_names_are_taken(name):
     assert Problem(name).name == name
 
 
 def test_an_output_must_not_be_called_like_such_a_file_either(tmp_path, capsys):
     (tmp_path / "p.py").write_text(FILE.replace("DELTA", "1e-2"))
-    for name in ("tiny.partial.h5", "tiny.starts.h5", "tiny.former-1.h5"):
+    for name in ("tiny.interrupted.h5", "tiny.starts.h5", "tiny.former-1.h5"):
         assert colloc(["solve", str(tmp_path / "p.py"), "--output", str(tmp_path / name)]) == 2
         assert f"--output {name} ends in" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["p.py"]

@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from colloc.results.realisation import realised_gaits
 
 from colloc import Friction, Problem, Relaxed
 from colloc.gaits.relaxed import Mixture
-from colloc.results import realisation
+from colloc.search import realise
+from colloc.search.realise import realised_gaits
 
 
 @pytest.mark.parametrize("better", [1, -1])
@@ -23,7 +23,7 @@ def test_loops_run_the_way_that_is_worth_more(better, monkeypatch):
         area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
         return SimpleNamespace(passed=True, efficiency=better * area)
 
-    monkeypatch.setattr(realisation, "finite_certificate", certified)
+    monkeypatch.setattr(realise, "finite_certificate", certified)
     problem = Problem("loops", friction=Friction(), gait=Relaxed(3, "none"), delta=1e-3)
     (found,) = realised_gaits(problem, gait, (2,))
     assert found.certificate.efficiency > 0
