@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse.linalg import spsolve
 
 from colloc.collocation.layout import Layout
 from colloc.collocation.program import GaitProgram
@@ -11,6 +10,8 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.mechanics.actuators import driven_power_in_balance
 from colloc.mechanics.balance_results import BalancedMotion
+from colloc.motion.collocated import CollocatedPose, stage_weights, sums
+from colloc.motion.heading import heading
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.orientation import Orientation
 from colloc.verification.collocated_slope import PointsOnSlope, points_on_slope
@@ -44,43 +45,26 @@ def balanced_variables(
         now = points_on_slope(body, friction, slope, Orientation(mesh, unit), angles, rates, slow, gait.theta)
         z = now.z
 
-    state, rate = mesh.integration()
-    # theta_0 = 0 closes the system; the matrix is block bidiagonal
-    theta = np.zeros(mesh.n_site)
-    theta[1:] = spsolve(state[:, 1:].tocsc(), unit * (rate @ z[2]))
-    site_of_point = np.empty(mesh.n_point, dtype=int)
-    site_of_point[mesh.points] = mesh.sites
-    cx, cy = now.centre
-    _, quadrature = mesh.quadrature()
-
-    if slope is not None:
-        theta += gait.theta
-    elif problem.gait.symmetry == "antipodal":
-        theta -= 0.5 * theta[-1]
-    else:  # turn the motion into +x
-        c, s = np.cos(theta[site_of_point]), np.sin(theta[site_of_point])
-        dx, dy = quadrature @ (c * cx - s * cy), quadrature @ (s * cx + c * cy)
-        theta -= np.arctan2(dy.sum(), dx.sum())
-    at_points = theta[site_of_point]
-    ahead, power = _forward(at_points, cx, cy), now.power
-    if slope is not None:
-        ahead, power = _forward(at_points - slope.ahead, cx, cy), power + slope.grade * ahead
-    distance = np.cumsum(unit * (quadrature @ ahead))
-    if slope is None and distance[-1] < 0:  # an antipodal gait that travels the other way along its axis
-        theta, distance = theta + np.pi, -distance
-    x[layout.distance[0, 1:]] = distance
-    x[layout.work[0, 1:]] = np.cumsum(unit * (quadrature @ power))
-    x[layout.theta[0]] = theta
+    centre, weight, points = np.array(now.centre), unit * stage_weights(mesh), mesh.points
+    pose = CollocatedPose.on_mesh(mesh, unit * z[2], unit * centre)
+    # on a slope the gait says where it points, and the way in a given direction counts; on the level it travels along +x
+    if slope is None:
+        theta_0, ahead = -heading(problem.gait.symmetry, complex(pose.place[-1]), float(pose.theta[-1])), 0.0
+        uphill = 0.0
+    else:
+        theta_0, ahead, uphill = gait.theta, slope.ahead, slope.grade
+    power = (weight * now.power[points]).sum(axis=1)
+    way = np.exp(1j * (theta_0 - ahead)) * pose.place
+    x[layout.distance[0, 1:]] = way[1:].real
+    x[layout.work[0, 1:]] = sums(power)[1:] + uphill * (np.exp(1j * ahead) * way)[1:].real
+    x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
+    x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
     if layout.driven_work.size:
         driven = driven_power_in_balance(body, friction, angles, rates, z, slow)
-        x[layout.driven_work] = unit * (quadrature @ driven).sum()
-    x[layout.length] = unit * (quadrature @ np.linalg.norm(rates, axis=0)).sum()
+        x[layout.driven_work] = (weight * driven[points]).sum()
+    x[layout.length] = (weight * np.linalg.norm(rates, axis=0)[points]).sum()
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
     if layout.forces.size:
         x[layout.forces] = body.forces(friction, angles, rates, z, slow)
     return x
-
-
-def _forward(theta: np.ndarray, cx: np.ndarray, cy: np.ndarray) -> np.ndarray:
-    return np.cos(theta) * cx - np.sin(theta) * cy

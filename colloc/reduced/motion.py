@@ -1,14 +1,9 @@
 r"""Distance, work, net rotation and path length of a collocated gait as functions of the gait alone, with exact gradients.
 
-On a mesh with nodes (A, b) and intervals of length h every equation of the collocation fixes one unknown: the balance the
-tail velocity, its rotation rate omega the orientation theta, both the displacement D and the work W,
-
-    theta_ki = sum_(l<k) h_l b.omega_l + h_k (A omega_k)_i,
-    D = sum_ki h_k b_i e^(i theta_ki) c_ki,      W = sum_ki h_k b_i P_ki,
-
-c being the velocity of the centre of mass in the body frame and P the power. What is left is a program of the gait's
-parameters v alone: of |D|, W, the rotation, the length of the path and the driven work. Gradients take one sweep back
-through theta.
+On a mesh every equation of the collocation fixes one unknown: the balance the tail velocity, its rotation rate the
+orientation, both the displacement D (`colloc.motion.collocated`) and the work ``W = sum_ki h_k b_i P_ki``, P being the power.
+What is left is a program of the gait's parameters v alone: of |D|, W, the rotation, the length of the path and the driven work.
+Gradients take one sweep back through the orientation.
 """
 
 from __future__ import annotations
@@ -19,10 +14,12 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.gaits.symmetry import ANTIPODAL, BOTH, fraction
+from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
+from colloc.motion.heading import heading, heading_shares
 from colloc.numerics.mesh import Mesh
 
 _TOLERANCE = 1e-12
@@ -61,8 +58,7 @@ class _State:
     pace: np.ndarray
     solved: BalanceSolution
     out: np.ndarray
-    turn: np.ndarray
-    turned: np.ndarray
+    pose: CollocatedPose
     displacement: complex
     work: float
     rotation: float
@@ -77,9 +73,7 @@ class ReducedMotion:
     ) -> None:
         self.body, self.friction, self.shapes, self.mesh = body, friction, shapes, mesh
         self._periods, self._besides = 1.0 / fraction(symmetry), besides
-        # share of the rotation, and of the sum of all bends, by which the direction of travel is turned
-        self._turned_by = {ANTIPODAL: (0.5, 0.0), BOTH: (1.0, 0.5)}.get(symmetry)
-        self._weight = mesh.h[:, None] * mesh.scheme.b
+        self._symmetry, self._weight = symmetry, stage_weights(mesh)
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray] | None = None
         self.solves = 0
@@ -96,17 +90,12 @@ class ReducedMotion:
         now = self.body.motion(*at, solved)
         out = np.vstack([now.z[_OMEGA], now.centre, now.power])
         out[:, ~(solved.residual < _ACCEPTED * _TOLERANCE)] = np.nan
-        mesh, points = self.mesh, self.mesh.points
-        omega, cx, cy, power = (out * pace).reshape(4, -1, mesh.n_point).sum(axis=1)[:, points]
-        c = cx + 1j * cy
-        before = np.concatenate([[0.0], np.cumsum((self._weight * omega).sum(axis=1))])
-        theta = before[:-1, None] + mesh.h[:, None] * (omega @ mesh.scheme.A.T)
-        turn = np.exp(1j * theta)
-        turned = turn * c
-        displacement, work = complex((self._weight * turned).sum()), float((self._weight * power).sum())
-        self._last = _State(
-            v.copy(), delta, angles, rates, pace, solved, out, turn, turned, displacement, work, float(before[-1])
-        )  # fmt: skip
+        mesh = self.mesh
+        omega, cx, cy, power = (out * pace).reshape(4, -1, mesh.n_point).sum(axis=1)
+        pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]))
+        displacement, rotation = complex(pose.place[-1]), float(pose.theta[-1])
+        work = float((self._weight * power[mesh.points]).sum())
+        self._last = _State(v.copy(), delta, angles, rates, pace, solved, out, pose, displacement, work, rotation)
         return self._last
 
     def _start(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray | None:
@@ -119,12 +108,8 @@ class ReducedMotion:
 
     def _direction(self, s: _State) -> complex:
         """Unit vector along which the displacement counts."""
-        if self._turned_by is None:
-            return s.displacement / max(abs(s.displacement), 1e-300)
-        on_rotation, on_bend = self._turned_by
-        bend = (self._weight * self._bending(s)).sum()
-        axis = np.exp(1j * (on_rotation * s.rotation + on_bend * bend))
-        return complex(axis if (s.displacement * np.conj(axis)).real >= 0 else -axis)
+        bend = float((self._weight * self._bending(s)).sum())
+        return complex(np.exp(1j * heading(self._symmetry, s.displacement, s.rotation, bend)))
 
     def _bending(self, s: _State) -> np.ndarray:
         """Rate of the sum of all joint angles at the stages, ``(n, s)``."""
@@ -152,28 +137,24 @@ class ReducedMotion:
 
     def _on_columns(self, s: _State) -> np.ndarray:
         """Weight of every point of every block in an integral over the part of the period that is solved."""
-        weight = np.zeros(self.mesh.n_point)
-        np.add.at(weight, self.mesh.points, self._weight)
+        weight = point_weights(self.mesh)
         return np.tile(weight, s.pace.size // self.mesh.n_point)
 
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
-        s, mesh, rule, h = self.at(v, delta), self.mesh, self.mesh.scheme, self.mesh.h[:, None]
+        s, mesh = self.at(v, delta), self.mesh
         slopes = self.body.slopes(self.friction, s.angles, s.rates, delta, s.solved)
         self._near = (s, slopes)
-        back = np.conj(self._direction(s))
-
-        # distance: directly through c, and through every theta
-        on_theta = self._weight * (1j * s.turned * back).real
-        later = np.concatenate([np.cumsum(on_theta.sum(axis=1)[::-1])[::-1][1:], [0.0]])
-        on_omega = h * (on_theta @ rule.A + rule.b * later[:, None])
-        on_rotation, on_bend = (part * (s.displacement * back).imag for part in self._turned_by or (0.0, 0.0))
-        on_omega += on_rotation * self._weight
-        on_c = self._weight * np.conj(s.turn * back)
+        axis = self._direction(s)
+        on_omega, on_cx, on_cy = s.pose.pulled_back(axis)
+        # a heading that turns with the gait
+        aside = (s.displacement * np.conj(axis)).imag
+        on_rotation, on_bend = (part * aside for part in heading_shares(self._symmetry) or (0.0, 0.0))
+        on_omega = on_omega + on_rotation * self._weight
         zero = np.zeros_like(self._weight)
         rows = np.array(
             [
-                [on_omega, on_c.real, on_c.imag, zero],
+                [on_omega, on_cx, on_cy, zero],
                 [zero, zero, zero, self._weight],
                 [self._weight, zero, zero, zero],
             ]

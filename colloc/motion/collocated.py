@@ -1,0 +1,113 @@
+r"""Orientation and place of a body along the intervals of a collocation scheme, with derivatives.
+
+The scheme (A, b) integrates ``theta' = omega`` and ``x' = e^(i theta) c``, where omega is the rotation rate and c the velocity
+of the centre of mass in the axes of the body, from their values at the stages i of the intervals k of length h:
+
+    theta_ki = theta_0 + sum_(l<k) h_l b.omega_l + h_k (A omega_k)_i,      x = sum_ki h_k b_i e^(i theta_ki) c_ki.
+
+Everything that is said of a collocated motion on the level follows from here. What a replay says does not.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import Scheme
+
+
+def stage_weights(mesh: Mesh) -> np.ndarray:
+    """Weights ``(n, s)`` of the stages of a mesh in an integral over it."""
+    return mesh.h[:, None] * mesh.scheme.b
+
+
+def point_weights(mesh: Mesh) -> np.ndarray:
+    """Weights ``(n_point,)`` of the points of a mesh in an integral over it; neighbours may share a point."""
+    weights = np.zeros(mesh.n_point)
+    np.add.at(weights, mesh.points, stage_weights(mesh))
+    return weights
+
+
+def sums(increments: np.ndarray, start: float | complex = 0.0) -> np.ndarray:
+    """A quantity at the edges, ``(n + 1,)``, from its increments over the intervals, ``(n,)``."""
+    return start + np.concatenate([[0.0], np.cumsum(increments)])
+
+
+class CollocatedPose:
+    """The pose along intervals, from the rates at their stages.
+
+    Parameters
+    ----------
+    scheme
+        The collocation scheme.
+    h
+        Lengths of the intervals, ``(n,)``. They follow one another, unless only `rotations` and `displacements` are used.
+    omega
+        Rotation rate at the stages [rad per unit of h], ``(n, s)``.
+    centre
+        Velocity of the centre of mass in the axes of the body, complex, ``(n, s)``.
+    theta_0
+        Orientation at the begin [rad].
+    """
+
+    def __init__(self, scheme: Scheme, h: np.ndarray, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0) -> None:
+        self._scheme, self._h, self._omega, self._theta_0 = scheme, h, omega, theta_0
+        self._weight = h[:, None] * scheme.b
+        self._turned = h[:, None] * (omega @ scheme.A.T)
+        self._velocity = np.exp(1j * self._turned) * centre
+        self._centre = centre
+
+    @classmethod
+    def on_mesh(cls, mesh: Mesh, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0) -> CollocatedPose:
+        """The pose along a mesh, from rates ``(n_point,)`` at its points; `centre` has two rows, forward and to the left."""
+        c = centre[0] + 1j * centre[1]
+        return cls(mesh.scheme, mesh.h, omega[mesh.points], c[mesh.points], theta_0)
+
+    @cached_property
+    def rotations(self) -> np.ndarray:
+        """By how much the body turns over each interval [rad], ``(n,)``."""
+        return (self._weight * self._omega).sum(axis=1)
+
+    @cached_property
+    def displacements(self) -> np.ndarray:
+        """Displacement over each interval in the axes the body has at its begin, complex, ``(n,)``."""
+        return (self._weight * self._velocity).sum(axis=1)
+
+    @cached_property
+    def theta(self) -> np.ndarray:
+        """Orientation at the edges, ``(n + 1,)``."""
+        return sums(self.rotations, self._theta_0)
+
+    @cached_property
+    def stage_theta(self) -> np.ndarray:
+        """Orientation at the stages, ``(n, s)``."""
+        return self.theta[:-1, None] + self._turned
+
+    @cached_property
+    def velocity(self) -> np.ndarray:
+        """Velocity of the centre of mass in the plane at the stages, complex, ``(n, s)``."""
+        return np.exp(1j * self.theta[:-1])[:, None] * self._velocity
+
+    @cached_property
+    def place(self) -> np.ndarray:
+        """Centre of mass in the plane at the edges, complex, from 0, ``(n + 1,)``."""
+        return sums((self._weight * self.velocity).sum(axis=1))
+
+    def at(self, k: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Orientation and place, complex, at fractions tau of intervals k, ``(n_time,)`` each, by the scheme's polynomials."""
+        weights = self._h[k][:, None] * self._scheme.integrals(tau)
+        turned, moved = (weights * self._omega[k]).sum(axis=1), (weights * self.velocity[k]).sum(axis=1)
+        return self.theta[k] + turned, self.place[k] + moved
+
+    def pulled_back(self, axis: complex) -> np.ndarray:
+        """Derivatives ``(3, n, s)`` of the displacement along a unit vector, to the rotation rate and to both components of the
+        velocity of the centre of mass in the axes of the body."""
+        rule, back = self._scheme, np.conj(axis)
+        on_theta = self._weight * (1j * self.velocity * back).real
+        # the rotation over an interval turns all that come later
+        later = np.concatenate([np.cumsum(on_theta.sum(axis=1)[::-1])[::-1][1:], [0.0]])
+        on_omega = self._h[:, None] * (on_theta @ rule.A + rule.b * later[:, None])
+        on_centre = self._weight * np.conj(np.exp(1j * self.stage_theta) * back)
+        return np.array([on_omega, on_centre.real, on_centre.imag])
