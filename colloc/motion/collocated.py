@@ -57,7 +57,6 @@ class CollocatedPose:
         self._weight = h[:, None] * scheme.b
         self._turned = h[:, None] * (omega @ scheme.A.T)
         self._velocity = np.exp(1j * self._turned) * centre
-        self._centre = centre
 
     @classmethod
     def on_mesh(cls, mesh: Mesh, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0) -> CollocatedPose:

@@ -14,6 +14,7 @@ from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.balance_results import Sliding
+from colloc.motion.collocated import CollocatedPose
 from colloc.numerics.mesh import Mesh
 from colloc.results.motion import RigidMotion, SampledMotion, turned
 
@@ -105,16 +106,10 @@ class CollocatedMotion:
 
     def _interpolated(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """z, theta and centre of mass at phases t of the solved part, and the centre's displacement at its end."""
-        mesh, layout, x, scheme = self.mesh, self.layout, self.x, self.mesh.scheme
+        mesh, z_points = self.mesh, self._points[2]
         k = np.clip(np.searchsorted(mesh.edges, t, side="right") - 1, 0, mesh.n - 1)
         tau = (t - mesh.edges[k]) / mesh.h[k]
-        value, integral = scheme.lagrange(tau), scheme.integrals(tau)
-        z_points = self._points[2]
-        lab = turned(self.at_points.centre, self._theta)
-        steps = np.einsum("ks,cks,k->ck", np.broadcast_to(scheme.b, (mesh.n, scheme.s)), lab[:, mesh.points], mesh.h)
-        edges = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
-        points = mesh.points[k]
-        z = np.einsum("ts,cts->ct", value, z_points[:, points])
-        theta = x[layout.theta[0, mesh.edge_sites[k]]] + mesh.h[k] * np.einsum("ts,ts->t", integral, z_points[2, points])
-        centre = edges[:, k] + mesh.h[k] * np.einsum("ts,cts->ct", integral, lab[:, points])
-        return z, theta, centre, edges[:, -1]
+        pose = CollocatedPose.on_mesh(mesh, z_points[2], self.at_points.centre, self.x[self.layout.theta[0, 0]])
+        theta, place = pose.at(k, tau)
+        z = np.einsum("ts,cts->ct", mesh.scheme.lagrange(tau), z_points[:, mesh.points[k]])
+        return z, theta, np.array([place.real, place.imag]), np.array([pose.place[-1].real, pose.place[-1].imag])

@@ -18,9 +18,11 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
+from colloc.motion.collocated import CollocatedPose
+from colloc.motion.heading import heading
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import FineMotion, Increments, Rates, fine_motion, increments, path_lengths, rates_at
+from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, path_lengths, rates_at
 from colloc.verification.collocated_slope import slope_course, slope_defects
 
 FINER = 0.05
@@ -138,7 +140,7 @@ def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndar
 
 
 class _Own(NamedTuple):
-    """What a scheme makes of intervals: errors as in `MeshError`, rates at its nodes, its own increments."""
+    """What a scheme makes of intervals: errors as in `MeshError`, rates at its nodes, its own pose, work and driven work."""
 
     rotation: np.ndarray
     displacement: np.ndarray
@@ -146,7 +148,9 @@ class _Own(NamedTuple):
     length: np.ndarray
     value: np.ndarray
     rates: Rates
-    increments: Increments
+    pose: CollocatedPose
+    spent: float
+    delivered: float
 
 
 def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Own:
@@ -154,10 +158,11 @@ def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: n
     nodes = left[:, None] + (right - left)[:, None] * rule.c
     at = problem.body, problem.friction, gait, delta, nodes
     rates = rates_at(*at, fine.velocity(nodes), problem.uses("driven_work"))
-    turned, moved, spent, delivered = increments(rule, right - left, rates)
+    pose, weights = CollocatedPose(rule, right - left, rates.z[2], rates.centre), (right - left)[:, None] * rule.b
+    spent, delivered = (weights * rates.power).sum(axis=1), (weights * rates.driven).sum(axis=1)
     (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
-    rotation, energy = turned - (theta_right - theta), spent - (work_right - work)
-    displacement = moved * np.exp(1j * theta) - (path_right - path)
+    rotation, energy = pose.rotations - (theta_right - theta), spent - (work_right - work)
+    displacement = pose.displacements * np.exp(1j * theta) - (path_right - path)
     # an error of rotation turns everything after it, and by half of it the direction that counts
     pull = displacement + 1j * rotation * (0.5 * fine.path[-1] - path_right)
     direction, length = _direction(problem, fine.path[-1], fine.theta[-1]), np.zeros(left.size)
@@ -168,7 +173,7 @@ def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: n
     ahead = (pull * np.conj(direction)).real
     value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length
     value += shares["driven_work"] * (delivered - (driven_right - driven))
-    return _Own(rotation, displacement, energy, length, value, rates, (turned, moved, spent, delivered))
+    return _Own(rotation, displacement, energy, length, value, rates, pose, float(spent.sum()), float(delivered.sum()))
 
 
 def _turning(known: Known, own: _Own) -> np.ndarray:
@@ -190,18 +195,14 @@ def _fine_part(known: Known) -> dict[str, float]:
 def _collocated_value(known: Known, own: _Own) -> float:
     """The objective as the scheme sees it."""
     problem = known.problem
-    turned, moved, spent, delivered = own.increments
-    theta = np.concatenate([[0.0], np.cumsum(turned)])
-    part = _part(problem, (np.exp(1j * theta[:-1]) * moved).sum(), spent.sum(), theta[-1], delivered.sum())
+    part = _part(problem, own.pose.place[-1], own.spent, own.pose.theta[-1], own.delivered)
     length = _whole_length(problem, known.gait) + float(own.length.sum()) / problem.gait.fraction
     return problem.objective(_period(problem, part, length))
 
 
 def _direction(problem: Problem, end: complex, rotation: float) -> complex:
     """Unit vector along which the solved part's displacement counts."""
-    if problem.gait.symmetry == "antipodal":
-        return np.exp(0.5j * rotation) * (1 if (end * np.exp(-0.5j * rotation)).real > 0 else -1)
-    return end / abs(end)
+    return np.exp(1j * heading(problem.gait.motion_symmetry, end, rotation))
 
 
 def _velocity_error(mesh: Mesh, rates: Rates, fine: FineMotion) -> np.ndarray:
