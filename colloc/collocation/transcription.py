@@ -68,7 +68,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges.
 
     Self-contact is constrained between links two apart, and between the pairs `far` of links farther apart: see
-    `colloc.search.far_contact`.
+    `colloc.search.converge.crossing_pairs`.
     """
     mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)

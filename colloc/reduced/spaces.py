@@ -76,7 +76,8 @@ def _searched(problem: Problem) -> Searched:
 def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:
     """The nonlinear program of a problem of any class near a gait, by default its guess.
 
-    Self-contact is constrained between links two apart, and between the pairs `far` (see `colloc.search.far_contact`).
+    Self-contact is constrained between links two apart, and between the pairs `far`
+    (see `colloc.search.converge.crossing_pairs`).
     """
     return _searched(problem).program(problem, problem.guess if gait is None else gait, edges, far)
 

@@ -48,11 +48,11 @@ def connected(
         from distributed import Client
     except ImportError:
         raise ProblemError("--dask needs the package distributed: pip install 'colloc[dask]'.") from None
-    try:
-        if address == "local":
-            client = Client(n_workers=workers, threads_per_worker=1, dashboard_address=":0")  # any port that is free
+    try:  # for the study alone: what else the process does with Dask, xarray for one, is not sent there
+        if address == "local":  # any port that is free
+            client = Client(n_workers=workers, threads_per_worker=1, dashboard_address=":0", set_as_default=False)
         else:
-            client = Client(address, timeout=_CONNECT)
+            client = Client(address, timeout=_CONNECT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ProblemError(f"no Dask scheduler at {address}: {error}") from None
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL + 1)  # what it has to say is said in a sentence

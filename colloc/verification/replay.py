@@ -50,7 +50,7 @@ class Replay:
     lever : float
         Largest distance of a point of the body from its centre of mass [body lengths].
     driven_work : float
-        Of the actuators where none takes energy back (`colloc.mechanics.driven_power`); NaN if it was not asked for.
+        Of the actuators where none takes energy back (`colloc.mechanics.actuators.driven_power`); NaN if it was not asked for.
     actuator_work : float
         Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
     residual : float

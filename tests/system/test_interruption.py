@@ -2,6 +2,7 @@
 
 import contextlib
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -163,3 +164,29 @@ def test_a_limit_that_is_not_reached_leaves_nothing_behind():
         pass
     time.sleep(0.1)
     assert not interrupted()
+
+
+def test_after_a_limit_in_another_thread_a_profiler_can_be_switched_on():
+    """CPython 3.11 stands still at the first profiled call if a thread's exception was withdrawn before."""
+    code = """
+import sys, threading, time
+from colloc.system.interruption import time_limit
+
+def block(limit, asleep):
+    with time_limit(limit):
+        time.sleep(asleep)
+    ended.append(limit)
+
+ended = []
+threading.excepthook = lambda _: None
+for each in ((30, 0), (0.01, 0.05), (0.01, 0.01), (0.01, 0.0101), (0.01, 0.0099)):
+    thread = threading.Thread(target=block, args=each)
+    thread.start()
+    thread.join()
+sys.setprofile(lambda *_: None)
+(lambda: None)()
+sys.setprofile(None)
+print(ended[0])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "30\n", done.stderr

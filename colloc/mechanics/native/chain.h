@@ -1,4 +1,4 @@
-/* A chain of straight links at one instant, seen from one of its links, the reference: colloc/mechanics/body.py and
+/* A chain of straight links at one instant, seen from one of its links, the reference: colloc/mechanics/links.py and
    colloc/mechanics/balance.py. Positions and velocities are added up from the reference outwards, so that links that rest
    beside it keep the relative precision of their speed. */
 
