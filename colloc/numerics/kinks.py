@@ -2,8 +2,9 @@
 
 An objective that is the larger of two smooth ones may have its least value where they meet, and both gradients point away from
 the kink there. Such a point is stationary in the sense of Clarke and Goldstein: 0 is a convex combination of gradients at
-points near it. With points drawn by chance within a small radius this can be measured (Burke, Lewis and Overton, SIAM J. Optim.
-15, 2005).
+points near it (Goldstein, Math. Program. 13, 1977). With points drawn by chance within a small radius this can be measured
+(Burke, Lewis and Overton, SIAM J. Optim. 15, 2005). Where several kinks meet, chance misses sides: points a step down the mean
+that is nearest to 0 find them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from colloc.numerics.sqp import NonlinearProgram, Stationarity, binding
 _LOWER = 0.1
 """A kink that bends down has the same gradients. There, points are lower by more than this part of what they would be higher by
 where it bends up."""
+_STEPS_DOWN, _NOTHING = 2, 1e-10
+"""Points down the nearest mean, per unknown, and the part of the largest gradient that is none."""
 
 
 def stationarity_around(
@@ -56,8 +59,7 @@ def stationarity_around(
     (1.0, 0.0)
     """
     rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
-    drawn = v + radius * np.random.default_rng(seed).uniform(-1.0, 1.0, (points * v.size, v.size))
-    places = np.clip(np.vstack([v, drawn]), program.lower, program.upper)
+    rng = np.random.default_rng(seed)
 
     def on_sides(u: np.ndarray) -> tuple[np.ndarray, float]:
         """Gradient and height of the Lagrangian; rows have kinks too: what is not linear in them counts, with the multipliers
@@ -65,16 +67,33 @@ def stationarity_around(
         bent = program.rows(u) - rows - slopes @ (u - v)
         return program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes), program.objective(u) + at.on_rows @ bent
 
-    found_there = [on_sides(u) for u in places]
-    gradients, heights = np.array([g for g, _ in found_there]).T, np.array([h for _, h in found_there])
-    if not (np.isfinite(gradients).all() and np.isfinite(heights).all()):
+    def nearest() -> tuple[np.ndarray, np.ndarray]:
+        """The mean of the gradients so far, with those of what binds, that is nearest to 0; and their multipliers."""
+        gradients = np.array([gradient for gradient, _ in found]).T
+        # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
+        matrix = np.vstack([np.hstack([gradients, columns]), np.repeat([size, 0.0], [len(found), columns.shape[1]])])
+        parts, _ = nnls(matrix, np.append(np.zeros(v.size), size), maxiter=30 * matrix.shape[1])
+        shares, multipliers = np.split(parts, [len(found)])
+        return matrix[:-1] @ parts / shares.sum(), multipliers / shares.sum()
+
+    drawn = v + radius * rng.uniform(-1.0, 1.0, (points * v.size, v.size))
+    places = [*np.clip(np.vstack([v, drawn]), program.lower, program.upper)]
+    found = [on_sides(u) for u in places]
+    if not all(np.isfinite(gradient).all() and np.isfinite(height) for gradient, height in found):
         return at
-    # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
-    size = np.abs(gradients).max()
-    matrix = np.vstack([np.hstack([gradients, columns]), np.repeat([size, 0.0], [len(places), columns.shape[1]])])
-    found, _ = nnls(matrix, np.append(np.zeros(v.size), size), maxiter=30 * matrix.shape[1])
-    shares, multipliers = np.split(found, [len(places)])
-    error = float(np.abs(matrix[:-1] @ found).max() / shares.sum())
-    higher = heights - heights[0] + (places - v) @ columns @ multipliers / shares.sum()
+    size = max(float(np.abs(gradient).max()) for gradient, _ in found)
+    mean, multipliers = nearest()
+    for step in rng.uniform(0.0, 1.0, _STEPS_DOWN * v.size) ** 2:
+        if not np.abs(mean).max() > _NOTHING * size:
+            break
+        u = np.clip(v - radius * step * mean / np.abs(mean).max(), program.lower, program.upper)
+        side = on_sides(u)
+        if not (np.isfinite(side[0]).all() and np.isfinite(side[1])):
+            break
+        places.append(u)
+        found.append(side)
+        mean, multipliers = nearest()
+    error, heights = float(np.abs(mean).max()), np.array([height for _, height in found])
+    higher = heights - heights[0] + (np.array(places) - v) @ columns @ multipliers
     bends_down = -higher.min() > _LOWER * higher.max()
     return at if bends_down or error >= at.kkt_error else replace(at, kkt_error=error)

@@ -44,6 +44,13 @@ def test_gradients_of_all_sides_cancel_at_the_bottom_of_a_valley(slopes):
     assert around(program, ZERO, points=16).kkt_error < 2e-6
 
 
+def test_a_narrow_side_is_found_that_chance_misses():
+    """Of the plane the third piece has a fiftieth, right below; the others' gradients leave (0, 0.05)."""
+    narrow = Pieces([(1, 0.05), (-1, 0.05), (0, -0.01)])
+    assert around(narrow, ZERO, points=2).kkt_error < 2e-6
+    assert around(Pieces([(1, 0.05), (-1, 0.05)]), ZERO, points=2).kkt_error == pytest.approx(0.05, rel=1e-3)
+
+
 def test_they_do_not_cancel_on_a_slope_with_a_kink():
     assert around(Pieces([(1, 1), (-1, 1)]), ZERO).kkt_error == pytest.approx(1, abs=1e-5)
 
