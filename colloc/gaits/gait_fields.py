@@ -18,7 +18,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.relaxed import Mixture, Relaxed
-from colloc.gaits.sloped import PointedSeries, SlopeHarmonic
+from colloc.gaits.sloped import PointedSeries
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.power_law import PowerLaw
@@ -77,7 +77,7 @@ def gait_from(given: dict[str, Any]) -> AnyGait:
 
 def class_from(given: dict[str, Any]) -> AnyClass:
     """The class of gaits that `fields` described; as `gait_from`."""
-    return _from((*CLASSES, SlopeHarmonic), given)
+    return _from(CLASSES, given)
 
 
 def law_from(given: dict[str, Any]) -> Law:
@@ -94,6 +94,7 @@ def problem_fields(problem: Any) -> dict[str, Any]:
     """All fields of a problem; what is usual of what it asks for is left out."""
     stated = {f.name: getattr(problem, f.name) for f in dataclasses.fields(problem)}
     usual = [f.name for f in dataclasses.fields(problem) if f.metadata == STATED_IF_SET and stated[f.name] == f.default]
+    stated["gait"] = problem.gait.level  # the grade says that it is on a slope
     stated |= {name: fields(stated[name]) for name in ("guess", "gait", "body", "friction")}
     stated |= {"objective": problem.objective.fields(), "at_least": [[aim.fields(), least] for aim, least in problem.at_least]}
     return {name: value for name, value in stated.items() if name not in usual}

@@ -9,7 +9,8 @@ the weight.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,8 +82,9 @@ class PointedSeries(Fourier):
         return [*super().lines(), where]
 
 
-class SlopeHarmonic(Harmonic):
-    """The class `Harmonic` on a slope: its last parameter is where the tail link points at phase 0."""
+class OnSlope(Harmonic):
+    """What a slope changes in a class of series: the last parameter says where the tail link points at phase 0. Classes on
+    slopes derive from it first and then from the class they are on the level (`class_on`)."""
 
     delta_start = 0.02
     """At more the body creeps down faster than it crawls up."""
@@ -102,7 +104,10 @@ class SlopeHarmonic(Harmonic):
 
     @property
     def level(self) -> Harmonic:
-        return Harmonic(self.harmonics, self.symmetry)
+        return type(self).__bases__[1](**_fields(self))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _pointed, (self.level,)
 
     def series(self, harmonics: int) -> Harmonic:
         return self.level
@@ -129,13 +134,33 @@ class SlopeHarmonic(Harmonic):
         return np.append(self.nearest(gait)[:-1], gait.theta)
 
 
+def _fields(gait_class: Any) -> dict[str, Any]:
+    return {f.name: getattr(gait_class, f.name) for f in fields(gait_class)}
+
+
+@cache
+def _on_slopes(kind: Any) -> Any:
+    return type(kind.__name__, (OnSlope, kind), {"__doc__": kind.__doc__})
+
+
+def _pointed(gait_class: Harmonic) -> Any:
+    return _on_slopes(type(gait_class))(**_fields(gait_class))
+
+
 def class_on(slope: Slope | None, gait_class: Any) -> Any:
-    """A class of gaits on a slope, or on the level. `ProblemError` if it has no gaits for slopes."""
+    """A class of gaits on a slope, or on the level; any that derives from `Harmonic`, one's own too, can be on both.
+
+    Raises
+    ------
+    ProblemError
+        If it has no gaits for slopes.
+    """
+    level = gait_class.level
     if slope is None:
-        return gait_class.level
-    if not isinstance(gait_class, Harmonic):
-        raise ProblemError(f"on a slope gaits are sought in a class Harmonic, not {type(gait_class).__name__}.")
-    return SlopeHarmonic(gait_class.harmonics, gait_class.symmetry)
+        return level
+    if not isinstance(level, Harmonic):
+        raise ProblemError(f"on a slope gaits are sought in a class Harmonic, not {type(level).__name__}.")
+    return _pointed(level)
 
 
 def _checked_grade(grade: object) -> float:

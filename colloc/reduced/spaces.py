@@ -20,7 +20,7 @@ from colloc.gaits.polygon import Polygon
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
-from colloc.gaits.sloped import SlopeHarmonic
+from colloc.gaits.sloped import OnSlope
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.reduced.harmonic_space import HarmonicSpace
@@ -55,7 +55,7 @@ _MIXED = Searched(
 SEARCHED: dict[type, Searched] = {
     FreePath: _ALONG_PATHS,
     Polygon: _ALONG_PATHS,
-    SlopeHarmonic: _ON_SLOPE,
+    OnSlope: _ON_SLOPE,
     Relaxed: _MIXED,
     Harmonic: _LINEAR,
     Prescribed: _LINEAR,
