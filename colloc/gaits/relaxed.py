@@ -107,7 +107,7 @@ class Mixture:
         return along / along[-1]
 
     @property
-    def breaks(self) -> np.ndarray:
+    def corner_phases(self) -> np.ndarray:
         """Phases in (0, 1) where the mixture jumps."""
         phases = np.unique(self.phases)
         return phases[(phases > _IDLE) & (phases < 1 - _IDLE)]
@@ -144,6 +144,10 @@ class Mixture:
         """Rates of the mean shape ``(n_joint, n_time)`` per period."""
         rates, shares = self.mixed_rates(t)
         return np.einsum("kjt,kt->jt", rates, shares)
+
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Mean joint angles, rates in each direction and their shares of the time: what a replay is made from."""
+        return self.angles(t), *self.mixed_rates(t)
 
     def split(self, pieces: int) -> Mixture:
         """The same gait in more pieces, by halving, and so on, those that take longest; pieces that take no time go."""

@@ -35,12 +35,8 @@ def relaxed_certificate(
     problem: Problem, gait: Mixture, optimality: Optimality, instants: int = 1600, tolerance: float = 1e-6
 ) -> Certificate:
     """The certificate of a relaxed gait."""
-
-    def path(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return gait.angles(t), *gait.mixed_rates(t)
-
     return gait_certificate(
-        problem, path, problem.delta * gait.delta_unit, gait.breaks, instants, tolerance,
+        problem, gait, problem.delta * gait.delta_unit, gait.corner_phases, instants, tolerance,
         claimed=optimality.efficiency,
         before=(
             Check("KKT error", optimality.kkt_error, STATIONARY, "gradient of the Lagrangian of the relaxed program"),

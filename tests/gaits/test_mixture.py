@@ -50,7 +50,7 @@ def test_the_whole_period_closes_and_has_the_symmetry(symmetry, n_joint):
 
 def test_mixed_rates_are_the_slopes_of_the_mean_shape():
     gait, h = mixture("both"), 1e-6
-    t = np.setdiff1d(np.linspace(0.01, 0.99, 41), gait.breaks)
+    t = np.setdiff1d(np.linspace(0.01, 0.99, 41), gait.corner_phases)
     difference = (gait.angles(t + h) - gait.angles(t - h)) / (2 * h)
     assert np.allclose(gait.rates(t), difference, atol=1e-6 * gait.length)
     rates, shares = gait.mixed_rates(t)

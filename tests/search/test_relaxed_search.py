@@ -55,7 +55,7 @@ def test_repeats_are_doubled_where_finite_gaits_stay_far_from_what_they_tend_to(
 def test_the_replay_of_a_relaxed_gait_is_the_limit_of_replays_of_finite_ones(solution):
     gait, stated = solution.relaxed.gait, solution.problem
     delta = 0.02 * gait.length
-    relaxed = replay(stated.body, stated.friction, lambda t: (gait.angles(t), *gait.mixed_rates(t)), delta, breaks=gait.breaks)
+    relaxed = replay(stated.body, stated.friction, gait, delta, breaks=gait.corner_phases)
     apart = []
     for repeats in (4, 8, 16):
         finite = gait.realised(repeats)

@@ -36,6 +36,7 @@ from colloc.system.sealed_file import check_seal
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="forks and kills")]
 CYCLES = 120
+RAISED = 99
 PROBLEM = """
 from colloc import *
 PROBLEM = Problem("tiny", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, delta_start=1e-2, intervals=8,
@@ -73,7 +74,7 @@ def child(kind, folder, pipe):
     os.dup2(null, 1)
     os.dup2(null, 2)
     if kind == "solve":
-        saved.save = told(say, kind, saved.save, solve_facts)
+        saved.save_result = told(say, kind, saved.save_result, solve_facts)
         return solve.main([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
@@ -126,10 +127,11 @@ def cycle(kind, folder, rng, longest, at_a_write):
     read, write = os.pipe()
     pid = os.fork()
     if pid == 0:
+        code = RAISED
         with contextlib.suppress(BaseException):
             os.close(read)
-            child(kind, folder, write)
-        os._exit(0)
+            code = child(kind, folder, write)
+        os._exit(code)
     os.close(write)
     os.set_blocking(read, False)
     begin, said = time.perf_counter(), b""
@@ -146,6 +148,7 @@ def cycle(kind, folder, rng, longest, at_a_write):
             break
     os.kill(pid, signal.SIGKILL)
     status = os.waitpid(pid, 0)[1]
+    assert os.waitstatus_to_exitcode(status) != RAISED, f"{kind} ended by itself, in an exception"
     os.set_blocking(read, True)
     with os.fdopen(read, "rb") as rest:
         said += rest.read()
