@@ -143,7 +143,7 @@ def _on_slopes(kind: Any) -> Any:
     return type(kind.__name__, (OnSlope, kind), {"__doc__": kind.__doc__})
 
 
-def _pointed(gait_class: Harmonic) -> Any:
+def _pointed(gait_class: Any) -> Any:
     return _on_slopes(type(gait_class))(**_fields(gait_class))
 
 

@@ -1,0 +1,208 @@
+r"""Periodic states along the intervals of a collocation scheme: ``s' = r(t, s)`` for any number of them, with an adjoint.
+
+At the stages i of the intervals k of length h the scheme (A, b) says
+
+    s_ki = s_0 + sum_(l<k) h_l sum_j b_j r_lj + h_k sum_j A_ij r_kj,
+
+in short ``s = s_0 + H r(s)``. A state either starts where it is told to, or is *free*: then it ends a period, or the part of one
+that is solved, where a symmetry sends its start, ``s_end = M s_0``. Newton's method, and derivatives of what follows from the
+states, need solutions with ``I - H R``, R being the derivatives of the rates with respect to the states. Interval by interval
+that is a small system in the stages; the states at its begin are handed on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.numerics.mesh import Mesh
+
+_CLOSED, _STEPS = 1e-12, 30
+
+
+class Rates(NamedTuple):
+    """Rates of the states at the points of a mesh."""
+
+    value: np.ndarray
+    """``(n_state, n_point)``."""
+    on_states: np.ndarray
+    """Their derivatives with respect to the states, ``(n_state, n_state, n_point)``."""
+    known: bool = True
+    """Whether the rates could be found everywhere."""
+
+
+class CollocatedStates:
+    """The equations of states on a mesh whose neighbours share no stage; points are in order of the stages.
+
+    Parameters
+    ----------
+    mesh
+    free : (n_state,), optional
+        Which states close a period; by default none, and all start where they are told to.
+    image : (n_state, n_state), optional
+        Where a symmetry sends the start of the free states; by default they end where they start.
+    unit
+        Rates are per time divided by this.
+    """
+
+    def __init__(
+        self, mesh: Mesh, free: np.ndarray | None = None, image: np.ndarray | None = None, unit: float = 1.0
+    ) -> None:
+        self._shape = mesh.n, mesh.scheme.s
+        self._a, self._b = unit * mesh.h[:, None, None] * mesh.scheme.A, unit * mesh.h[:, None] * mesh.scheme.b
+        self._free = np.flatnonzero(np.zeros(0, dtype=bool) if free is None else free)
+        self._image = image
+
+    def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``, of rates ``(n_state, n_point)``."""
+        stages = rates.reshape(len(rates), *self._shape)
+        gained = np.cumsum((self._b * stages).sum(axis=2), axis=1)
+        before = np.concatenate([np.zeros((len(rates), 1)), gained[:, :-1]], axis=1)
+        return (before[:, :, None] + np.einsum("nij,anj->ani", self._a, stages)).reshape(rates.shape), gained[:, -1]
+
+    def solved(
+        self,
+        rates: Callable[[np.ndarray], Rates],
+        start: np.ndarray,
+        near: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        """States at the points by Newton's method.
+
+        Parameters
+        ----------
+        rates
+            Of states ``(n_state, n_point)``.
+        start : (n_state,)
+            At the begin; of free states where the search for it begins.
+        near : (n_state, n_point), optional
+            Where the search for the states begins; by default at their start.
+
+        Returns
+        -------
+        states : (n_state, n_point)
+            Those that `rates` was asked for last.
+        start : (n_state,)
+        held : bool
+            Whether there is such a motion: it was found, and all rates are known.
+        """
+        start = np.array(start, dtype=float)
+        states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
+        for _ in range(_STEPS):
+            now = rates(states)
+            gained, whole = self.integrals(now.value)
+            left_over, open_by = states - start[:, None] - gained, whole + self._moved(start)
+            held = now.known and max(np.abs(left_over).max(), np.abs(open_by[self._free]).max(initial=0.0)) < _CLOSED
+            if held or not now.known:
+                break
+            step, step_start = self._newton(now.on_states, left_over, open_by)
+            states, start = states - step, start - step_start
+        return states, start, bool(held)
+
+    def _moved(self, start: np.ndarray) -> np.ndarray:
+        """``s_0 - M s_0``."""
+        return start - (start if self._image is None else self._image @ start)
+
+    def _newton(self, on_states: np.ndarray, left_over: np.ndarray, open_by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of the states and of their start that the equations, to first order, differ by."""
+        within = _Linear(self._a, self._b, on_states)
+        step, gained = within.solved(left_over)
+        start = np.zeros_like(open_by)
+        if self._free.size:
+            free = self._free
+            through = np.stack([within.handed_on(unit) for unit in np.eye(len(start))], axis=1)
+            start[free] = np.linalg.solve(self._open(through), open_by[free] + gained[free])
+            step, _ = within.solved(left_over, start)
+        return step, start
+
+    def _open(self, through: np.ndarray) -> np.ndarray:
+        """Of the free states ``d s_end / d s_0 - M``."""
+        image = np.eye(len(through)) if self._image is None else self._image
+        return (through - image)[np.ix_(self._free, self._free)]
+
+    def pulled_back(self, on_states: np.ndarray, of_states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of numbers by way of the states.
+
+        Parameters
+        ----------
+        on_states : (n_state, n_state, n_point)
+            Those of the rates with respect to the states.
+        of_states : (m, n_state, n_point)
+            Those of m numbers with respect to the states.
+
+        Returns
+        -------
+        on_start : (m, n_state)
+            With respect to the start; 0 of free states, whose start follows.
+        on_rates : (m, n_state, n_point)
+            With respect to the rates at given states.
+        """
+        within = _Linear(self._a, self._b, on_states)
+        on_start, on_rates = within.pulled_back(of_states)
+        if self._free.size:
+            free = self._free
+            through, _ = within.pulled_back(np.zeros((on_start.shape[1], *of_states.shape[1:])), np.eye(on_start.shape[1]))
+            closing = np.zeros_like(on_start)
+            closing[:, free] = -np.linalg.solve(self._open(through).T, on_start[:, free].T).T
+            image = np.eye(len(through)) if self._image is None else self._image
+            on_start, on_rates = within.pulled_back(of_states, closing)
+            on_start -= closing @ image
+        return on_start, on_rates
+
+
+class _Linear:
+    """``I - H R``, condensed to the begins of the intervals: their stages are ``own + response @ begin``."""
+
+    def __init__(self, a: np.ndarray, b: np.ndarray, on_states: np.ndarray) -> None:
+        (n, s), k = b.shape, len(on_states)
+        self._a, self._b, self._shape = a, b, (n, s, k)
+        # of an interval in order of stage, state
+        slopes = on_states.reshape(k, k, n, s).transpose(2, 3, 0, 1)
+        matrix = np.eye(s * k) - np.einsum("nij,njab->niajb", a, slopes).reshape(n, s * k, s * k)
+        self._inverse = np.linalg.inv(matrix)
+        self._gain = np.einsum("nj,njab->najb", b, slopes).reshape(n, k, s * k)
+        self._response = self._inverse.reshape(n, s * k, s, k).sum(axis=2)
+        self._through = np.eye(k) + self._gain @ self._response
+
+    def _by_interval(self, at_points: np.ndarray) -> np.ndarray:
+        n, s, k = self._shape
+        return np.moveaxis(at_points.reshape(*at_points.shape[:-2], k, n, s), -3, -1).reshape(*at_points.shape[:-2], n, s * k)
+
+    def _by_point(self, by_interval: np.ndarray) -> np.ndarray:
+        n, s, k = self._shape
+        return np.moveaxis(by_interval.reshape(*by_interval.shape[:-2], n, s, k), -1, -3).reshape(
+            *by_interval.shape[:-2], k, n * s
+        )
+
+    def handed_on(self, begin: np.ndarray) -> np.ndarray:
+        """States at the end of all intervals, ``(k,)``, from those at their begin, to first order."""
+        for through in self._through:
+            begin = through @ begin
+        return begin
+
+    def solved(self, right: np.ndarray, begin: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """x with ``(I - H R) x = begin + right``, ``(k, n_point)``, and ``begin + sum of h b R x``, ``(k,)``."""
+        own = np.einsum("nij,nj->ni", self._inverse, self._by_interval(right))
+        gained = np.einsum("nai,ni->na", self._gain, own)
+        begins = np.empty_like(gained)
+        now = np.zeros(gained.shape[1]) if begin is None else begin
+        for k, (through, more) in enumerate(zip(self._through, gained, strict=True)):
+            begins[k] = now
+            now = through @ now + more
+        return self._by_point(own + np.einsum("nia,na->ni", self._response, begins)), now
+
+    def pulled_back(self, of_states: np.ndarray, of_end: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Of numbers with derivatives ``(m, k, n_point)`` with respect to the states and ``(m, k)`` to those at the end: to
+        their begin, ``(m, k)``, and to the rates, ``(m, k, n_point)``, as ``H'(I - H R)'^-1``."""
+        (n, s, k), given = self._shape, self._by_interval(of_states)
+        through = np.einsum("mni,nia->mna", given, self._response)
+        later = np.empty_like(through)
+        now = np.zeros((len(given), k)) if of_end is None else of_end
+        for interval in range(n - 1, -1, -1):
+            later[:, interval] = now
+            now = now @ self._through[interval] + through[:, interval]
+        mu = np.einsum("mni,nij->mnj", given + np.einsum("mna,nai->mni", later, self._gain), self._inverse)
+        stages = mu.reshape(-1, n, s, k)
+        on_rates = np.einsum("mnia,nij->mnja", stages, self._a) + self._b[:, :, None] * later[:, :, None]
+        return now, self._by_point(on_rates.reshape(-1, n, s * k))

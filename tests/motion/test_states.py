@@ -1,0 +1,132 @@
+"""States on a mesh whose rates depend on them, one to three: the differential equation, the order, adjoints, symmetry."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from colloc.motion.states import CollocatedStates, Rates
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
+
+EDGES = np.array([0.0, 0.1, 0.35, 0.4, 0.8, 1.0])
+SIZES = (1, 2, 3)
+
+
+def spring(k, push=1.0):
+    """States that are pulled to 0, unevenly and by each other, and pushed to and fro once a period."""
+    rng = np.random.default_rng(k)
+    matrix = 2.0 * np.eye(k) + 0.5 * rng.normal(size=(k, k))
+
+    def rates(t, s):
+        force = push * np.sin(2 * np.pi * t + np.arange(k)[:, None])
+        return force - matrix @ s - 0.5 * s**3
+
+    def on_states(t, s):
+        return np.moveaxis(-matrix - 1.5 * np.eye(k) * (s**2).T[:, None], 0, -1)
+
+    return rates, on_states
+
+
+def on_mesh(mesh, ode):
+    rates, on_states = ode
+    return lambda s: Rates(rates(mesh.times, s), on_states(mesh.times, s))
+
+
+def followed(rates, start, t):
+    run = solve_ivp(lambda t, s: rates(np.array([t]), s[:, None])[:, 0], (0, t[-1]), start, t_eval=t, rtol=1e-11, atol=1e-12)
+    return run.y
+
+
+def settled(rates, k):
+    """The state at phase 0 after many periods."""
+    return followed(rates, np.zeros(k), np.array([0.0, 30.0]))[:, -1]
+
+
+@pytest.mark.parametrize("k", SIZES)
+@pytest.mark.parametrize("free", [False, True])
+def test_they_converge_to_the_differential_equation_with_the_order_of_the_scheme(k, free):
+    ode, errors = spring(k), []
+    start = settled(ode[0], k) if free else np.linspace(0.5, 1, k)
+    exact = followed(ode[0], start, np.array([0.0, 1.0]))[:, -1]
+    for n in (10, 20):
+        mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, n + 1))
+        equations = CollocatedStates(mesh, np.full(k, free))
+        states, found, held = equations.solved(on_mesh(mesh, ode), 0 * start if free else start)
+        assert held
+        end = found + equations.integrals(ode[0](mesh.times, states))[1]
+        errors.append(np.abs(end - exact).max())
+        if free:
+            np.testing.assert_allclose(end, found, atol=1e-11)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.3)
+
+
+@pytest.mark.parametrize("k", SIZES)
+@pytest.mark.parametrize("free", [False, True])
+def test_the_adjoint_has_the_slopes_of_differences(k, free):
+    mesh, rng = Mesh(scheme("radau-2"), EDGES), np.random.default_rng(1)
+    mask = np.full(k, free)
+    mask[:1] = free and k != 2  # one told, the other free
+    image = -np.eye(k) if k == 3 else None
+    equations, (rates, on_states) = CollocatedStates(mesh, mask, image), spring(k)
+    weight, more, start = rng.normal(size=(k, mesh.n_point)), rng.normal(size=(k, mesh.n_point)), np.full(k, 0.2)
+    moved = np.where(mask, 0.0, rng.normal(size=k))
+
+    def number(size):
+        def at(s):
+            return Rates(rates(mesh.times, s) + size * more, on_states(mesh.times, s))
+
+        states, _, held = equations.solved(at, start + size * moved)
+        assert held
+        return (weight * states).sum(), states
+
+    _, states = number(0.0)
+    on_start, on_rates = equations.pulled_back(on_states(mesh.times, states), weight[None])
+    difference = (number(1e-5)[0] - number(-1e-5)[0]) / 2e-5
+    assert (on_rates[0] * more).sum() + on_start[0] @ moved == pytest.approx(difference, rel=1e-7)
+    np.testing.assert_allclose(on_start[0, mask], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["gauss-3", "radau-2"])
+def test_interval_by_interval_it_is_the_one_large_system(name):
+    mesh, rng, k = Mesh(scheme(name), EDGES), np.random.default_rng(0), 2
+    equations, n = CollocatedStates(mesh, unit=2.0), mesh.n_point
+    matrix, push = rng.normal(size=(k, k, n)), rng.normal(size=(k, n))
+    integral = np.stack([equations.integrals(row.reshape(k, n))[0].ravel() for row in np.eye(k * n)], axis=1)
+    jacobian = np.zeros((k, n, k, n))
+    jacobian[:, range(n), :, range(n)] = np.moveaxis(matrix, -1, 0)
+    whole = np.eye(k * n) - integral @ jacobian.reshape(k * n, k * n)
+    states, start, held = equations.solved(lambda s: Rates(np.einsum("abn,bn->an", matrix, s) + push, matrix), np.ones(k))
+    assert held
+    np.testing.assert_allclose(whole @ states.ravel(), 1 + integral @ push.ravel(), atol=1e-10)
+    of_states = rng.normal(size=(3, k, n))
+    mu = np.linalg.solve(whole.T, of_states.reshape(3, -1).T).T
+    on_start, on_rates = equations.pulled_back(matrix, of_states)
+    np.testing.assert_allclose(on_start, mu.reshape(3, k, n).sum(axis=2), atol=1e-10)
+    np.testing.assert_allclose(on_rates.reshape(3, -1), mu @ integral, atol=1e-10)
+
+
+def test_half_a_period_and_its_image_are_the_whole():
+    """Pushed the other way half a period later, odd springs do the opposite."""
+    ode, image = spring(2), -np.eye(2)
+    half, whole = (Mesh(scheme("gauss-4"), np.linspace(0.0, end, n + 1)) for end, n in ((0.5, 20), (1.0, 40)))
+    first, start, held = CollocatedStates(half, np.full(2, True), image).solved(on_mesh(half, ode), np.zeros(2))
+    both, again, _ = CollocatedStates(whole, np.full(2, True)).solved(on_mesh(whole, ode), np.zeros(2))
+    assert held
+    np.testing.assert_allclose(start, again, atol=1e-11)
+    np.testing.assert_allclose(np.concatenate([first, -first], axis=1), both, atol=1e-11)
+
+
+def test_a_good_start_is_found_at_once_and_no_motion_is_said_to_be_none():
+    mesh, asked = Mesh(scheme("gauss-3"), EDGES), []
+    at = on_mesh(mesh, spring(3))
+
+    def counted(s):
+        asked.append(s)
+        return at(s)
+
+    equations = CollocatedStates(mesh, np.full(3, True))
+    states, start, _ = equations.solved(counted, np.zeros(3))
+    cold, _ = len(asked), asked.clear()
+    assert equations.solved(counted, start, states)[2]
+    assert len(asked) == 1 < cold
+    assert not equations.solved(lambda s: at(s)._replace(known=False), np.zeros(3))[2]
