@@ -9,14 +9,9 @@ from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.mechanics.actuators import driven_power_in_balance
-from colloc.mechanics.balance_results import BalancedMotion
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
-from colloc.motion.heading import heading
+from colloc.motion.kinds import OMEGA, Passed, Shapes, begin_of, first_theta, kind_of_motion
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.orientation import Orientation
-from colloc.verification.collocated_slope import PointsOnSlope, points_on_slope
-
-_TOLERANCE = 1e-11
 
 
 def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: float) -> np.ndarray:
@@ -36,27 +31,23 @@ def balanced_variables(
     unit = gait.speed_unit
     slow = delta * gait.delta_unit / unit
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
-    body, friction, slope = problem.body, problem.friction.in_speeds_of(unit), problem.slope
-    now: BalancedMotion | PointsOnSlope
-    if slope is None:
-        solved = body.solve(friction, angles, rates, slow, tolerance=_TOLERANCE)
-        now, z = body.motion(friction, angles, rates, slow, solved), solved.z
-    else:
-        now = points_on_slope(body, friction, slope, Orientation(mesh, unit), angles, rates, slow, gait.theta)
-        z = now.z
+    body, friction = problem.body, problem.friction.in_speeds_of(unit)
+    kind = kind_of_motion(problem, friction)
+    begin = begin_of(kind, gait)
+    along = kind.along(mesh, Shapes(angles, rates, slow, unit), begin)
+    now, z = along.now, along.now.z
 
     centre, weight, points = np.array(now.centre), unit * stage_weights(mesh), mesh.points
-    pose = CollocatedPose.on_mesh(mesh, unit * z[2], unit * centre)
-    # on a slope the gait says where it points, and the way in a given direction counts; on the level it travels along +x
-    if slope is None:
-        theta_0, ahead = -heading(problem.gait.symmetry, complex(pose.place[-1]), float(pose.theta[-1])), 0.0
-        uphill = 0.0
-    else:
-        theta_0, ahead, uphill = gait.theta, slope.ahead, slope.grade
+    pose = CollocatedPose.on_mesh(mesh, unit * z[OMEGA], unit * centre, first_theta(kind, begin))
     power = (weight * now.power[points]).sum(axis=1)
-    way = np.exp(1j * (theta_0 - ahead)) * pose.place
-    x[layout.distance[0, 1:]] = way[1:].real
-    x[layout.work[0, 1:]] = sums(power)[1:] + uphill * (np.exp(1j * ahead) * way)[1:].real
+    # a gait with both symmetries has another program
+    shares = kind.shares(Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(power.sum())))
+    sides = np.array([shares[name].side for name in ("distance", "work")]) / kind.periods
+    ahead, climbed = (pose.place * np.conj(sides)[:, None]).real
+    # where the orientation is no state the plane is turned so that the gait goes along +x
+    theta_0 = 0.0 if kind.states else -float(np.angle(sides[0]))
+    x[layout.distance[0, 1:]] = ahead[1:]
+    x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
     x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
     if layout.driven_work.size:

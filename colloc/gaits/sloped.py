@@ -144,7 +144,8 @@ def _on_slopes(kind: Any) -> Any:
 
 
 def _pointed(gait_class: Any) -> Any:
-    return _on_slopes(type(gait_class))(**_fields(gait_class))
+    kind: Any = type(gait_class)
+    return _on_slopes(kind)(**_fields(gait_class))
 
 
 def class_on(slope: Slope | None, gait_class: Any) -> Any:

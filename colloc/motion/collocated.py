@@ -100,13 +100,17 @@ class CollocatedPose:
         turned, moved = (weights * self._omega[k]).sum(axis=1), (weights * self.velocity[k]).sum(axis=1)
         return self.theta[k] + turned, self.place[k] + moved
 
-    def pulled_back(self, axis: complex) -> np.ndarray:
-        """Derivatives ``(3, n, s)`` of the displacement along a unit vector, to the rotation rate and to both components of the
-        velocity of the centre of mass in the axes of the body."""
-        rule, back = self._scheme, np.conj(axis)
-        on_theta = self._weight * (1j * self.velocity * back).real
+    def on_pose(self, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the displacements along directions ``(m,)``, complex, whose size counts: with respect to the
+        orientation at the stages, ``(m, n, s)``, and to both components of the velocity of the centre of mass in the axes of
+        the body, ``(m, 2, n, s)``."""
+        back = self._weight * np.conj(sides)[:, None, None]
+        on_centre = np.conj(np.exp(1j * self.stage_theta) * back)
+        return -(back * self.velocity).imag, np.stack([on_centre.real, on_centre.imag], axis=1)
+
+    def on_rates(self, on_theta: np.ndarray) -> np.ndarray:
+        """Derivatives with respect to the rotation rate, from those with respect to the orientation, ``(m, n, s)`` both."""
         # the rotation over an interval turns all that come later
-        later = np.concatenate([np.cumsum(on_theta.sum(axis=1)[::-1])[::-1][1:], [0.0]])
-        on_omega = self._h[:, None] * (on_theta @ rule.A + rule.b * later[:, None])
-        on_centre = self._weight * np.conj(np.exp(1j * self.stage_theta) * back)
-        return np.array([on_omega, on_centre.real, on_centre.imag])
+        after = np.cumsum(on_theta.sum(axis=2)[:, ::-1], axis=1)[:, ::-1]
+        later = np.concatenate([after[:, 1:], np.zeros((len(after), 1))], axis=1)
+        return self._h[:, None] * (on_theta @ self._scheme.A + self._scheme.b * later[:, :, None])

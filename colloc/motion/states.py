@@ -4,10 +4,10 @@ At the stages i of the intervals k of length h the scheme (A, b) says
 
     s_ki = s_0 + sum_(l<k) h_l sum_j b_j r_lj + h_k sum_j A_ij r_kj,
 
-in short ``s = s_0 + H r(s)``. A state either starts where it is told to, or is *free*: then it ends a period, or the part of one
-that is solved, where a symmetry sends its start, ``s_end = M s_0``. Newton's method, and derivatives of what follows from the
-states, need solutions with ``I - H R``, R being the derivatives of the rates with respect to the states. Interval by interval
-that is a small system in the stages; the states at its begin are handed on.
+in short ``s = s_0 + H r(s)``. A state either starts where it is told to, or is *free*: then it ends a period, or the part of
+one that is solved, where a symmetry sends its start, ``s_end = M s_0``. Newton's method, and derivatives of what follows from
+the states, need solutions with ``I - H R``, R being the derivatives of the rates with respect to the states. Interval by
+interval that is a small system in the stages; the states at its begin are handed on.
 """
 
 from __future__ import annotations
@@ -47,9 +47,7 @@ class CollocatedStates:
         Rates are per time divided by this.
     """
 
-    def __init__(
-        self, mesh: Mesh, free: np.ndarray | None = None, image: np.ndarray | None = None, unit: float = 1.0
-    ) -> None:
+    def __init__(self, mesh: Mesh, free: np.ndarray | None = None, image: np.ndarray | None = None, unit: float = 1.0) -> None:
         self._shape = mesh.n, mesh.scheme.s
         self._a, self._b = unit * mesh.h[:, None, None] * mesh.scheme.A, unit * mesh.h[:, None] * mesh.scheme.b
         self._free = np.flatnonzero(np.zeros(0, dtype=bool) if free is None else free)

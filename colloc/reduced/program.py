@@ -12,11 +12,11 @@ from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Pairs
+from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.actuator_rows import ActuatorRows
 from colloc.reduced.given import Given
 from colloc.reduced.motion import ReducedMotion, Shapes
-from colloc.reduced.sloped import SlopedMotion
 
 
 class SearchSpace(Shapes, Protocol):
@@ -100,8 +100,7 @@ class ReducedProgram:
         self.space, self.delta = space, delta
         problem, self.unit = in_friction_units(space.problem)
         besides = [name for name in ("length", "driven_work") if problem.uses(name)]
-        at = problem.body, problem.friction, problem.gait.motion_symmetry, space.mesh, space, besides
-        self.motion = ReducedMotion(*at) if problem.slope is None else SlopedMotion(*at, problem.slope)
+        self.motion = ReducedMotion(kind_of_motion(problem), space.mesh, space, besides)
         held = {"rotation": problem.rotation} if problem.gait.closing_symmetry == NONE else {}
         held |= {} if problem.towards is None else {"across": 0.0}
         self._held = [name for name, value in held.items() if value is not None]

@@ -1,8 +1,7 @@
-r"""A gait on a slope as a collocation scheme sees it, and how wrong it is, interval by interval.
+r"""How wrong a collocated gait on a slope is, interval by interval.
 
-The scheme's orientation at its points obeys ``theta = theta_0 + H omega(theta)`` (`colloc.numerics.orientation`), omega being
-that of the balance under the weight's pull. Newton's method solves for all points at once. What this says of every interval is
-held against the differential equation (`colloc.verification.gait_on_slope`).
+What the scheme says of every interval (`colloc.motion.kinds.SlowOnSlope`) is held against the differential equation
+(`colloc.verification.gait_on_slope`).
 """
 
 from __future__ import annotations
@@ -13,70 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colloc.gaits.problem import Problem
-from colloc.gaits.sloped import Slope, checked_chain
-from colloc.mechanics.chain_motion import chain_slopes
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.law import Law
+from colloc.gaits.sloped import checked_chain
+from colloc.motion.collocated import CollocatedPose, stage_weights
+from colloc.motion.kinds import OMEGA, Shapes, begin_of, first_theta, kind_of_motion
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.orientation import Orientation
 from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.gait_on_slope import GaitOnSlope
-
-_TOLERANCE, _ACCEPTED = 1e-12, 1e-9
-_CLOSED, _STEPS = 1e-12, 30
-_OUTPUTS, _LOAD = slice(2, 6), slice(-2, None)
-
-
-class PointsOnSlope(NamedTuple):
-    """A collocated motion at the points of a mesh."""
-
-    theta: np.ndarray  # (n,)
-    z: np.ndarray
-    """Tail velocities, ``(3, n)``."""
-    centre: np.ndarray
-    """Velocities of the centre of mass, in the body's axes, ``(2, n)``."""
-    power: np.ndarray
-    """Against friction, ``(n,)``."""
-    on_shape: np.ndarray
-    on_theta: np.ndarray
-    """Derivatives of rotation rate, centre and power along (angles, rates), ``(4, 2 n_joint, n)``, and theta, ``(4, n)``."""
-    held: bool
-    """Whether there is such a motion: friction holds the body everywhere."""
-
-    def travelled(self) -> np.ndarray:
-        """Velocity of the centre of mass in the plane, its real part uphill, ``(n,)``."""
-        return np.exp(1j * self.theta) * (self.centre[0] + 1j * self.centre[1])
-
-
-def points_on_slope(
-    body: Any,
-    friction: Law,
-    slope: Slope,
-    mesh: Orientation,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    delta: float,
-    theta_0: float,
-    near: tuple[np.ndarray, np.ndarray] | None = None,
-) -> PointsOnSlope:
-    """The collocated motion of a chain with shapes ``(n_joint, n_point)`` whose tail link starts at an angle from straight
-    uphill; `near`: theta and tail velocities to start from."""
-    at = checked_chain(body, friction, slope.grade), friction, angles, rates, delta
-    n = angles.shape[1]
-    theta, z = near or (np.full(n, theta_0), np.zeros((3, n)))
-    for _ in range(_STEPS):
-        load = slope.pull(theta[None])
-        solved = solve_balance(*at, load=load, start=z, tolerance=_TOLERANCE)
-        now, slopes = chain_slopes(*at, solved, load)
-        z, slopes = solved.z, slopes[_OUTPUTS]
-        on_theta = slopes[:, -2] * load[1] - slopes[:, -1] * load[0]  # the pull turns against theta
-        left_over = theta - theta_0 - mesh.turned(now.z[2])
-        balanced = bool((solved.residual < _ACCEPTED).all())
-        held = balanced and bool(np.abs(left_over).max() < _CLOSED)
-        if held or not balanced:
-            break
-        theta = theta - mesh.solved(on_theta[0], left_over)
-    return PointsOnSlope(theta, z, now.centre, now.power, slopes[:, : _LOAD.start], on_theta, held)
 
 
 class SlopeDefects(NamedTuple):
@@ -114,16 +55,17 @@ def slope_course(problem: Problem, gait: Any, delta: float, error: float) -> Slo
 
 def slope_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact: SlopeCourse) -> SlopeDefects:
     """Errors of collocating a gait on a slope, delta per period."""
-    slope, body, friction = problem.slope, problem.body, problem.friction
+    slope, kind = problem.slope, kind_of_motion(problem)
     assert slope is not None
-    orientation, (angles, rates) = Orientation(mesh), gait(mesh.times)
-    own = points_on_slope(body, friction, slope, orientation, angles, rates, delta, gait.theta)
-    moved, weight = own.travelled(), orientation.weight
-    power = own.power + slope.grade * moved.real if own.held else np.nan * own.power
-    pace = np.linalg.norm(rates, axis=0)
-    turned, way, work, passed = (
-        (weight * rate).reshape(mesh.n, -1).sum(axis=1) for rate in (own.z[2], moved, power, pace)
-    )  # fmt: skip
+    angles, rates = gait(mesh.times)
+    begin = begin_of(kind, gait)
+    own = kind.along(mesh, Shapes(angles, rates, delta), begin)
+    pose = CollocatedPose.on_mesh(mesh, own.now.z[OMEGA], own.now.centre, first_theta(kind, begin))
+    weight, way = stage_weights(mesh), np.diff(pose.place)
+    spent, passed = ((weight * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, np.linalg.norm(rates, axis=0)))
+    turned, work = pose.rotations, spent + slope.grade * way.real
+    if not own.held.all():
+        work = np.nan * work
     theta, up, aside, _, joint_work = np.diff(exact.at(mesh.edges), axis=1)
     length, back = path_lengths(gait, mesh.edges[:-1], mesh.edges[1:], 4), np.exp(-1j * slope.ahead)
     rotation, displacement, energy = turned - theta, back * (way - (up + 1j * aside)), work - joint_work

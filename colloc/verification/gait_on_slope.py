@@ -26,10 +26,9 @@ from scipy.integrate import OdeSolution, solve_ivp
 
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.chain_motion import chain_slopes
-from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.motion.on_slope import balance_on_slope
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import Path
@@ -39,7 +38,7 @@ _STEP = 1 / 100
 (Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams' takes short ones, and errs by 8 to 40 times a step."""
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
-_OMEGA, _LOAD = 2, slice(-2, None)
+_OMEGA = 2
 _PANELS, _ONE_SIDED = 40, 1e-12
 _OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0, "driven_work": 0.0}
 """Shares in the error of the motion on the level: its way alone is asked for."""
@@ -174,15 +173,15 @@ class GaitOnSlope(NamedTuple):
 
     def _rates(self, t: float, theta: float, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
-        load = self.pull(np.array([theta]))
-        at = self.body, self.friction, *self.path(np.array([t])), self.delta
-        solved = solve_balance(*at, load=load, start=near)
+        shapes = (*self.path(np.array([t])), self.delta)
+        solved, now, _, on_theta = balance_on_slope(
+            self.body, self.friction, Slope(self.grade), shapes, np.array([theta]), start=near
+        )
         if not solved.converged.all():
             raise NotConvergedError(
                 f"no balance at phase {t:.4f} on a slope of grade {self.grade:g} (residual {solved.residual[0]:.1e}): friction "
                 "may be too weak to hold the body in that direction, so that it slides down; try a gentler slope."
             )
-        now, slopes = chain_slopes(*at, solved, load)
         moved = np.exp(1j * theta) * complex(*now.centre[:, 0])
-        steering = slopes[_OMEGA, _LOAD, 0] @ [load[1, 0], -load[0, 0]]  # the pull turns against theta
-        return np.array([now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], steering]), solved.z
+        unknowns = now.z[_OMEGA, 0], moved.real, moved.imag, now.power[0], now.actuator_power[0], on_theta[_OMEGA, 0]
+        return np.array(unknowns), solved.z

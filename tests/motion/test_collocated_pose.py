@@ -64,7 +64,9 @@ def test_the_displacement_has_the_slopes_of_differences(name):
         turn, forwards, left = rates
         return (CollocatedPose(mesh.scheme, mesh.h, turn, forwards + 1j * left).place[-1] * np.conj(axis)).real
 
-    slopes = CollocatedPose(mesh.scheme, mesh.h, omega, x + 1j * y).pulled_back(axis)
+    found = CollocatedPose(mesh.scheme, mesh.h, omega, x + 1j * y)
+    on_theta, (on_centre,) = found.on_pose(np.array([axis]))
+    slopes = np.concatenate([found.on_rates(on_theta), on_centre])
     for which in range(3):
         step = np.zeros((3, *shape))
         step[which] = 1e-6 * rng.normal(size=shape)

@@ -95,7 +95,7 @@ def test_interval_by_interval_it_is_the_one_large_system(name):
     jacobian = np.zeros((k, n, k, n))
     jacobian[:, range(n), :, range(n)] = np.moveaxis(matrix, -1, 0)
     whole = np.eye(k * n) - integral @ jacobian.reshape(k * n, k * n)
-    states, start, held = equations.solved(lambda s: Rates(np.einsum("abn,bn->an", matrix, s) + push, matrix), np.ones(k))
+    states, _, held = equations.solved(lambda s: Rates(np.einsum("abn,bn->an", matrix, s) + push, matrix), np.ones(k))
     assert held
     np.testing.assert_allclose(whole @ states.ravel(), 1 + integral @ push.ravel(), atol=1e-10)
     of_states = rng.normal(size=(3, k, n))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Problem, Relaxed, replay
+from colloc.motion.kinds import SlowOnLevel
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.motion import ReducedMotion
 from colloc.reduced.program import ReducedProgram
@@ -32,7 +33,8 @@ def begun(symmetry, links=3, directions=3, pieces=5, far=()):
 def test_slopes_of_what_a_period_comes_to_and_of_rows_are_those_of_differences(symmetry, links, far):
     space, v = begun(symmetry, links, far=far)
     program, h = ReducedProgram(space, DELTA), 1e-6
-    program.motion = ReducedMotion(space.problem.body, space.problem.friction, symmetry, space.mesh, space, ["length"])
+    kind = SlowOnLevel(space.problem.body, space.problem.friction, symmetry)
+    program.motion = ReducedMotion(kind, space.mesh, space, ["length"])
     slopes, rows = program.motion.gradients(v, DELTA), space.row_slopes(v)
     for k in np.random.default_rng(2).choice(space.n, 8, replace=False):
         step = np.zeros(space.n)

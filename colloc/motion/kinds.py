@@ -1,0 +1,243 @@
+r"""Kinds of motion: which states a period has besides the shape, their rates at an instant, and what a period comes to.
+
+| kind | states that are solved for | summed up |
+|---|---|---|
+| slow, on the level | none: the balance holds instant by instant | orientation, place, work |
+| slow, on a slope | the orientation theta, on which the weight's pull depends | place, work |
+
+A kind answers for a balance with its derivatives, for the motion along a mesh, and for the numbers of a period. Whoever
+collocates a motion asks it, and not whether there is a slope.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.gaits.sloped import Slope, checked_chain
+from colloc.gaits.symmetry import fraction
+from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.law import Law
+from colloc.motion.collocated import CollocatedPose
+from colloc.motion.heading import heading, heading_shares
+from colloc.motion.on_slope import balance_on_slope
+from colloc.motion.states import CollocatedStates, Rates
+from colloc.numerics.mesh import Mesh
+
+TOLERANCE = 1e-12
+_ACCEPTED = 1e3
+"""Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
+OMEGA, OUTPUTS = 2, slice(2, 6)
+"""Among the rows of `colloc.mechanics.bodies.Body.slopes`: rotation rate; the same, velocity of the centre, power."""
+
+
+class Shapes(NamedTuple):
+    """Angles and rates ``(n_joint, n_point)`` at the points of a mesh, per time divided by `unit`, and delta in that unit."""
+
+    angles: np.ndarray
+    rates: np.ndarray
+    delta: float
+    unit: float = 1.0
+
+
+class Along(NamedTuple):
+    """A motion at the points of a mesh."""
+
+    begin: np.ndarray
+    """Of the states, ``(n_state,)``."""
+    states: np.ndarray
+    """``(n_state, n_point)``."""
+    solved: BalanceSolution
+    now: BalancedMotion
+    """Per time divided by the shapes' unit."""
+    held: np.ndarray
+    """Where the equations hold, ``(n_point,)``."""
+    slopes: tuple[np.ndarray, np.ndarray] | None = None
+    """What `Kind.slopes` gives, if it is known."""
+
+
+class Passed(NamedTuple):
+    """What the solved part of a period comes to: displacement from the initial orientation 0 or, where the orientation is a
+    state, in the plane; rotation, change of the sum of all joint angles [rad], work against friction."""
+
+    displacement: complex
+    rotation: float
+    bend: float
+    work: float
+
+
+class Share(NamedTuple):
+    """What makes a number of a period grow: a way along a direction, the size of which counts; rotation, bend, work."""
+
+    side: complex = 0.0
+    rotation: float = 0.0
+    bend: float = 0.0
+    work: float = 0.0
+
+
+class Kind(Protocol):
+    """A kind of motion of a body."""
+
+    body: Body
+    friction: Law
+    states: tuple[str, ...]
+    """States of a period; a gait's last parameters are where they begin."""
+    periods: float
+    """A whole period over the part that is solved."""
+
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
+        tolerance: float = TOLERANCE,
+    ) -> Along:
+        """The motion along a mesh from the begin of its states; `near`: states and tail velocities to start from."""
+
+    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles, rates), ``(6, 2 n_joint,
+        n_point)``, and to the states, ``(6, n_state, n_point)``."""
+
+    def through_pose(
+        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of m numbers with respect to (rotation rate, velocity of the centre, power) at the stages, ``(m, 4, n,
+        s)``, and to the begin of the states, ``(m, n_state)``, from those at a given orientation, those with respect to the
+        orientation, ``(m, n, s)``, and those of the outputs with respect to the states."""
+
+    def counted(self, passed: Passed) -> dict[str, float]:
+        """What a whole period comes to."""
+
+    def shares(self, passed: Passed) -> dict[str, Share]:
+        """Derivatives of `counted`."""
+
+
+class SlowOnLevel:
+    """No state: the balance holds instant by instant, wherever the body points. Distance is along the direction of travel."""
+
+    states: tuple[str, ...] = ()
+
+    def __init__(self, body: Body, friction: Law, symmetry: str) -> None:
+        self.body, self.friction, self._symmetry = body, friction, symmetry
+        self.periods = 1.0 / fraction(symmetry)
+
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
+        tolerance: float = TOLERANCE,
+    ) -> Along:
+        at = self.friction, shapes.angles, shapes.rates, shapes.delta
+        solved = self.body.solve(*at, start=near[1], tolerance=tolerance)
+        held = solved.residual < _ACCEPTED * tolerance
+        return Along(begin, np.empty((0, held.size)), solved, self.body.motion(*at, solved), held)
+
+    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+        found = self.body.slopes(self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved)
+        return found, found[:, :0]
+
+    def through_pose(
+        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        turned = on_out.copy()
+        turned[:, 0] += pose.on_rates(on_theta)
+        return turned, np.empty((len(on_out), 0))
+
+    def _axis(self, passed: Passed) -> complex:
+        return complex(np.exp(1j * heading(self._symmetry, passed.displacement, passed.rotation, passed.bend)))
+
+    def counted(self, passed: Passed) -> dict[str, float]:
+        ahead = float((passed.displacement * np.conj(self._axis(passed))).real)
+        return {"distance": self.periods * ahead, "work": self.periods * passed.work, "rotation": passed.rotation}
+
+    def shares(self, passed: Passed) -> dict[str, Share]:
+        axis, periods = self._axis(passed), self.periods
+        # a heading that turns with the gait
+        aside = periods * (passed.displacement * np.conj(axis)).imag
+        on_rotation, on_bend = heading_shares(self._symmetry) or (0.0, 0.0)
+        distance = Share(periods * axis, on_rotation * aside, on_bend * aside)
+        return {"distance": distance, "work": Share(work=periods), "rotation": Share(rotation=1.0)}
+
+
+class SlowOnSlope:
+    """One state, the orientation, from straight uphill. Distance is along the direction that counts; joints lift the body."""
+
+    states: tuple[str, ...] = ("theta",)
+    periods: float = 1.0
+
+    def __init__(self, body: Body, friction: Law, slope: Slope) -> None:
+        self.body, self.friction, self._slope = body, friction, slope
+        self._chain = checked_chain(body, friction, slope.grade)
+
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
+        tolerance: float = TOLERANCE,
+    ) -> Along:
+        states, z = near
+        z = np.zeros((3, mesh.n_point)) if z is None else z
+        at = shapes.angles, shapes.rates, shapes.delta
+        now: Any = None
+
+        def rates(states: np.ndarray) -> Rates:
+            nonlocal now, z
+            now = balance_on_slope(self._chain, self.friction, self._slope, at, states[0], start=z, tolerance=tolerance)
+            z = now.solved.z
+            balanced = bool((now.solved.residual < _ACCEPTED * tolerance).all())
+            return Rates(z[None, OMEGA], now.on_theta[None, None, OMEGA], balanced)
+
+        states, _, held = CollocatedStates(mesh, unit=shapes.unit).solved(rates, begin, states)
+        slopes = now.on_shape, now.on_theta[:, None]
+        return Along(begin, states, now.solved, now.now, np.full(mesh.n_point, held), slopes)
+
+    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+        assert along.slopes is not None
+        return along.slopes
+
+    def through_pose(
+        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        at_points = on_out.reshape(*on_out.shape[:2], -1)
+        of_theta = on_theta.reshape(len(on_theta), 1, -1) + np.einsum("mrt,rkt->mkt", at_points, on_states[OUTPUTS])
+        on_begin, on_rates = CollocatedStates(mesh).pulled_back(on_states[None, OMEGA], of_theta)
+        turned = on_out.copy()
+        turned[:, 0] += on_rates.reshape(on_theta.shape)
+        return turned, on_begin
+
+    def counted(self, passed: Passed) -> dict[str, float]:
+        """Not a number where the joints brake."""
+        way = passed.displacement * np.exp(-1j * self._slope.ahead)
+        work = passed.work + self._slope.grade * passed.displacement.real
+        found = {"distance": way.real, "work": work, "rotation": passed.rotation, "across": way.imag}
+        return {name: float(value) if work > 0 else np.nan for name, value in found.items()}
+
+    def shares(self, passed: Passed) -> dict[str, Share]:
+        ahead = np.exp(1j * self._slope.ahead)
+        across, turned = Share(1j * ahead), Share(rotation=1.0)
+        return {"distance": Share(ahead), "work": Share(self._slope.grade, work=1.0), "rotation": turned, "across": across}
+
+
+def kind_of_motion(problem: Problem, friction: Law | None = None) -> Kind:
+    """How the body of a problem moves, or would under another law of friction."""
+    body, law, slope = problem.body, problem.friction if friction is None else friction, problem.slope
+    return SlowOnLevel(body, law, problem.gait.motion_symmetry) if slope is None else SlowOnSlope(body, law, slope)
+
+
+def begin_of(kind: Kind, gait: AnyGait) -> np.ndarray:
+    """Where a gait says that the states begin, ``(n_state,)``."""
+    return np.array([getattr(gait, name) for name in kind.states])
+
+
+def first_theta(kind: Kind, begin: np.ndarray) -> float:
+    """The orientation at the begin: 0 where it is no state."""
+    return float(begin[kind.states.index("theta")]) if "theta" in kind.states else 0.0
