@@ -149,3 +149,19 @@ def test_the_page_names_what_exists_and_fits_a_screen():
     for name in re.findall(r"`([\w/]+(?:\.py|/))`", PAGE):
         assert (ROOT / name).exists(), name
     assert len(PAGE.splitlines()) <= 75
+
+
+COLLOCATED = re.compile(r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b")
+ADAPTIVE = ("replay", "panels", "adaptive_motion", "followed_motion", "gait_on_slope", "slope", "slope_replay", "heading_map")
+
+
+def test_what_checks_a_motion_shares_no_mesh_and_no_program_with_what_found_it():
+    known, wanted = modules(), {f"verification.{name}" for name in ADAPTIVE}
+    assert wanted <= known.keys()
+    seen = set()
+    while wanted:
+        name = wanted.pop()
+        seen.add(name)
+        others = set(imported(known[name]))
+        assert not any(map(COLLOCATED.match, others)), f"{name} imports {sorted(filter(COLLOCATED.match, others))}"
+        wanted |= {other.removeprefix("colloc.") for other in others} & known.keys() - seen

@@ -49,8 +49,8 @@ def slope_course(problem: Problem, gait: Any, delta: float, error: float) -> Slo
     assert problem.slope is not None
     body, friction, grade = problem.body, problem.friction, problem.slope.grade
     on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
-    *_, (unknowns,) = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
-    return SlopeCourse(lambda t: unknowns(t)[:5], error)
+    course = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
+    return SlopeCourse(lambda t: course.at(t)[:5], error)
 
 
 def slope_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact: SlopeCourse) -> SlopeDefects:

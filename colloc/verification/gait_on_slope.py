@@ -18,28 +18,24 @@ which is measured on both sides: the left one from the moments in the joints.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import OdeSolution, solve_ivp
 
 from colloc.gaits.sloped import Slope
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.motion.follow import Course, followed
 from colloc.motion.on_slope import balance_on_slope
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import fine_motion
 from colloc.verification.replay import Path
 
-_STEP = 1 / 100
-"""Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and then skip one unnoticed
-(Runge and Kutta's left 1e-5 at 1e-7 a step, or 1e-4 of order 8); Adams' takes short ones, and errs by 8 to 40 times a step."""
 _UNKNOWNS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
 """Units of the errors of theta, place, works, and of the logarithm of the steering, which is needed less exactly."""
 _OMEGA = 2
-_PANELS, _ONE_SIDED = 40, 1e-12
+_PANELS = 40
 _OF_WAY = {"distance": 1.0, "work": 0.0, "rotation": 0.0, "driven_work": 0.0}
 """Shares in the error of the motion on the level: its way alone is asked for."""
 
@@ -118,30 +114,9 @@ class GaitOnSlope(NamedTuple):
         way = fine_motion(self.body, self.friction, self.path, self.delta, edges, tolerance, lambda period: _OF_WAY).path[-1]
         return float(np.angle(way)) if abs(way) > tolerance else 0.0
 
-    def followed(
-        self, state: np.ndarray, tolerance: float, longest: float = np.inf
-    ) -> tuple[np.ndarray, np.ndarray, list[OdeSolution]]:
-        """Phases ``(n,)`` and unknowns ``(6, n)`` at the solver's steps through a period, none longer than `longest`; and the
-        unknowns as functions of the phase, between breaks."""
-        near: np.ndarray | None = None
-
-        def slope(t: float, state: np.ndarray) -> np.ndarray:
-            nonlocal near
-            one_sided = min(max(t, first + _ONE_SIDED), last - _ONE_SIDED)  # rates may jump at the ends
-            found, near = self._rates(one_sided, state[0], near)
-            return found
-
-        phases, states, between = [], [], []
-        for first, last in pairwise([0.0, *self.breaks, 1.0]):
-            accuracy = {"rtol": 1e-13, "atol": _STEP * tolerance * _UNKNOWNS, "max_step": longest}
-            run = solve_ivp(slope, (first, last), state, method="LSODA", dense_output=True, **accuracy)
-            if not run.success:
-                raise NotConvergedError(f"the motion on the slope could not be followed beyond phase {run.t[-1]:.4f}.")
-            state = run.y[:, -1]
-            phases.append(run.t)
-            states.append(run.y)
-            between.append(run.sol)
-        return np.concatenate(phases), np.concatenate(states, axis=1), between
+    def followed(self, begin: np.ndarray, tolerance: float, longest: float = np.inf) -> Course:
+        """The unknowns ``(6,)`` through a period; no step is longer than `longest`."""
+        return followed(self._rates, begin, tolerance * _UNKNOWNS, self.breaks, longest)
 
     def pull(self, theta: np.ndarray) -> np.ndarray:
         """Of the weight, in the body's axes, ``(2, n)``."""
@@ -171,9 +146,9 @@ class GaitOnSlope(NamedTuple):
         works = friction_work, joint_work
         return SlopeMotion(self.grade, course, theta + course, climb, aside, *works, np.exp(steering), np.nan, np.nan, *unknown)
 
-    def _rates(self, t: float, theta: float, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    def _rates(self, t: float, state: np.ndarray, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the unknowns, and the tail velocity ``(3, 1)``, from which the next balance may start."""
-        shapes = (*self.path(np.array([t])), self.delta)
+        shapes, theta = (*self.path(np.array([t])), self.delta), state[0]
         solved, now, _, on_theta = balance_on_slope(
             self.body, self.friction, Slope(self.grade), shapes, np.array([theta]), start=near
         )

@@ -1,0 +1,43 @@
+"""States followed through a period: a closed form, a jump in the rates, and what the tolerance promises."""
+
+import numpy as np
+import pytest
+
+from colloc.motion.follow import followed
+
+TURN = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+BEGIN = np.array([1.0, 0.0, 2.0])
+
+
+def exact(t):
+    return np.array([np.cos(2 * t), -np.sin(2 * t), 2 * np.exp(-t)])
+
+
+def turning(t, state, asked):
+    return TURN @ state, (asked or 0) + 1
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
+def test_three_states_are_those_of_the_closed_form_within_the_tolerance(tolerance):
+    ran = followed(turning, BEGIN, tolerance)
+    assert np.abs(ran.states - exact(ran.phases)).max() < tolerance
+    t = np.linspace(0, 1, 33)
+    assert np.abs(ran.at(t) - exact(t)).max() < tolerance
+
+
+def test_a_jump_of_the_rates_is_met_from_both_sides():
+    """s' = -1, then 3: asked for at 0.3 itself the later rate never counts for the earlier piece."""
+    seen = []
+
+    def rates(t, state, _):
+        seen.append(t)
+        return np.array([-1.0 if t < 0.3 else 3.0]), None
+
+    ran = followed(rates, np.zeros(1), 1e-6, breaks=(0.3,))
+    assert 0.3 not in seen
+    np.testing.assert_allclose(ran.at(np.array([0.15, 0.3, 0.65])), [[-0.15, -0.3, 0.75]], atol=1e-9)
+    assert ran.states[0, -1] == pytest.approx(1.8, abs=1e-9)
+
+
+def test_steps_are_no_longer_than_asked():
+    assert np.diff(followed(turning, BEGIN, 1e-3, longest=0.01).phases).max() <= 0.01 + 1e-15
