@@ -19,7 +19,9 @@ import numpy as np
 
 from colloc.numerics.mesh import Mesh
 
-_CLOSED, _STEPS = 1e-12, 30
+_CLOSED, _STEPS = 1e-12, 60
+_SHARES = 0.5 ** np.arange(7)
+"""Of Newton's step, tried until the equations are off by less."""
 
 
 class Rates(NamedTuple):
@@ -87,16 +89,28 @@ class CollocatedStates:
         """
         start = np.array(start, dtype=float)
         states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
+        now, left_over, open_by, off = self._residual(rates, states, start)
         for _ in range(_STEPS):
-            now = rates(states)
-            gained, whole = self.integrals(now.value)
-            left_over, open_by = states - start[:, None] - gained, whole + self._moved(start)
-            held = now.known and max(np.abs(left_over).max(), np.abs(open_by[self._free]).max(initial=0.0)) < _CLOSED
-            if held or not now.known:
+            if off < _CLOSED or not now.known:
                 break
             step, step_start = self._newton(now.on_states, left_over, open_by)
-            states, start = states - step, start - step_start
-        return states, start, bool(held)
+            for share in _SHARES:
+                after, begin = states - share * step, start - share * step_start
+                now, left_over, open_by, off_then = self._residual(rates, after, begin)
+                if off_then < off:
+                    break
+            states, start, off = after, begin, off_then
+        return states, start, bool(now.known and off < _CLOSED)
+
+    def _residual(
+        self, rates: Callable[[np.ndarray], Rates], states: np.ndarray, start: np.ndarray
+    ) -> tuple[Rates, np.ndarray, np.ndarray, float]:
+        """Rates; what the equations are off by at the points and, of the free states, at the end; and the largest of these."""
+        now = rates(states)
+        gained, whole = self.integrals(now.value)
+        left_over, open_by = states - start[:, None] - gained, whole + self._moved(start)
+        off = max(np.abs(left_over).max(), np.abs(open_by[self._free]).max(initial=0.0))
+        return now, left_over, open_by, float(off) if now.known else np.inf
 
     def _moved(self, start: np.ndarray) -> np.ndarray:
         """``s_0 - M s_0``."""
@@ -110,7 +124,7 @@ class CollocatedStates:
         if self._free.size:
             free = self._free
             through = np.stack([within.handed_on(unit) for unit in np.eye(len(start))], axis=1)
-            start[free] = np.linalg.solve(self._open(through), open_by[free] + gained[free])
+            start[free] = np.linalg.solve(self._open(through), open_by[free] - gained[free])
             step, _ = within.solved(left_over, start)
         return step, start
 

@@ -1,0 +1,190 @@
+"""A gait played with inertia on a mesh: the momenta that repeat every period, and how slow is slow enough.
+
+The momenta (`colloc.mechanics.inertia`) are the states of the period (`colloc.motion.states`), solved for at all instants
+together. Newton's method starts from those of the slow motion.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colloc.mechanics.balance import balance_jacobian
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.inertia import checked_inertia, moment_of_inertia, momenta, momentum_rates
+from colloc.mechanics.law import Law
+from colloc.motion.collocated import CollocatedPose, point_weights
+from colloc.motion.states import CollocatedStates, Rates
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
+from colloc.system.arguments import check_finite
+from colloc.system.errors import NotConvergedError, ProblemError
+
+SCHEME = "gauss-3"
+_INTERVALS, _DOUBLED = 50, 6
+"""Of the first mesh, and how many there are, each of twice as many."""
+_ACCURACY = 0.02
+"""Relative, of a loss, and of what a finer mesh may change in the Froude number for it."""
+_POWER = 1.5
+"""Of the Froude number, to which the change of the efficiency is in proportion; between 1 and 2 where it is small."""
+_FIRST, _FASTEST, _FARTHEST = 0.3, 10.0, np.log(5.0)
+"""The first Froude number tried, over loss times friction; the largest, over friction, beyond which nobody is slow; and the
+farthest step between the logarithms of two."""
+
+
+class Played(NamedTuple):
+    """A period of a gait played with inertia."""
+
+    distance: float
+    work: float
+    rotation: float
+    states: np.ndarray
+    """Momenta at the points of the mesh, ``(3, n_point)``."""
+
+    @property
+    def efficiency(self) -> float:
+        """Distance over work."""
+        return self.distance / self.work
+
+
+class GaitOnMesh:
+    """A gait of a chain at the points of a mesh, to be played at any pace.
+
+    Parameters
+    ----------
+    body, friction, gait
+    mesh
+        Of a scheme whose neighbouring intervals share no stage, such as `SCHEME`.
+    """
+
+    def __init__(self, body: Chain, friction: Law, gait, mesh: Mesh) -> None:  # type: ignore[no-untyped-def]
+        self._body, self._friction, self._mesh = body, friction, mesh
+        self._angles, self._rates = gait(mesh.times)
+        posture = self._posture = body.posture(self._angles)
+        (x,), (y,) = body.centre_of_mass(posture)
+        one, zero, inertia = np.ones_like(x), np.zeros_like(x), moment_of_inertia(body, posture)
+        # (u, v, omega) from the momenta, and (force, moment about the centre) from (force, torque about the tail)
+        self._to_tail = np.array([[one, zero, y / inertia], [zero, one, -x / inertia], [zero, zero, 1 / inertia]])
+        self._to_centre = np.array([[one, zero, zero], [zero, one, zero], [y, -x, one]])
+
+    def slow(self, delta: float) -> Played:
+        """The gait played slowly: the balance, instant by instant."""
+        z = solve_balance(self._body, self._friction, self._angles, self._rates, delta).require().z
+        link = self._body.velocity(self._posture, self._rates, z)
+        power = self._body.sliding(self._friction, self._angles, self._rates, z, delta).power[0]
+        return self._summed(momenta(self._body, self._posture, link), z[2], power)
+
+    def played(self, delta: float, froude: float, near: Played) -> Played:
+        """The motion in which all periods are alike, by Newton's method from another: a slow one, or one at a pace like it.
+
+        Raises
+        ------
+        NotConvergedError
+            If none is found.
+        """
+        equations = CollocatedStates(self._mesh, free=np.ones(3, dtype=bool))
+        begin = near.states[:, 0]
+        states, _, held = equations.solved(lambda now: self._momentum_rates(now, delta, froude), begin, near.states)
+        if not held:
+            raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
+        now = momentum_rates(self._body, self._friction, self._angles, self._rates, states, delta=delta, froude=froude)
+        return self._summed(states, now.z[2], now.power)
+
+    def _momentum_rates(self, states: np.ndarray, delta: float, froude: float) -> Rates:
+        body, at = self._body, (self._friction, self._angles, self._rates, states)
+        now = momentum_rates(body, *at, delta=delta, froude=froude)
+        velocity = body.velocity(self._posture, self._rates, now.z)
+        on_force = -balance_jacobian(body, self._friction, self._posture, velocity, delta)
+        on_states = np.einsum("abn,nbc,cdn->adn", self._to_centre, on_force, self._to_tail) / froude
+        (vx, vy, _), (*_, omega) = states, now.z
+        turned = self._to_tail[2, 2]
+        on_states[0] += np.stack([np.zeros_like(vx), omega, vy * turned])
+        on_states[1] -= np.stack([omega, np.zeros_like(vx), vx * turned])
+        return Rates(now.rates, on_states)
+
+    def _summed(self, states: np.ndarray, omega: np.ndarray, power: np.ndarray) -> Played:
+        pose = CollocatedPose.on_mesh(self._mesh, omega, states[:2])
+        return Played(float(abs(pose.place[-1])), float(point_weights(self._mesh) @ power), float(pose.theta[-1]), states)
+
+
+def slow_enough(
+    body: Body,
+    friction: Law,
+    gait,  # type: ignore[no-untyped-def]
+    delta: float,
+    loss: float = 0.01,
+    *,
+    breaks: np.ndarray | tuple[float, ...] = (),
+) -> float:
+    """The Froude number L/(g T^2) up to which inertia changes the efficiency of a gait by no more than the part `loss`.
+
+    A body of length L [m] that takes T [s] a period has the Froude number L / (9.81 T^2); so T must be sqrt(L / (9.81 Fr)) or
+    more. Played faster a gait may be better or worse: either is a change.
+
+    Parameters
+    ----------
+    body : Chain
+        Its links are as heavy as they press on the floor, evenly along their lengths.
+    friction : Law
+    gait : callable
+        Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones.
+    delta : float
+        Regularisation speed, per period.
+    loss : float
+        In (0, 0.5]; the answer is right to 2 % of it.
+    breaks : (n,), optional
+        Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
+
+    Raises
+    ------
+    ProblemError
+        If the body is no chain, or numbers are out of range.
+    NotConvergedError
+        If the motion is not found, or the gait can be played as fast as one likes.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    >>> round(colloc.slow_enough(colloc.Chain(), colloc.Friction(), gait, delta=1e-4), 4)
+    0.0031
+    """
+    check_finite(positive=True, loss=loss, delta=delta)
+    if loss > 0.5:
+        raise ProblemError(f"loss must be at most 0.5, not {loss!r}.")
+    chain, known = checked_inertia(body, gait), np.nan
+    for intervals in _INTERVALS * 2 ** np.arange(_DOUBLED):
+        edges = np.union1d(np.linspace(0.0, 1.0, intervals + 1), np.asarray(breaks, dtype=float))
+        before, known = known, _froude(GaitOnMesh(chain, friction, gait, Mesh(scheme(SCHEME), edges)), friction, delta, loss)
+        if abs(known - before) < _ACCURACY * known:
+            return known
+    raise NotConvergedError("finer and finer meshes do not agree on how slow is slow enough; try a larger delta.")
+
+
+def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float:
+    """At which inertia first changes the efficiency of a gait on a mesh by the part `loss`."""
+    last = slow = gait.slow(delta)
+    # the change is a power of the Froude number where both are small
+    low, high, at = -np.inf, np.log(_FASTEST * friction.largest), np.log(_FIRST * loss * friction.largest)
+    fastest, power = high, _POWER
+    tried: list[tuple[float, float]] = []
+    while high - low > _ACCURACY / _POWER:
+        last = gait.played(delta, float(np.exp(at)), last)
+        more = float(np.log(max(abs(1.0 - last.efficiency / slow.efficiency), 1e-12) / loss))
+        if abs(more) < _ACCURACY:
+            return float(np.exp(at))
+        low, high = (at, high) if more < 0.0 else (low, at)
+        tried.append((at, more))
+        if len(tried) > 1:
+            (a, x), (b, y) = tried[-2:]
+            power = (y - x) / (b - a) if (y - x) * (b - a) > 0.0 else _POWER
+        nearer = at - np.clip(more / power, -_FARTHEST, _FARTHEST)
+        at = nearer if low < nearer < high else 0.5 * (max(low, at - _FARTHEST) + high)
+    if high < fastest:
+        return float(np.exp(low))
+    raise NotConvergedError(
+        f"inertia changes the efficiency by less than {loss:g} up to a Froude number of {np.exp(fastest):g}."
+    )

@@ -1,0 +1,244 @@
+"""A gait played with inertia, period by period alike: by Adams' and Gear's methods, steps of their own, and shooting.
+
+How fast a gait is played matters once the body's mass does. The Froude number Fr = L/(g T^2), length over gravity and the
+period squared, says how much: it is the mass times acceleration of a body that covers its length in a period, over its weight.
+It counts against the coefficient of friction. At Fr = 0 this is `colloc.verification.replay.replay`.
+
+Nothing is shared with collocation but the forces. The momenta after a period are those before it; they are found by Newton's
+method on the map from one to the other, whose derivatives also say whether the motion is stable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from colloc.gaits.objective import EFFICIENCY
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.inertia import MomentumRates, checked_inertia, momenta, momentum_rates
+from colloc.mechanics.law import Law
+from colloc.system.arguments import check_finite
+from colloc.system.errors import NotConvergedError
+from colloc.verification.replay import Path
+
+_STEP = 1 / 100
+"""Error of a step, over that of a run: Adams' method errs by 8 to 40 times a step where friction sticks and slips."""
+_ROUGH = 1e-4
+"""Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta."""
+_APART = 1e-3
+"""How far the runs of that start from each other."""
+_FIRST, _TENTH, _LEAST = 1.0, 0.1, 1e-12
+"""Error of the first run over the relative one that is asked for, of each next over the last, and the smallest tried."""
+_CLOSED = 10.0
+"""Gap between the momenta at start and end that is left open, over the error of a run."""
+_MOST_PERIODS = 30
+_ONE_SIDED = 1e-12
+_MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
+
+
+@dataclass(frozen=True, eq=False)
+class InertialMotion:
+    """A gait played with inertia, over one period of the motion in which all periods are alike.
+
+    Attributes
+    ----------
+    froude : float
+        Froude number L/(g T^2).
+    distance, work, rotation : float
+        Displacement of the centre of mass [body lengths], work against friction [weight x length], and net rotation [rad] of a
+        period.
+    distance_error, work_error, rotation_error : float
+        How much they change where every step may err ten times as much.
+    multipliers : (3,)
+        By what small changes of the momenta are multiplied in a period (Floquet multipliers); stable if all are within 1.
+    phases, states : (n,), (7, n)
+        Where the solver stepped, and Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's orientation, the place of the
+        centre of mass, and the work up to there.
+    """
+
+    froude: float
+    distance: float
+    work: float
+    rotation: float
+    distance_error: float
+    work_error: float
+    rotation_error: float
+    multipliers: np.ndarray = field(repr=False)
+    phases: np.ndarray = field(repr=False)
+    states: np.ndarray = field(repr=False)
+
+    @property
+    def efficiency(self) -> float:
+        """Distance over work."""
+        return self.distance / self.work
+
+    @property
+    def error(self) -> float:
+        """Relative error of the efficiency."""
+        return float(EFFICIENCY.relative_error(vars(self), {"distance": self.distance_error, "work": self.work_error}))
+
+    @property
+    def stable(self) -> bool:
+        """Whether motions beside this one come closer to it, period by period."""
+        return bool(np.abs(self.multipliers).max() < 1.0)
+
+
+class GaitWithInertia(NamedTuple):
+    """A gait of a chain, and how fast it is played."""
+
+    body: Chain
+    friction: Law
+    path: Path
+    delta: float
+    froude: float
+    breaks: tuple[float, ...]
+
+    def slow_momenta(self) -> np.ndarray:
+        """Those at the start of the period if the gait is played slowly, ``(3,)``: where to begin."""
+        angles, rates = self.path(np.full(1, _ONE_SIDED))
+        z = solve_balance(self.body, self.friction, angles, rates, self.delta).require().z
+        posture = self.body.posture(angles)
+        return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
+
+    def run(self, start: np.ndarray, aim: float) -> tuple[np.ndarray, np.ndarray]:
+        """Phases ``(n,)`` and `InertialMotion.states` ``(7, n)`` from the momenta `start` through a period."""
+
+        def slope(t: float, state: np.ndarray) -> np.ndarray:
+            now = self._rates(t, state[_MOMENTA, None])
+            moved = np.exp(1j * state[_THETA]) * complex(state[0], state[1])
+            return np.array([*now.rates[:, 0], now.z[2, 0], moved.real, moved.imag, now.power[0]])
+
+        return self._solved(slope, np.concatenate([start, np.zeros(4)]), aim)
+
+    def mapped(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Momenta after a period ``(3,)`` and their derivatives ``(3, 3)`` with respect to those before it, by differences."""
+        begin = start[:, None] + _APART * np.concatenate([np.zeros((3, 1)), np.eye(3)], axis=1)
+
+        def slope(t: float, state: np.ndarray) -> np.ndarray:
+            return self._rates(t, state.reshape(4, 3).T).rates.T.ravel()
+
+        # runs do not know of one another: derivatives lie in blocks about the diagonal
+        end = self._solved(slope, begin.T.ravel(), _ROUGH, lband=2, uband=2)[1][:, -1].reshape(4, 3).T
+        return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
+
+    def closed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Momenta ``(3,)`` that a period leaves as they are, but for the error of rough runs, and the derivatives there."""
+        start = self.slow_momenta()
+        for _ in range(_MOST_PERIODS):
+            end, slopes = self.mapped(start)
+            step = self._step(end - start, slopes)
+            start = start + step
+            if np.abs(step).max() < _CLOSED * _ROUGH:
+                return start, slopes
+        raise NotConvergedError(
+            f"at a Froude number of {self.froude:g} no motion was found in which all periods are alike; try a smaller one."
+        )
+
+    @staticmethod
+    def _step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Newton's step to where a period changes nothing."""
+        return np.linalg.solve(np.eye(3) - slopes, gap)
+
+    def _rates(self, t: float, states: np.ndarray) -> MomentumRates:
+        angles, rates = (np.repeat(part, states.shape[1], axis=1) for part in self.path(np.array([t])))
+        return momentum_rates(self.body, self.friction, angles, rates, states, delta=self.delta, froude=self.froude)
+
+    def _solved(
+        self, slope: Callable[[float, np.ndarray], np.ndarray], state: np.ndarray, aim: float, **options: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        phases, states = [], []
+        for first, last in pairwise([0.0, *self.breaks, 1.0]):
+
+            def inside(t: float, state: np.ndarray, first: float = first, last: float = last) -> np.ndarray:
+                return slope(min(max(t, first + _ONE_SIDED), last - _ONE_SIDED), state)  # rates may jump at the ends
+
+            run = solve_ivp(inside, (first, last), state, method="LSODA", rtol=_STEP * aim, atol=_STEP * aim, **options)
+            if not run.success:
+                raise NotConvergedError(f"the motion with inertia could not be followed beyond phase {run.t[-1]:.4f}.")
+            state = run.y[:, -1]
+            phases.append(run.t)
+            states.append(run.y)
+        return np.concatenate(phases), np.concatenate(states, axis=1)
+
+
+def inertial_motion(
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    froude: float,
+    *,
+    tolerance: float = 1e-5,
+    breaks: np.ndarray | tuple[float, ...] = (),
+) -> InertialMotion:
+    """Play a gait with inertia, once the body has settled to a motion in which all periods are alike.
+
+    Parameters
+    ----------
+    body : Chain
+        Its links are as heavy as they press on the floor, evenly along their lengths.
+    friction : Law
+    gait : callable
+        Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones. Their pace within the period counts.
+    delta : float
+        Regularisation speed, per period.
+    froude : float
+        Froude number L/(g T^2), above 0: 0.0255 for a body of 1 m in 2 s. What counts is its ratio to the friction coefficient.
+    tolerance : float
+        Relative error of the efficiency.
+    breaks : (n,), optional
+        Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
+
+    Raises
+    ------
+    ProblemError
+        If the body is no chain, or numbers are out of range.
+    NotConvergedError
+        If no such motion is found, or rounding hides the accuracy that is asked for.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    >>> played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-3, froude=0.1)
+    >>> round(played.efficiency, 3), played.stable
+    (0.136, True)
+    """
+    played = gait_with_inertia(body, friction, gait, delta, froude, breaks=breaks)
+    start, slopes = played.closed()
+    aim, before = _FIRST * tolerance, None
+    while aim >= _LEAST:
+        for _ in range(_MOST_PERIODS):
+            phases, states = played.run(start, aim)
+            gap = states[_MOMENTA, -1] - start
+            if np.abs(gap).max() < _CLOSED * aim:
+                break
+            start = start + GaitWithInertia._step(gap, slopes)
+        else:
+            raise NotConvergedError(f"at a Froude number of {froude:g} the periods do not become alike; try a smaller one.")
+        rotation, work = float(states[_THETA, -1]), float(states[_WORK, -1])
+        now = {"distance": float(np.hypot(*states[_PLACE, -1])), "work": work, "rotation": rotation}
+        if before is not None:
+            errors = {f"{name}_error": abs(now[name] - before[name]) for name in now}
+            found = InertialMotion(froude, **now, **errors, multipliers=np.linalg.eigvals(slopes), phases=phases, states=states)
+            if found.error <= tolerance:
+                return found
+        aim, before = _TENTH * aim, now
+    raise NotConvergedError(f"the motion with inertia cannot be replayed to a relative error of {tolerance:.0e}.")
+
+
+def gait_with_inertia(
+    body: Body, friction: Law, gait: Path, delta: float, froude: float, *, breaks: np.ndarray | tuple[float, ...] = ()
+) -> GaitWithInertia:
+    """A gait of a body that has a mass, or a `ProblemError` that says why there is none."""
+    check_finite(positive=True, froude=froude, delta=delta)
+    return GaitWithInertia(
+        checked_inertia(body, gait), friction, gait, delta, float(froude), tuple(sorted(float(t) for t in breaks))
+    )

@@ -1,0 +1,165 @@
+"""Gaits played with inertia: against a program of dense points and Newton's law, limits, symmetries, conservation."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc.mechanics.inertia import moment_of_inertia, momenta, momentum_rates, tail_velocity
+from colloc.motion.with_inertia import SCHEME, GaitOnMesh
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
+
+GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
+CHAIN, UNEQUAL = colloc.Chain(), colloc.Chain((0.3, 0.45, 0.25))
+ISOTROPIC, ANISOTROPIC = colloc.Friction(), colloc.Friction(1.7, 1.0, 1.3)
+
+
+def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=40):
+    """Distance, work and rotation of the last period: mass points, differences in time, Runge and Kutta's method."""
+    mu_t, mu_f, mu_b = mu
+    lengths = np.array(lengths)
+    along = (np.arange(points) + 0.5) / points
+    mass = np.repeat(lengths / points, points)
+    # midpoints of cells miss the turning of the cells themselves
+    own_inertia = (lengths * (lengths / points) ** 2 / 12).sum()
+
+    def tangents(t):
+        return np.concatenate([[0.0], np.cumsum(gait(np.array([t % 1.0]))[0][:, 0])])
+
+    def shape(t):
+        """Places of all points from the tail, and directions there, in the axes of the tail link."""
+        turn = np.exp(1j * tangents(t))
+        ends = np.concatenate([[0.0], np.cumsum(lengths * turn)])
+        return (ends[:-1, None] + lengths[:, None] * along * turn[:, None]).ravel(), np.repeat(turn, points)
+
+    def known(t, h=1e-6):
+        place, turn = shape(t)
+        moving = (shape(t + h)[0] - shape(t - h)[0]) / (2 * h)
+        spins = (tangents(t + h) - tangents(t - h)) / (2 * h)
+        return place - mass @ place, moving - mass @ moving, turn, (lengths * (lengths / points) ** 2 / 12) @ spins
+
+    def law(t, state, shape_now):
+        """Unknowns: orientation, place and velocity of the centre of mass in the plane, angular momentum, work."""
+        place, moving, turn, own = shape_now
+        theta, velocity, h = state[0].real, state[2], state[3].real
+        inertia = mass @ np.abs(place) ** 2 + own_inertia
+        omega = (h - mass @ (np.conj(place) * moving).imag - own) / inertia
+        v = velocity * np.exp(-1j * theta) + moving + 1j * omega * place
+        tangential, normal = (np.conj(turn) * v).real, (np.conj(turn) * v).imag
+        size = np.sqrt(np.abs(v) ** 2 + delta**2)
+        force = -turn * (np.where(tangential > 0, mu_f, mu_b) * tangential + 1j * mu_t * normal) / size * mass
+        power = -(np.conj(force) * v).real.sum()
+        moment = (np.conj(place) * force).imag.sum()
+        pull = force.sum() * np.exp(1j * theta)
+        return np.array([omega, velocity, pull / froude, moment / froude, power], dtype=complex)
+
+    state, step = np.zeros(5, dtype=complex), 1.0 / steps
+    places = [known(0.5 * k * step) for k in range(2 * steps)]
+    for _ in range(periods):
+        before = state
+        for k in range(steps):
+            t, (first, middle, last) = k * step, (places[2 * k], places[2 * k + 1], places[(2 * k + 2) % (2 * steps)])
+            k1 = law(t, state, first)
+            k2 = law(t + step / 2, state + step / 2 * k1, middle)
+            k3 = law(t + step / 2, state + step / 2 * k2, middle)
+            k4 = law(t + step, state + step * k3, last)
+            state = state + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    change = state - before
+    return abs(change[1]), change[4].real, change[0].real
+
+
+@pytest.mark.parametrize(
+    ("lengths", "friction", "gait"),
+    [((0.3, 0.45, 0.25), ANISOTROPIC, LEANING), pytest.param((1 / 3, 1 / 3, 1 / 3), ISOTROPIC, GAIT, marks=pytest.mark.slow)],
+)
+def test_newtons_law_for_dense_points_says_the_same(lengths, friction, gait):
+    """A program that shares no line: error of 40 points a link, 1e-4."""
+    mu = friction.mu_t, friction.mu_f, friction.mu_b
+    distance, work, rotation = newtons_law(lengths, mu, gait, 0.05, 0.1)
+    played = colloc.inertial_motion(colloc.Chain(lengths), friction, gait, 0.05, 0.1)
+    assert played.distance == pytest.approx(distance, rel=1e-3)
+    assert played.work == pytest.approx(work, rel=1e-3)
+    assert played.rotation == pytest.approx(rotation, abs=1e-3)
+
+
+def test_momenta_and_tail_velocity_are_inverse_to_each_other():
+    rng = np.random.default_rng(2)
+    angles, rates, z = rng.normal(size=(2, 5)), rng.normal(size=(2, 5)), rng.normal(size=(3, 5))
+    posture = UNEQUAL.posture(angles)
+    states = momenta(UNEQUAL, posture, UNEQUAL.velocity(posture, rates, z))
+    np.testing.assert_allclose(tail_velocity(UNEQUAL, angles, rates, states), z, atol=1e-13)
+
+
+def test_a_straight_body_has_the_moment_of_inertia_of_a_rod():
+    assert moment_of_inertia(UNEQUAL, UNEQUAL.posture(np.zeros((2, 1))))[0] == pytest.approx(1 / 12, rel=1e-14)
+
+
+def test_without_friction_momentum_is_conserved():
+    """A free body that is not pushed keeps its velocity in the plane and its angular momentum, however its joints move."""
+    angles, rates = LEANING(np.array([0.3]))
+    states = np.array([[0.2], [-0.4], [0.05]])
+    now = momentum_rates(CHAIN, colloc.Friction(1e-12, 1e-12, 1e-12), angles, rates, states, delta=1e-3, froude=1.0)
+    omega = now.z[2, 0]
+    np.testing.assert_allclose(now.rates[:, 0], [omega * states[1, 0], -omega * states[0, 0], 0.0], atol=1e-11)
+
+
+@pytest.mark.parametrize("froude", [0.1, 0.5, pytest.param(0.003, marks=pytest.mark.slow)])
+def test_shooting_and_collocation_find_the_same_motion(froude):
+    """One by steps of its own through time, one for all instants at once."""
+    shot = colloc.inertial_motion(UNEQUAL, ANISOTROPIC, LEANING, 1e-2, froude)
+    mesh = Mesh(scheme(SCHEME), np.linspace(0, 1, 201))
+    on_mesh = GaitOnMesh(UNEQUAL, ANISOTROPIC, LEANING, mesh)
+    found = on_mesh.played(1e-2, froude, on_mesh.slow(1e-2))
+    assert shot.stable
+    assert found.distance == pytest.approx(shot.distance, rel=2e-4)
+    assert found.work == pytest.approx(shot.work, rel=2e-4)
+    assert found.rotation == pytest.approx(shot.rotation, abs=2e-4)
+
+
+def test_slow_motion_is_the_limit():
+    """The difference falls at least like the Froude number."""
+    slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2, tolerance=1e-7).efficiency
+    mesh = Mesh(scheme(SCHEME), np.linspace(0, 1, 401))
+    on_mesh = GaitOnMesh(CHAIN, ISOTROPIC, GAIT, mesh)
+    near = on_mesh.slow(1e-2)
+    assert near.efficiency == pytest.approx(slow, rel=1e-5)
+    off = [1 - on_mesh.played(1e-2, froude, near).efficiency / near.efficiency for froude in (1.6e-3, 4e-4, 1e-4)]
+    assert off[0] > 3.5 * off[1] > 3.5**2 * off[2] > 0
+
+
+@pytest.mark.slow
+def test_a_mirror_image_of_a_gait_turns_the_other_way():
+    mirrored = colloc.Fourier(mean=-LEANING.mean, cos=-LEANING.cos, sin=-LEANING.sin)
+    one, other = (colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.2) for gait in (LEANING, mirrored))
+    assert one.rotation == pytest.approx(-other.rotation, abs=1e-5)
+    assert one.distance == pytest.approx(other.distance, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_corners_are_passed_where_they_are():
+    """A gait of straight lines between corners, against steps that know nothing of these but are small."""
+    gait = colloc.Corners(np.array([[0.0, 1.5, 0.4], [0.0, 0.2, 1.4]]))
+    exact = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1, breaks=gait.corner_phases)
+    blind = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1)
+    assert exact.distance == pytest.approx(blind.distance, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [ISOTROPIC, *(pytest.param(each, marks=pytest.mark.slow) for each in (ANISOTROPIC, colloc.Friction(10.0, 1.0, 1.0)))],
+)
+def test_slow_enough_is_where_the_part_is_lost(friction):
+    froude = colloc.slow_enough(CHAIN, friction, GAIT, 1e-3, 0.01)
+    slow = colloc.replay(CHAIN, friction, GAIT, 1e-3).efficiency
+    played = colloc.inertial_motion(CHAIN, friction, GAIT, 1e-3, froude, tolerance=1e-4)
+    assert abs(1 - played.efficiency / slow) == pytest.approx(0.01, rel=0.06)
+
+
+def test_what_has_no_inertia_is_refused_in_words():
+    with pytest.raises(colloc.ProblemError, match="froude must be"):
+        colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.0)
+    with pytest.raises(colloc.ProblemError, match="of a ModalBody"):
+        colloc.slow_enough(colloc.ModalBody(), ISOTROPIC, GAIT, 1e-2)
+    with pytest.raises(colloc.ProblemError, match="at most"):
+        colloc.slow_enough(CHAIN, ISOTROPIC, GAIT, 1e-2, loss=0.9)
