@@ -34,7 +34,7 @@ ORDER = (
     (
         "How to",
         (
-            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "slopes", "check", "starts")),
+            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "pace", "slopes", "check", "starts")),
             "laws.md",
             "objectives.md",
             "studies.md",

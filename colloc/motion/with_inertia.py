@@ -14,7 +14,7 @@ from colloc.mechanics.balance import balance_jacobian
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import checked_inertia, moment_of_inertia, momenta, momentum_rates
+from colloc.mechanics.inertia import Path, checked_inertia, moment_of_inertia, momenta, momentum_rates
 from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose, point_weights
 from colloc.motion.states import CollocatedStates, Rates
@@ -60,7 +60,7 @@ class GaitOnMesh:
         Of a scheme whose neighbouring intervals share no stage, such as `SCHEME`.
     """
 
-    def __init__(self, body: Chain, friction: Law, gait, mesh: Mesh) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, body: Chain, friction: Law, gait: Path, mesh: Mesh) -> None:
         self._body, self._friction, self._mesh = body, friction, mesh
         self._angles, self._rates = gait(mesh.times)
         posture = self._posture = body.posture(self._angles)
@@ -113,7 +113,7 @@ class GaitOnMesh:
 def slow_enough(
     body: Body,
     friction: Law,
-    gait,  # type: ignore[no-untyped-def]
+    gait: Path,
     delta: float,
     loss: float = 0.01,
     *,

@@ -15,12 +15,14 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import Sliding
+from colloc.motion.with_inertia import slow_enough
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import SAMPLES, Column, RigidMotion, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
+from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.system.versions import versions
 
@@ -171,6 +173,17 @@ class Solution:
         side = "counter-clockwise" if self.rotation > 0 else "clockwise"
         turned = f"turns {math.degrees(abs(self.rotation)):.4g}° {side}"
         return f"{turned}, on a circle of radius {self.turning_radius:.4g} body lengths"
+
+    def slow_enough(self, loss: float = 0.01) -> float:
+        """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than the part `loss`.
+
+        A body of length L [m] that takes T [s] a period, on a floor whose friction is f times the stated one, is slow enough if
+        T is at least sqrt(L / (9.81 f Fr)). See `colloc.slow_enough`, which says what is raised.
+        """
+        if self.problem.slope is not None:
+            raise ProblemError("on a slope it is not known how slow is slow enough.")
+        at = self.problem.body, self.problem.friction, self.gait, self.answer.delta_per_period
+        return slow_enough(*at, loss, breaks=self.gait.corner_phases)
 
     @property
     def standing(self) -> list[str]:

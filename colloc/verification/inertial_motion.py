@@ -10,13 +10,10 @@ method on the map from one to the other, whose derivatives also say whether the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.bodies import Body
@@ -24,12 +21,11 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import MomentumRates, checked_inertia, momenta, momentum_rates
 from colloc.mechanics.law import Law
+from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError
 from colloc.verification.replay import Path
 
-_STEP = 1 / 100
-"""Error of a step, over that of a run: Adams' method errs by 8 to 40 times a step where friction sticks and slips."""
 _ROUGH = 1e-4
 """Error of the runs that say how the momenta at the end depend on those at the start, over the size of the momenta."""
 _APART = 1e-3
@@ -107,25 +103,24 @@ class GaitWithInertia(NamedTuple):
         posture = self.body.posture(angles)
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
-    def run(self, start: np.ndarray, aim: float) -> tuple[np.ndarray, np.ndarray]:
-        """Phases ``(n,)`` and `InertialMotion.states` ``(7, n)`` from the momenta `start` through a period."""
+    def run(self, start: np.ndarray, aim: float) -> Course:
+        """`InertialMotion.states` from the momenta `start` through a period."""
 
-        def slope(t: float, state: np.ndarray) -> np.ndarray:
+        def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             now = self._rates(t, state[_MOMENTA, None])
             moved = np.exp(1j * state[_THETA]) * complex(state[0], state[1])
-            return np.array([*now.rates[:, 0], now.z[2, 0], moved.real, moved.imag, now.power[0]])
+            return np.array([*now.rates[:, 0], now.z[2, 0], moved.real, moved.imag, now.power[0]]), None
 
-        return self._solved(slope, np.concatenate([start, np.zeros(4)]), aim)
+        return followed(slope, np.concatenate([start, np.zeros(4)]), aim, self.breaks)
 
     def mapped(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Momenta after a period ``(3,)`` and their derivatives ``(3, 3)`` with respect to those before it, by differences."""
         begin = start[:, None] + _APART * np.concatenate([np.zeros((3, 1)), np.eye(3)], axis=1)
 
-        def slope(t: float, state: np.ndarray) -> np.ndarray:
-            return self._rates(t, state.reshape(4, 3).T).rates.T.ravel()
+        def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
+            return self._rates(t, state.reshape(4, 3).T).rates.T.ravel(), None
 
-        # runs do not know of one another: derivatives lie in blocks about the diagonal
-        end = self._solved(slope, begin.T.ravel(), _ROUGH, lband=2, uband=2)[1][:, -1].reshape(4, 3).T
+        end = followed(slope, begin.T.ravel(), _ROUGH, self.breaks).states[:, -1].reshape(4, 3).T
         return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
 
     def closed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -149,23 +144,6 @@ class GaitWithInertia(NamedTuple):
     def _rates(self, t: float, states: np.ndarray) -> MomentumRates:
         angles, rates = (np.repeat(part, states.shape[1], axis=1) for part in self.path(np.array([t])))
         return momentum_rates(self.body, self.friction, angles, rates, states, delta=self.delta, froude=self.froude)
-
-    def _solved(
-        self, slope: Callable[[float, np.ndarray], np.ndarray], state: np.ndarray, aim: float, **options: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        phases, states = [], []
-        for first, last in pairwise([0.0, *self.breaks, 1.0]):
-
-            def inside(t: float, state: np.ndarray, first: float = first, last: float = last) -> np.ndarray:
-                return slope(min(max(t, first + _ONE_SIDED), last - _ONE_SIDED), state)  # rates may jump at the ends
-
-            run = solve_ivp(inside, (first, last), state, method="LSODA", rtol=_STEP * aim, atol=_STEP * aim, **options)
-            if not run.success:
-                raise NotConvergedError(f"the motion with inertia could not be followed beyond phase {run.t[-1]:.4f}.")
-            state = run.y[:, -1]
-            phases.append(run.t)
-            states.append(run.y)
-        return np.concatenate(phases), np.concatenate(states, axis=1)
 
 
 def inertial_motion(
@@ -216,7 +194,7 @@ def inertial_motion(
     aim, before = _FIRST * tolerance, None
     while aim >= _LEAST:
         for _ in range(_MOST_PERIODS):
-            phases, states = played.run(start, aim)
+            phases, states, _ = played.run(start, aim)
             gap = states[_MOMENTA, -1] - start
             if np.abs(gap).max() < _CLOSED * aim:
                 break
