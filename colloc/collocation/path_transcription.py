@@ -35,6 +35,7 @@ from colloc.gaits.path_samples import Gait, arcs_through, corners_through, grade
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
+from colloc.motion.heading import closing_sign
 from colloc.numerics.blocks import Block
 from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
 from colloc.numerics.mesh import Mesh
@@ -149,7 +150,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         *geometry.groups,
         *(_full_groups(problem, n_out, n_point, layout.n) if full else []),
         equalities("orientation", state @ selector(layout.theta[0], layout.n), {"point": (-rate @ pick).tocsr()}),
-        *rotation_groups(problem.gait.symmetry, layout.theta[0], layout.n, problem.rotation),
+        *rotation_groups(closing_sign(problem.gait.symmetry), layout.theta[0], layout.n, problem.rotation),
         quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
         quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
     ]

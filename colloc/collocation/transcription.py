@@ -37,6 +37,7 @@ from colloc.collocation.shape_checks import shape_checks
 from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
+from colloc.motion.heading import closing_sign
 from colloc.numerics.constraint_rows import (
     Group,
     block_group,
@@ -158,6 +159,6 @@ def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Gr
     begin = selector(layout.theta[0, :1], layout.n) - selector(layout.parameters[-1], layout.n)
     return [
         equalities("orientation", linear),
-        *rotation_groups(problem.gait.closing_symmetry, layout.theta[0], layout.n, problem.rotation),
+        *rotation_groups(closing_sign(problem.gait.closing_symmetry), layout.theta[0], layout.n, problem.rotation),
         *([] if problem.slope is None else [equalities("heading", begin)]),
     ]

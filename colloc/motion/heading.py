@@ -1,4 +1,4 @@
-"""The direction in which a gait travels, from the part of its period that is solved and its symmetry.
+"""How a symmetry closes a period: the direction in which a gait travels, and its orientations, from the part that is solved.
 
 A bilateral gait repeats its displacement, so it travels along it. The second half of an antipodal gait is the mirror image of
 the first; together they travel along the bisector of the orientations at the ends of the first. A gait with both symmetries is
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.symmetry import ANTIPODAL, BOTH
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 
 
 def heading_shares(symmetry: str) -> tuple[float, float] | None:
@@ -27,3 +27,15 @@ def heading(symmetry: str, displacement: complex, rotation: float, bend: float =
     angle = shares[0] * rotation + shares[1] * bend
     # it may travel the other way along its axis
     return float(angle if (displacement * np.exp(-1j * angle)).real >= 0 else angle - np.pi)
+
+
+def closing_sign(symmetry: str) -> float | None:
+    """The sign with which the first orientation counts where the last one and it add up to a given turn, that of the period or
+    a whole number of turns. None: nothing has to close."""
+    return {NONE: -1.0, ANTIPODAL: 1.0, BILATERAL: None}[symmetry]
+
+
+def whole_turns(first: float, last: float) -> float:
+    """The whole turns [rad] that the orientations at the ends of an antipodal gait's first half add up to: 0, or, where it
+    travels the other way along its axis, one."""
+    return float(2 * np.pi * np.round((first + last) / (2 * np.pi)))

@@ -70,9 +70,8 @@ def quadrature_group(name: str, variable: np.ndarray, output: int, n_out: int, m
     return equalities(name, state @ selector(variable[0], n), {"point": (-unit * rate @ pick).tocsr()})
 
 
-def rotation_groups(symmetry: str, theta: np.ndarray, n: int, turn: float | None) -> list[Group]:
-    """How the orientation, variables `theta` in order, closes where no symmetry does it: after a given turn; None: freely."""
-    sign = {"none": -1.0, "antipodal": 1.0, "bilateral": None}[symmetry]
+def rotation_groups(sign: float | None, theta: np.ndarray, n: int, turn: float | None) -> list[Group]:
+    """The last of variables `theta` in order, and the first times a sign, add up to a turn; no row if sign or turn is None."""
     if sign is None or turn is None:
         return []
     row = sparse.csr_matrix(([1.0, sign], ([0, 0], [theta[-1], theta[0]])), shape=(1, n))

@@ -23,6 +23,7 @@ from colloc.gaits.relaxed import Relaxed
 from colloc.gaits.sloped import OnSlope
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
+from colloc.motion.heading import whole_turns
 from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
@@ -83,15 +84,11 @@ def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray
 
 
 def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
-    """The program with the net rotation closed as variables x close it.
-
-    The first orientation of an antipodal gait is minus the last, or, where it travels the other way along its axis, pi more:
-    their sum is a whole number of turns.
-    """
+    """The program with the net rotation closed as variables x close it."""
     if program.problem.gait.closing_symmetry != ANTIPODAL:
         return program
     theta, rows = x[program.layout.theta[0]], np.zeros(program.constraint_lower.size)
-    rows[program.groups["rotation"]] = 2 * np.pi * np.round((theta[0] + theta[-1]) / (2 * np.pi))
+    rows[program.groups["rotation"]] = whole_turns(theta[0], theta[-1])
     return program.with_rows(program.constraint_lower + rows, program.constraint_upper + rows)
 
 

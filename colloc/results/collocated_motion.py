@@ -15,6 +15,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.balance_results import Sliding
 from colloc.motion.collocated import CollocatedPose
+from colloc.motion.heading import whole_turns
 from colloc.numerics.mesh import Mesh
 from colloc.results.motion import RigidMotion, SampledMotion, turned
 
@@ -96,8 +97,7 @@ class CollocatedMotion:
         elif symmetry == ANTIPODAL:
             mirror, x_theta = np.array([[1.0], [-1.0], [-1.0]]), self.x[self.layout.theta[0]]
             z = np.where(second, mirror * z, z)
-            turns = 2 * np.pi * np.round((x_theta[0] + x_theta[-1]) / (2 * np.pi))
-            theta = np.where(second, turns - theta, theta)
+            theta = np.where(second, whole_turns(x_theta[0], x_theta[-1]) - theta, theta)
             centre = np.where(second, end[:, None] + np.array([[1.0], [-1.0]]) * centre, centre)
             end = np.array([2 * end[0], 0.0])
         before = RigidMotion(self.rotation, complex(*end)).repeated(period)

@@ -14,6 +14,9 @@ import numpy as np
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.motion.collocated import CollocatedPose
+from colloc.numerics.mesh import uniform_mesh
+from colloc.numerics.schemes import scheme
 from colloc.results.distinct_optima import phase_distance, reversed_in_time, swapped
 
 RETROGRADE, DIRECT, STANDING = "retrograde", "direct", "standing"
@@ -85,13 +88,13 @@ def headed_displacement(gait: Fourier, body: Body, friction: Law) -> float:
 
     From the velocities in the frame of the body's mean direction; friction at a delta of 1e-3 is enough for a sign.
     """
-    t = (np.arange(_INSTANTS) + 0.5) / _INSTANTS
-    angles, rates = gait.angles(t), gait.rates(t)
+    mesh = uniform_mesh(scheme("gauss-1"), _INSTANTS, 1.0)
+    angles, rates = gait(mesh.times)
     z = body.solve(friction, angles, rates, _DELTA, tolerance=1e-8).z
-    x, y = body.sliding(friction, angles, rates, z, np.full((1, _INSTANTS), _DELTA)).centre
-    turn = np.exp(1j * np.concatenate([[0.0], np.cumsum(0.5 * (z[2, 1:] + z[2, :-1])) / _INSTANTS]))
+    centre = body.sliding(friction, angles, rates, z, np.full((1, _INSTANTS), _DELTA)).centre
+    pose = CollocatedPose.on_mesh(mesh, z[2], centre)
     head_x, head_y = (points[-1] for points in body.outline(angles))
-    moved, axis = np.mean(turn * (x + 1j * y)), np.mean(turn * (head_x + 1j * head_y))
+    moved, axis = pose.place[-1], np.mean(np.exp(1j * pose.stage_theta[:, 0]) * (head_x + 1j * head_y))
     size = abs(moved) * abs(axis)
     return float((moved * np.conj(axis)).real / size) if size > 0 else 0.0
 

@@ -5,7 +5,7 @@ import pytest
 
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE
 from colloc.motion.collocated import CollocatedPose, point_weights
-from colloc.motion.heading import heading
+from colloc.motion.heading import closing_sign, heading, whole_turns
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
@@ -91,3 +91,15 @@ def test_a_gait_goes_where_its_whole_period_leads():
     for symmetry in (NONE, BILATERAL):
         assert heading(symmetry, displacement, rotation) == pytest.approx(0.9)
     assert abs(heading(BOTH, displacement, rotation, 0.2)) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize("backwards", [0.0, np.pi])
+def test_orientations_along_the_travel_close_an_antipodal_gait(backwards):
+    """Seen along the travel the second half begins as the mirror image of the first, which ends there."""
+    rotation = 0.5
+    displacement = 0.3 * np.exp(1j * (0.5 * rotation + backwards))
+    first = -heading(ANTIPODAL, displacement, rotation)
+    last = first + rotation
+    assert last + closing_sign(ANTIPODAL) * first == pytest.approx(whole_turns(first, last))
+    assert whole_turns(first, last) == pytest.approx(2 * backwards)
+    assert (closing_sign(NONE), closing_sign(BILATERAL)) == (-1.0, None)
