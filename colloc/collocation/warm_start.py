@@ -35,7 +35,7 @@ def balanced_variables(
     unit = gait.speed_unit
     slow = delta * gait.delta_unit / unit
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
-    body, friction, slope = problem.body, problem.friction.in_speeds_of(unit), problem.slope
+    body, friction, slope = problem.body, problem.law.in_speeds_of(unit), problem.slope
     now: BalancedMotion | PointsOnSlope
     if slope is None:
         solved = body.solve(friction, angles, rates, slow, tolerance=_TOLERANCE)

@@ -52,19 +52,17 @@ def instant(
     """Posture, link velocities and friction for joint angles, joint rates ``(n_joint, n_time)`` and z ``(3, n_time)``."""
     posture = body.posture(angles, reference)
     velocity = body.velocity(posture, rates, z, reference)
-    own, pressure = friction.link_force(*velocity, body.length_column(), delta), body.pressure_column()
-    return Instant(posture, velocity, LinkForce(*(pressure * part for part in own)))
+    return Instant(posture, velocity, body.contact.force(friction, velocity, delta))
 
 
 def link_stiffness(body: Links, friction: Law, velocity: LinkVelocity, delta: Array) -> Matrix:
     """Minus the derivative of the friction on the links with respect to (vs, vn, w), 3 x 3 of ``(n_link, n_time)``."""
-    pressure = body.pressure_column()
-    return tuple(tuple(pressure * a for a in row) for row in friction.link_jacobian(*velocity, body.length_column(), delta))
+    return body.contact.stiffness(friction, velocity, delta)
 
 
 def dissipation_potential(body: Links, friction: Law, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """The function of z whose gradient is minus `net_force`, ``(n_time,)``; of associated laws only."""
-    return (body.pressure_column() * friction.link_potential(*velocity, body.length_column(), delta)).sum(axis=0)
+    return body.contact.potential(friction, velocity, delta).sum(axis=0)
 
 
 def net_force(posture: Posture, force: LinkForce) -> Array:
@@ -121,5 +119,4 @@ def secant_matrix(body: Links, friction: Law, posture: Posture, velocity: LinkVe
 
     One step of the paper's fixed point (eqs. ftbtilde to deltatilde) is ``z + A(z)^-1 net_force(z)``.
     """
-    secant, pressure = friction.link_secant(*velocity, body.length_column(), delta), body.pressure_column()
-    return _pulled_back(posture, tuple(tuple(pressure * a for a in row) for row in secant))
+    return _pulled_back(posture, body.contact.secant(friction, velocity, delta))

@@ -84,6 +84,10 @@ class Body(Protocol):
         """Number of forces that are variables of a full program."""
 
     @property
+    def force_names(self) -> tuple[str, ...]:
+        """What these are, for messages."""
+
+    @property
     def symmetries(self) -> tuple[str, ...]:
         """Of `colloc.gaits.symmetry`, those that its gaits may have."""
 
@@ -113,6 +117,9 @@ class Body(Protocol):
         """The same body on so many."""
 
     # mechanics
+    def law(self, friction: Law) -> Law:
+        """The law of friction of all of it that touches the floor, where the problem states `friction`."""
+
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         """The balance at any tail velocity z ``(3, n_time)``: the one statement of it, for NumPy and CasADi."""
 

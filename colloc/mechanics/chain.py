@@ -26,7 +26,6 @@ from colloc.mechanics.contact import (
 )
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
-from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.numerics.arrays import Array, namespace
@@ -47,6 +46,9 @@ class Chain(Links):
     weights : tuple of float
         Of the links from tail to head, in parts of the body's weight, 1; by default in proportion to their lengths. What a
         law says of a length is multiplied by the weight per length there, so drag of a fluid goes with the default only.
+    feet : int or tuple of Foot
+        What it stands on: so many on each link, evenly spread (one: its middle), or a `Foot` or `Wheel` each. By default the
+        links lie on the floor along their length.
 
     Examples
     --------
@@ -69,8 +71,12 @@ class Chain(Links):
 
     @property
     def n_force(self) -> int:
-        """Tangential and normal force and couple of every link."""
-        return 3 * self.n_link
+        """Those of what touches the floor."""
+        return self.contact.n_force
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        return self.contact.force_names
 
     @property
     def symmetries(self) -> tuple[str, ...]:
@@ -86,7 +92,8 @@ class Chain(Links):
         wide = f", {self.width:.4g} wide" if self.width else ""
         heavy = f", of weights {', '.join(f'{weight:.4g}' for weight in self.weights)}" if self.weights else ""
         lengths = ", ".join(f"{length:.4g}" for length in self.lengths)
-        return f"links of lengths {lengths} from the tail{wide} [body lengths]{heavy}"
+        stands = f", on {len(self.standing_on)} feet" if self.feet else ""
+        return f"links of lengths {lengths} from the tail{wide}{stands} [body lengths]{heavy}"
 
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         now = instant(self, friction, angles, rates, z, delta)
@@ -94,20 +101,19 @@ class Chain(Links):
         return Sliding(net_force(now.posture, now.force), centre, total_power(now.velocity, now.force))
 
     def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
-        """Laws of the links, scaled like velocities (see `colloc.mechanics.law.Law.scaled_laws`)."""
-        n, posture, length, pressure = self.n_link, self.posture(angles), self.length_column(), self.pressure_column()
-        velocity = self.velocity(posture, rates, z)
-        force = LinkForce(forces[:n, :], forces[n : 2 * n, :], forces[2 * n :, :])
-        laws = friction.scaled_laws(*velocity, length, delta, LinkForce(*(part / pressure for part in force)))
+        """Laws scaled like velocities (see `colloc.mechanics.law.Law.scaled_laws`)."""
+        posture, contact = self.posture(angles), self.contact
+        velocity, force = self.velocity(posture, rates, z), contact.on_links(forces)
+        laws = contact.laws(friction, velocity, forces, delta)
         stack = namespace(angles, z, forces).stack
         centre = stack(list(self.centre_velocity(posture, velocity)))
         return Lifted(stack(laws), net_force(posture, force), centre, total_power(velocity, force))
 
     def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
-        return namespace(angles, rates, z).stack(list(instant(self, friction, angles, rates, z, delta).force))
+        return self.contact.forces(friction, self.velocity(self.posture(angles), rates, z), delta)
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        return friction.largest_link_forces(self.length_column()) * np.tile(self.pressure_column(), (3, 1))
+        return self.contact.largest_forces(friction)
 
     def solve(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
@@ -134,14 +140,10 @@ class Chain(Links):
         return all_balanced_velocities(self, friction, angles, rates, delta)
 
     def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
-        """Speed of the slowest point of each link, or tangential speed where directions differ; none where nothing is dry."""
-        velocity = self.velocity(self.posture(angles), rates, z)
-        if not friction.regularised:
-            return velocity.vs[:0]
-        if not friction.reversible:
-            return np.abs(velocity.vs)
-        beyond = np.maximum(np.abs(velocity.vn) - 0.5 * self.length_column() * np.abs(velocity.w), 0.0)
-        return np.hypot(velocity.vs, beyond)
+        """Speed of the slowest point of each link, or of each foot; along it where directions differ; none where nothing is
+        dry."""
+        law, velocity = self.law(friction), self.velocity(self.posture(angles), rates, z)
+        return self.contact.slowness(law, velocity) if law.regularised else velocity.vs[:0]
 
     @property
     def limited(self) -> np.ndarray:
@@ -204,15 +206,14 @@ class Chain(Links):
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
     ) -> tuple[np.ndarray, np.ndarray]:
         posture = self.posture(angles)
-        velocity, many = self.velocity(posture, rates, z), max(2, count // self.n_link)
-        places, forces = [], []
-        for share in (np.arange(many) + 0.5) / many - 0.5:
-            along = share * self.length_column()
-            own = friction.density(velocity.vs, velocity.vn + along * velocity.w, delta)
-            fs, fn = (self.pressure_column() * part for part in own)
-            places.append([posture.x + along * posture.cos, posture.y + along * posture.sin])
-            forces.append([fs * posture.cos - fn * posture.sin, fs * posture.sin + fn * posture.cos])
-        return np.concatenate(places, axis=1), np.concatenate(forces, axis=1)
+        fs, fn = self.contact.at_points(friction, self.velocity(posture, rates, z), delta, count)
+        link, *at = self.contact.points(count)
+        cos, sin, x, y = (part[link] for part in posture)
+        along, offset = (part[:, None] for part in at)
+        return (
+            np.stack([x + along * cos - offset * sin, y + along * sin + offset * cos]),
+            np.stack([fs * cos - fn * sin, fs * sin + fn * cos]),
+        )
 
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
         """Of the midpoints of the links."""

@@ -69,8 +69,7 @@ class _Batch:
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
         velocity = self.at(np.arange(z.shape[1]), z, delta).velocity
-        half = 0.5 * self.body.length_column()
-        anchor = np.argmin(np.abs(velocity.vs) + np.abs(velocity.vn) + half * np.abs(velocity.w), axis=0)
+        anchor = np.argmin(self.body.contact.slowest(velocity), axis=0)
         return anchor, self.rereferenced(z, delta, anchor)
 
     def rereferenced(self, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
@@ -172,6 +171,7 @@ def solve_balance(
         if load.shape != (2, n_time) or not np.isfinite(load).all():
             raise ProblemError(f"load must be finite with shape (2, {n_time}).")
     settings = float(tolerance), int(max_iterations), method
+    friction = body.law(friction)
     library = native_kernel(body, friction)
 
     solved = _numpy_balance if library is None else partial(compiled_balance, library)

@@ -52,7 +52,7 @@ _switched_off = False
 
 def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
-    known = body.in_series and friction.kernel_numbers and not _switched_off
+    known = body.in_series and not body.feet and friction.kernel_numbers and not _switched_off
     return library(friction.kernel_source) if known else None
 
 

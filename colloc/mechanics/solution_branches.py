@@ -60,6 +60,7 @@ def all_balanced_velocities(
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
     (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """
+    friction = body.law(friction)
     moving = Moving(body, friction, angles, rates, delta, load)
     if friction.associated:
         return Branches(*_solved(moving, np.zeros((1, 3, angles.shape[1])), "auto"))

@@ -55,7 +55,7 @@ def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: 
     body, delta = problem.body, solution.delta_per_period
     motion = solution.sample(np.linspace(0.0, 1.0, count))
     ends = lab_outline(body, motion.angles, motion.theta, motion.tail)
-    places, forces = body.rubbing(problem.friction, motion.angles, motion.rates, delta, motion.z, arrows)
+    places, forces = body.rubbing(problem.law, motion.angles, motion.rates, delta, motion.z, arrows)
     period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), complex(*(motion.centre[:, -1] - motion.centre[:, 0])))
     return Frames(
         motion.t,

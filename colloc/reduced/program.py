@@ -100,7 +100,7 @@ class ReducedProgram:
         self.space, self.delta = space, delta
         problem, self.unit = in_friction_units(space.problem)
         besides = [name for name in ("length", "driven_work") if problem.uses(name)]
-        at = problem.body, problem.friction, problem.gait.motion_symmetry, space.mesh, space, besides
+        at = problem.body, problem.law, problem.gait.motion_symmetry, space.mesh, space, besides
         self.motion = ReducedMotion(*at) if problem.slope is None else SlopedMotion(*at, problem.slope)
         held = {"rotation": problem.rotation} if problem.gait.closing_symmetry == NONE else {}
         held |= {} if problem.towards is None else {"across": 0.0}

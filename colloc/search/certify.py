@@ -63,8 +63,8 @@ def is_trivial(answer: Answer) -> bool:
     """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
     problem = answer.problem
     if problem.slope is not None:
-        return in_unit(answer.value, 1 / friction_unit(problem.friction), problem.objective) < NOWHERE
-    if abs(answer.efficiency) * problem.friction.smallest >= TRIVIAL_EFFICIENCY:
+        return in_unit(answer.value, 1 / friction_unit(problem.law), problem.objective) < NOWHERE
+    if abs(answer.efficiency) * problem.law.smallest >= TRIVIAL_EFFICIENCY:
         return False
     theta = answer.x[answer.layout.theta[0]]
     return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
@@ -144,7 +144,7 @@ def gait_certificate(
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
     settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "slope": problem.slope}
-    known = measured(problem.body, problem.friction, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
+    known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
         *before,
@@ -178,7 +178,7 @@ def gait_certificate(
 
 
 def _first_order(answer: Answer) -> list[Check]:
-    residual = np.abs(answer.motion.at_points.force).max() / answer.problem.friction.largest
+    residual = np.abs(answer.motion.at_points.force).max() / answer.problem.law.largest
     return [
         Check("KKT error", max(answer.kkt_error, answer.complementarity), KKT, "gradient of the Lagrangian, complementarity"),
         Check("constraint violation", answer.violation, VIOLATION, "largest violated equation or bound"),
@@ -273,7 +273,7 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
     if problem.slope is not None:
         meaning = "part of the period at which several motions are balanced; what they would change is not measured"
         return Check("one motion", fine.several, SEVERAL, meaning)
-    if problem.friction.associated:
+    if problem.law.associated:
         meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:
         meaning = "relative; other balanced motions of a smooth body are not looked for"

@@ -81,7 +81,7 @@ def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray
     def shares(part: Mapping[str, float]) -> dict[str, float]:
         return _shares(problem, part, length)
 
-    of = (problem.body, problem.friction, gait)
+    of = (problem.body, problem.law, gait)
     return fine_motion(*of, delta, edges, tolerance, shares, problem.uses("driven_work"))
 
 
@@ -152,7 +152,7 @@ class _Own(NamedTuple):
 def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Own:
     problem, gait, delta, fine = known
     nodes = left[:, None] + (right - left)[:, None] * rule.c
-    at = problem.body, problem.friction, gait, delta, nodes
+    at = problem.body, problem.law, gait, delta, nodes
     rates = rates_at(*at, fine.velocity(nodes), problem.uses("driven_work"))
     turned, moved, spent, delivered = increments(rule, right - left, rates)
     (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
