@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -199,15 +199,11 @@ class FeetLaw:
     def __post_init__(self) -> None:
         object.__setattr__(self, "laws", tuple(self.laws))
 
+    kernel_numbers: ClassVar[tuple[float, ...]] = ()
     kernel_source = ""
     link_force = link_jacobian = link_secant = link_potential = scaled_laws = largest_link_forces = staticmethod(
         _at_points_only
     )
-
-    @property
-    def kernel_numbers(self) -> tuple[float, ...]:
-        """Those of the laws one after the other; none where the kernel lacks one of them."""
-        return () if any(law.kernel_source or not law.kernel_numbers for law in self.laws) else (0.0,)
 
     @property
     def degree(self) -> float | None:

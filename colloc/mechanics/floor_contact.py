@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from colloc.mechanics.feet import FeetLaw, Foot
-from colloc.mechanics.law import Law, Matrix
+from colloc.mechanics.law import KernelLaw, Law, Matrix
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 
@@ -78,6 +78,9 @@ class FloorContact(Protocol):
 
     def slowness(self, friction: Law, velocity: LinkVelocities) -> np.ndarray:
         """What has to vanish for a kink of the velocities in time, ``(n_part, n_time)``."""
+
+    def kernel_law(self, friction: Law) -> KernelLaw:
+        """The law of all that touches, for the compiled kernel."""
 
     def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where friction is drawn: the link of each point, its place along that from the midpoint and its offset, ``(n,)``."""
@@ -143,6 +146,10 @@ class LineContact:
         beyond = np.maximum(np.abs(velocity.vn) - 0.5 * self._length * np.abs(velocity.w), 0.0)
         return np.hypot(velocity.vs, beyond)
 
+    def kernel_law(self, friction: Law) -> KernelLaw:
+        source = friction.kernel_source
+        return KernelLaw(friction.kernel_numbers, "OWN_LAW" if source else "", source)
+
     def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         n, many = len(self._length), max(2, count // len(self._length))
         share = (np.arange(many) + 0.5) / many - 0.5
@@ -190,6 +197,9 @@ class PointContact:
             self._own[friction] = FeetLaw(tuple(foot.friction or friction for foot in self.feet))
         return self._own[friction]
 
+    def _each(self, law: Law) -> tuple[Law, ...]:
+        return law.laws if isinstance(law, FeetLaw) else (law,) * len(self.feet)
+
     def velocities(self, velocity: LinkVelocities) -> tuple[Array, Array]:
         """Of the feet along and across their own directions, ``(n_foot, n_time)`` each."""
         vs, vn, w = velocity.vs[self.links, :], velocity.vn[self.links, :], velocity.w[self.links, :]
@@ -234,8 +244,7 @@ class PointContact:
         return [(forces[k * n : (k + 1) * n, :] / self.weight - own[k]) / secant[k][k] for k in range(2)]
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        law = self.law(friction)
-        largest = [each.largest if each.degree == 0 else np.inf for each in getattr(law, "laws", (law,) * len(self.feet))]
+        largest = [each.largest if each.degree == 0 else np.inf for each in self._each(self.law(friction))]
         return np.tile(self.weight * np.array(largest)[:, None], (2, 1))
 
     def slowest(self, velocity: LinkVelocities) -> np.ndarray:
@@ -247,6 +256,25 @@ class PointContact:
         """Speed of each foot, or the one along it where directions differ."""
         along, across = self.velocities(velocity)
         return np.hypot(along, across) if friction.reversible else np.abs(along)
+
+    @cached_property
+    def _of_kernel(self) -> dict[Law, KernelLaw]:
+        return {}
+
+    def kernel_law(self, friction: Law) -> KernelLaw:
+        """Feet under Coulomb's law or the elliptic one; it has others along links only."""
+        if friction not in self._of_kernel:
+            self._of_kernel[friction] = self._in_the_kernel(self.law(friction))
+        return self._of_kernel[friction]
+
+    def _in_the_kernel(self, law: Law) -> KernelLaw:
+        own = self._each(law)
+        if any(each.kernel_source or not each.kernel_numbers for each in own):
+            return KernelLaw(())
+        first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
+        place = np.hstack([self.along, self.offset, self.cos, self.sin, self.weight])
+        feet = np.hstack([place, [each.kernel_numbers[:5] for each in own]])
+        return KernelLaw((len(self._scatter), law.largest, float(law.associated), *first, *feet.ravel()), "FEET")
 
     def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return np.array(self.links), self.along[:, 0], self.offset[:, 0]

@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 from shared.instants import random_instants
+from shared.kernels import by_both
 
 from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, PowerLaw, Problem, ProblemError, Viscous, Wheel, solve_balance
+from colloc.mechanics.native_kernel import native_kernel
 
 LENGTHS = (0.3, 0.45, 0.25)
 PAIR = (Foot(0, 0.2), Foot(1, 0.3, offset=0.05), Foot(1, 0.3, offset=-0.05), Foot(2, 1.0))
@@ -242,3 +244,21 @@ def test_symmetries_need_symmetric_feet():
     assert "bilateral" in Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2, 0.9))).symmetries
     assert "bilateral" not in Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2, 0.1))).symmetries
     assert "bilateral" not in Chain(feet=(Wheel(0), Foot(1), Foot(2))).symmetries
+
+
+@pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
+@pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
+@pytest.mark.parametrize("law", LAWS[:3], ids=["isotropic", "unequal", "elliptic"])
+def test_compiled_balances_and_slopes_are_those_of_numpy(law, feet):
+    body, (angles, rates) = Chain(LENGTHS, feet=feet), random_instants(60)
+    assert native_kernel(body, body.law(law)) is not None
+    (z, motion, slopes), (same_z, known, reference) = by_both(body, law, angles, rates, 1e-3)
+    np.testing.assert_allclose(same_z, z, atol=1e-8)
+    np.testing.assert_allclose(motion.centre, known.centre, atol=1e-11)
+    np.testing.assert_allclose(motion.actuator_power, motion.power, atol=1e-9)
+    np.testing.assert_allclose(slopes, reference, atol=1e-8)
+
+
+def test_laws_that_the_kernel_does_not_know_at_points_are_left_to_numpy():
+    for law in (Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")):
+        assert native_kernel(Chain(feet=1), law) is None
