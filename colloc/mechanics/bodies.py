@@ -218,6 +218,13 @@ class Body(Protocol):
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
         """Speeds of a few parts ``(n_part, n_time)``, and what a part is called: for drawing what sticks."""
 
+    @property
+    def stands(self) -> bool:
+        """On feet: then `speeds` and `rubbing` are those of the feet."""
+
+    def imbalance(self, angles: np.ndarray) -> np.ndarray:
+        """How far from beneath the centre of mass its weight presses on the floor [body lengths], ``(n_time,)``."""
+
     def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Velocity of the head in the axes of a body that is named from it, and its heading in the body's own axes, turned by
         half a turn [rad]: what a bilateral gait needs."""  # fmt: skip

@@ -31,6 +31,9 @@ from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import named_arguments
 
+BALANCED = 1e-9
+"""Body lengths by which the weights of feet may press beside the centre of mass and count as beneath it."""
+
 
 @named_arguments
 class Chain(Links):
@@ -92,7 +95,9 @@ class Chain(Links):
         wide = f", {self.width:.4g} wide" if self.width else ""
         heavy = f", of weights {', '.join(f'{weight:.4g}' for weight in self.weights)}" if self.weights else ""
         lengths = ", ".join(f"{length:.4g}" for length in self.lengths)
-        stands = f", on {len(self.standing_on)} feet" if self.feet else ""
+        stands = f", on {len(self.standing_on)} feet" if self.stands else ""
+        if self.largest_imbalance > BALANCED:
+            stands += f" (whose weights press up to {self.largest_imbalance:.3g} beside the centre of mass)"
         return f"links of lengths {lengths} from the tail{wide}{stands} [body lengths]{heavy}"
 
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
@@ -207,18 +212,41 @@ class Chain(Links):
     ) -> tuple[np.ndarray, np.ndarray]:
         posture = self.posture(angles)
         fs, fn = self.contact.at_points(friction, self.velocity(posture, rates, z), delta, count)
+        cos, sin = (part[self.contact.points(count)[0]] for part in posture[:2])
+        return self._points(angles, count), np.stack([fs * cos - fn * sin, fs * sin + fn * cos])
+
+    def _points(self, angles: np.ndarray, count: int) -> np.ndarray:
+        """Where it touches the floor, at about `count` points of a line, ``(2, n_point, n_time)``."""
         link, *at = self.contact.points(count)
-        cos, sin, x, y = (part[link] for part in posture)
+        cos, sin, x, y = (part[link] for part in self.posture(angles))
         along, offset = (part[:, None] for part in at)
-        return (
-            np.stack([x + along * cos - offset * sin, y + along * sin + offset * cos]),
-            np.stack([fs * cos - fn * sin, fs * sin + fn * cos]),
-        )
+        return np.stack([x + along * cos - offset * sin, y + along * sin + offset * cos])
 
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
-        """Of the midpoints of the links."""
-        velocity = self.velocity(self.posture(angles), rates, z)
-        return "link", np.hypot(velocity.vs, velocity.vn)
+        """Of the midpoints of the links, or of the feet."""
+        return self.contact.speeds(self.velocity(self.posture(angles), rates, z))
+
+    @property
+    def stands(self) -> bool:
+        return bool(self.standing_on)
+
+    def imbalance(self, angles: np.ndarray) -> np.ndarray:
+        if not self.stands:
+            return np.zeros(angles.shape[1])
+        weight = np.array([foot.weight for foot in self.standing_on])
+        pressed = np.einsum("f,cft->ct", weight, self._points(angles, self.n_link))
+        return np.hypot(*(pressed - self.centre(angles)))
+
+    @property
+    def largest_imbalance(self) -> float:
+        """`imbalance` at the worst shape, whatever the limits of the joints."""
+        path, weights = self.weighted_path(None), self.weight_column()[:, 0]
+        arms = -(weights @ path).astype(complex)
+        for foot in self.standing_on:
+            weight = float(foot.weight or 0.0)
+            arms += weight * path[foot.link]
+            arms[foot.link] += weight * ((foot.place - 0.5) * self.lengths[foot.link] + 1j * foot.offset)
+        return float(np.abs(arms).sum()) if self.stands else 0.0
 
     def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         link = self.velocity(self.posture(angles), rates, z)

@@ -22,6 +22,9 @@ from colloc.mechanics.law import KernelLaw, Law, Matrix
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 
+FOOT = "foot"
+"""What a point of contact is called."""
+
 
 class LinkVelocities(Protocol):
     """As `colloc.mechanics.links.LinkVelocity`."""
@@ -81,6 +84,9 @@ class FloorContact(Protocol):
 
     def kernel_law(self, friction: Law) -> KernelLaw:
         """The law of all that touches, for the compiled kernel."""
+
+    def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
+        """Of what is drawn as sticking or sliding, and what it is called."""
 
     def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where friction is drawn: the link of each point, its place along that from the midpoint and its offset, ``(n,)``."""
@@ -149,6 +155,10 @@ class LineContact:
     def kernel_law(self, friction: Law) -> KernelLaw:
         source = friction.kernel_source
         return KernelLaw(friction.kernel_numbers, "OWN_LAW" if source else "", source)
+
+    def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
+        """Of the midpoints of the links."""
+        return "link", np.hypot(velocity.vs, velocity.vn)
 
     def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         n, many = len(self._length), max(2, count // len(self._length))
@@ -275,6 +285,9 @@ class PointContact:
         place = np.hstack([self.along, self.offset, self.cos, self.sin, self.weight])
         feet = np.hstack([place, [each.kernel_numbers[:5] for each in own]])
         return KernelLaw((len(self._scatter), law.largest, float(law.associated), *first, *feet.ravel()), "FEET")
+
+    def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
+        return FOOT, np.hypot(*self.velocities(velocity))
 
     def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return np.array(self.links), self.along[:, 0], self.offset[:, 0]

@@ -189,6 +189,7 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     data: dict[str, Any] = {name: np.round(row, 4).tolist() for name, row in rows.items()}
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
+        "holding": shown.holding.astype(int).tolist(),
         "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
         "before": [np.array([np.exp(1j * b.rotation), b.shift]).view(float).round(6).tolist() for b in shown.before],
         "arrowScale": shown.arrow_scale, "grid": grid,

@@ -11,6 +11,7 @@ from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.gaits.symmetry import NONE
+from colloc.mechanics.chain import BALANCED
 from colloc.results.answer import REALISED, Answer
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
@@ -24,6 +25,8 @@ change is the body's own (`colloc.mechanics.bodies.Usual`)."""
 MOTIONS = 1e-2
 """Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
+_ANY_LEAN = 1.0
+"""Body lengths: reported, not judged. A real body would shift its weight between its feet, which the model does not."""
 ASTRAY, SEVERAL = 1e-3, 1e-3
 """On a slope: angle off the direction that was asked for; part of the period at which the motion is left open."""
 
@@ -218,6 +221,9 @@ def _motion(
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
     ]
+    if (lean := float(body.imbalance(angles).max())) > BALANCED:
+        beside = "way from the centre of mass to where the feet's weights press [body lengths]; reported, not judged"
+        checks.append(Check("statics", lean, _ANY_LEAN, beside))
     if claimed is not None:
         gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))

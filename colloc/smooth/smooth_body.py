@@ -95,6 +95,11 @@ class SmoothBody:
         """None: a point at rest moves along the body, and does not come and go."""
         return np.empty((0, angles.shape[1]))
 
+    stands = False
+
+    def imbalance(self, angles: np.ndarray) -> np.ndarray:
+        return np.zeros(angles.shape[1])
+
     def law(self, friction: Law) -> Law:
         return friction
 
