@@ -178,7 +178,15 @@ def solve_balance(
     moving = Moving(body, friction, angles, rates, float(delta), load)
     found = _balanced(solved, moving, start, *settings) if method == "auto" else solved(moving, start, *settings)
     z, residual, iterations, anchor, velocity = found
-    return BalanceSolution(z, residual, iterations, residual <= tolerance, anchor, velocity)
+    return BalanceSolution(z, residual, iterations, residual <= _reachable(moving, tolerance), anchor, velocity)
+
+
+def _reachable(moving: Moving, tolerance: float) -> np.ndarray:
+    """The tolerance, or what rounding leaves of the forces where that is more, ``(n_time,)``."""
+    rounding, speed = moving.body.contact.rounding, np.abs(moving.rates).max(axis=0)
+    if not rounding:
+        return np.full(speed.size, tolerance)
+    return np.maximum(tolerance, rounding / relative_delta(moving.delta, np.maximum(speed, np.finfo(float).tiny))[0])
 
 
 def _balanced(
@@ -186,10 +194,11 @@ def _balanced(
 ) -> Found:
     """What `solved` finds directly, with each link at rest, from where friction is smoother, and last by the method given."""
     found, middle = solved(moving, start, tolerance, max_iterations, "direct"), moving.body.n_link // 2
+    enough = _reachable(moving, tolerance)
 
     def again(begun: Callable[[Moving], np.ndarray | None], how: str = "direct") -> None:
         """Try anew where nothing was found yet."""
-        failed = np.flatnonzero(~(found[1] <= tolerance))
+        failed = np.flatnonzero(~(found[1] <= enough))
         if failed.size:
             there = moving.at(failed)
             new = solved(there, begun(there), tolerance, max_iterations, how)

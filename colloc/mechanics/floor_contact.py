@@ -76,6 +76,10 @@ class FloorContact(Protocol):
     def largest_forces(self, friction: Law) -> np.ndarray:
         """Their largest magnitudes, ``(n_force, 1)``."""
 
+    @property
+    def rounding(self) -> float:
+        """What rounding leaves of the force, times delta over the largest rate; 0 where the solver need not reckon with it."""
+
     def slowest(self, velocity: LinkVelocities) -> np.ndarray:
         """How fast the slowest part of each link's contact moves, ``(n_link, n_time)``; infinite for a carried link."""
 
@@ -98,6 +102,7 @@ class FloorContact(Protocol):
 class LineContact:
     """The links press evenly along their length."""
 
+    rounding = 0.0
     force_names: tuple[str, ...]
 
     def __init__(self, lengths: np.ndarray, pressure: np.ndarray) -> None:
@@ -174,6 +179,10 @@ class LineContact:
 
 class PointContact:
     """Feet at points of the links."""
+
+    rounding = 16 * float(np.finfo(float).eps)
+    """Two feet may hold on links that turn, where what turns them cancels: each speed is then known to some units of rounding
+    of the largest, and its friction changes within delta."""
 
     def __init__(self, lengths: np.ndarray, feet: tuple[Foot, ...]) -> None:
         self.feet, self.links = feet, [foot.link for foot in feet]

@@ -89,7 +89,7 @@ def _solved(moving: Moving, starts: np.ndarray, method: str = "direct") -> tuple
     body, friction, angles, rates, delta, load = tiled = moving.at(np.tile(np.arange(n_time), count))
     at, start = (body, friction, angles, rates, delta), np.concatenate(list(starts), axis=1)
     solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, method=method)
-    sign = np.where(solved.residual <= _ACCEPTED, np.sign(_determinant(tiled, solved)), 0.0)
+    sign = np.where((solved.residual <= _ACCEPTED) | solved.converged, np.sign(_determinant(tiled, solved)), 0.0)
     return np.stack(np.split(solved.z, count, axis=1)), sign.reshape(count, -1)
 
 
