@@ -193,8 +193,8 @@ def _balanced(
     solved: Callable[..., Found], moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> Found:
     """What `solved` finds directly, with each link at rest, from where friction is smoother, and last by the method given."""
-    found, middle = solved(moving, start, tolerance, max_iterations, "direct"), moving.body.n_link // 2
-    enough = _reachable(moving, tolerance)
+    found = solved(moving, start, tolerance, max_iterations, "direct")
+    enough, contact = _reachable(moving, tolerance), moving.body.contact
 
     def again(begun: Callable[[Moving], np.ndarray | None], how: str = "direct") -> None:
         """Try anew where nothing was found yet."""
@@ -209,9 +209,9 @@ def _balanced(
     def smoother(there: Moving) -> np.ndarray:
         return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
 
-    # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
-    for link in (middle, *(link for link in range(moving.body.n_link) if link != middle)):
-        again(partial(Moving.with_link_at_rest, link=link))
+    # unequal coefficients: the balance may have folds, beside which steps end; one of the links, or feet, rests nearly
+    for rest in (*contact.rests, *contact.further_rests):
+        again(partial(Moving.at_rest, rest=rest))
     if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
         # several rest nearly, each where the others let it
         again(smoother)

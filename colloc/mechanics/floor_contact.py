@@ -13,7 +13,7 @@ weight is a number. One that changes with the shape would be a function of the p
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,6 +35,20 @@ class LinkVelocities(Protocol):
     def vn(self) -> Array: ...
     @property
     def w(self) -> Array: ...
+
+
+class Rest(NamedTuple):
+    """A point that does not move, by its link and its place there, and a link that does not turn: where a balance is near."""
+
+    link: int
+    along: float
+    offset: float
+    still: int
+
+
+def from_middle(n: int) -> list[int]:
+    """Numbers of n links, the middle one first."""
+    return [n // 2, *(link for link in range(n) if link != n // 2)]
 
 
 class FloorContact(Protocol):
@@ -80,6 +94,14 @@ class FloorContact(Protocol):
     def rounding(self) -> float:
         """What rounding leaves of the force, times delta over the largest rate; 0 where the solver need not reckon with it."""
 
+    @property
+    def rests(self) -> tuple[Rest, ...]:
+        """What may be at rest: from each of them a balance is sought that is not found otherwise."""
+
+    @property
+    def further_rests(self) -> tuple[Rest, ...]:
+        """Others that are tried where these lead nowhere."""
+
     def slowest(self, velocity: LinkVelocities) -> np.ndarray:
         """How fast the slowest part of each link's contact moves, ``(n_link, n_time)``; infinite for a carried link."""
 
@@ -103,12 +125,14 @@ class LineContact:
     """The links press evenly along their length."""
 
     rounding = 0.0
+    further_rests: tuple[Rest, ...] = ()
     force_names: tuple[str, ...]
 
     def __init__(self, lengths: np.ndarray, pressure: np.ndarray) -> None:
         self._length, self._pressure = lengths, pressure
         kinds = ("tangential force", "normal force", "couple")
         self.force_names = tuple(f"{kind} on link {i + 1}" for kind in kinds for i in range(len(lengths)))
+        self.rests = tuple(Rest(link, 0.0, 0.0, link) for link in from_middle(len(lengths)))
 
     @property
     def n_force(self) -> int:
@@ -197,6 +221,10 @@ class PointContact:
         )
         self._scatter = np.zeros((len(lengths), len(feet)))
         self._scatter[self.links, np.arange(len(feet))] = 1.0
+        order = from_middle(len(lengths))
+        points = sorted(zip(self.links, self.along[:, 0], self.offset[:, 0], strict=True), key=lambda at: order.index(at[0]))
+        self.rests = tuple(Rest(*at, at[0]) for at in points)
+        self.further_rests = tuple(Rest(*at, link) for at in points for link in order if link != at[0])
         self.force_names = tuple(f"force {way} at foot {i + 1}" for way in ("along", "across") for i in range(len(feet)))
 
     @property
