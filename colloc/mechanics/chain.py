@@ -95,7 +95,7 @@ class Chain(Links):
         wide = f", {self.width:.4g} wide" if self.width else ""
         heavy = f", of weights {', '.join(f'{weight:.4g}' for weight in self.weights)}" if self.weights else ""
         lengths = ", ".join(f"{length:.4g}" for length in self.lengths)
-        stands = f", on {len(self.standing_on)} feet" if self.stands else ""
+        stands = f", on {len(self.standing_on)} feet" if self.feet else ""
         if self.largest_imbalance > BALANCED:
             stands += f" (whose weights press up to {self.largest_imbalance:.3g} beside the centre of mass)"
         return f"links of lengths {lengths} from the tail{wide}{stands} [body lengths]{heavy}"
@@ -226,15 +226,14 @@ class Chain(Links):
         """Of the midpoints of the links, or of the feet."""
         return self.contact.speeds(self.velocity(self.posture(angles), rates, z))
 
-    @property
-    def stands(self) -> bool:
-        return bool(self.standing_on)
+    def foot_places(self, angles: np.ndarray) -> np.ndarray:
+        return self._points(angles, self.n_link) if self.feet else np.zeros((2, 0, angles.shape[1]))
 
     def imbalance(self, angles: np.ndarray) -> np.ndarray:
-        if not self.stands:
+        if not self.feet:
             return np.zeros(angles.shape[1])
         weight = np.array([foot.weight for foot in self.standing_on])
-        pressed = np.einsum("f,cft->ct", weight, self._points(angles, self.n_link))
+        pressed = np.einsum("f,cft->ct", weight, self.foot_places(angles))
         return np.hypot(*(pressed - self.centre(angles)))
 
     @property
@@ -246,7 +245,7 @@ class Chain(Links):
             weight = float(foot.weight or 0.0)
             arms += weight * path[foot.link]
             arms[foot.link] += weight * ((foot.place - 0.5) * self.lengths[foot.link] + 1j * foot.offset)
-        return float(np.abs(arms).sum()) if self.stands else 0.0
+        return float(np.abs(arms).sum()) if self.feet else 0.0
 
     def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         link = self.velocity(self.posture(angles), rates, z)

@@ -52,10 +52,15 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
     return tail[:, None] + turned(np.stack(body.outline(angles)), theta)
 
 
+def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
+    """Lab positions of the feet of a body, ``(2, n_foot, n_time)``; no rows where it has none."""
+    return tail[:, None] + turned(body.foot_places(angles), theta)
+
+
 def holding(solution: Solution, motion: SampledMotion) -> np.ndarray:
     """Which feet of a body hold at instants of its motion, ``(n_foot, n_time)``; no rows where it has none."""
     body = solution.problem.body
-    if not body.stands:
+    if not body.foot_places(motion.angles).size:
         return np.zeros((0, motion.t.size), dtype=bool)
     return body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * solution.delta_per_period
 
