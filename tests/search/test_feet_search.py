@@ -5,11 +5,13 @@ import json
 import numpy as np
 import pytest
 from scipy.optimize import root
+from shared.instants import random_instants
 
-from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Problem, ProblemError, Wheel, load, save
+from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Problem, ProblemError, Wheel, load, save, solve_balance
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.main import main as colloc
+from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames
 from colloc.search.solve import solve
@@ -46,22 +48,18 @@ def played(gait, feet, delta, count=300):
 
         def motion(z, step=step, turn=turn):
             w = 1j * (z[2] + turn) * step
-            joints = (
-                np.concatenate([[0.0], np.cumsum(step)[:-1]]),
-                z[0] + 1j * z[1] + np.concatenate([[0.0], np.cumsum(w)[:-1]]),
-            )
-            at, velocity = (np.add.outer(places, 0 * a) * b + a for a, b in zip(joints, (step, w), strict=True))
+            ends = (origin + np.concatenate([[0.0], np.cumsum(a)[:-1]]) for origin, a in ((0.0, step), (z[0] + 1j * z[1], w)))
+            at, velocity = (end + np.outer(places, along) for end, along in zip(ends, (step, w), strict=True))
             return at, velocity, -velocity / np.sqrt(abs(velocity) ** 2 + delta**2) / (3 * feet)
 
         def balance(z, motion=motion):
             at, _, force = motion(z)
             return np.array([force.sum().real, force.sum().imag, (at.conj() * force).imag.sum()])
 
-        tries = (
-            root(balance, start, tol=1e-12) for start in (z, [0, 0, -turn[1]], [0, 0, -turn[2]], [0, 0, 0], [0, 1, -turn[1]])
-        )
+        starts = z, [0, 0, -turn[1]], [0, 0, -turn[2]], [0, 0, 0], [0, 1, -turn[1]]
+        tries = (root(balance, start, tol=1e-12) for start in starts)
         z = next(found.x for found in tries if np.abs(found.fun).max() < 1e-10)
-        at, velocity, force = motion(z)
+        _, velocity, force = motion(z)
         middle = heading + 0.5 * z[2] / count
         way += velocity.mean() * np.exp(1j * middle) / count
         work -= (force * velocity.conj()).real.sum() / count
@@ -107,13 +105,18 @@ def test_a_film_shows_which_feet_hold(on_feet):
 
 
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
-    """Wheels alone: the problem's friction acts nowhere. And a search in other units finds the same."""
+    """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own size."""
     wheels = Chain(feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(3)))
-    problem = Problem("wheels", body=wheels, gait=Harmonic(1, "bilateral"), delta=1e-3)
-    one, other = (solve(problem.with_(friction=law), 2) for law in (Friction(), Elliptic(7, 8, 9)))
-    assert one.certificate.passed
-    assert other.certificate.efficiency == pytest.approx(one.certificate.efficiency, rel=1e-6)
-    assert 30 < one.certificate.efficiency < 50 == 1 / problem.law.smallest
+    one, other = (Problem("wheels", body=wheels, friction=law) for law in (Friction(), Elliptic(7, 8, 9)))
+    assert one.law == other.law
+    scaled, unit = in_friction_units(other)
+    assert scaled.law == one.law.in_units_of(unit)
+    assert 0.1 < scaled.law.smallest < 10
+    assert Problem.from_dict(scaled.to_dict()).law == scaled.law
+    angles, rates = random_instants(20)
+    z, same, again = (solve_balance(wheels, law, angles, rates, 1e-3).z for law in (Friction(), Elliptic(7, 8, 9), scaled.law))
+    np.testing.assert_array_equal(z, same)
+    np.testing.assert_allclose(z, again, atol=1e-9)
 
 
 def test_a_certificate_says_how_far_the_feet_press_beside_the_centre_of_mass(solved):
