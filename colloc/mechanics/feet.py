@@ -46,11 +46,11 @@ class Foot:
 
     Examples
     --------
-    A body of three links that stands on two feet:
+    Three links on three feet, the outer ones near the ends:
 
     >>> from colloc import Chain, Foot
-    >>> Chain(feet=(Foot(0, weight=0.5), Foot(2, weight=0.5))).describe()
-    'links of lengths 0.3333, 0.3333, 0.3333 from the tail, on 2 feet [body lengths]'
+    >>> Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2, 0.9))).symmetric
+    True
     """
 
     link: int
