@@ -183,7 +183,7 @@ class LineContact:
 
     def kernel_law(self, friction: Law) -> KernelLaw:
         source = friction.kernel_source
-        return KernelLaw(friction.kernel_numbers, "OWN_LAW" if source else "", source)
+        return KernelLaw(friction.kernel_numbers, ("OWN_LAW",) if source else (), source)
 
     def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
         """Of the midpoints of the links."""
@@ -309,19 +309,21 @@ class PointContact:
         return {}
 
     def kernel_law(self, friction: Law) -> KernelLaw:
-        """Feet under Coulomb's law or the elliptic one; it has others along links only."""
+        """Feet under Coulomb's law or the elliptic one, each its own, or all under one law that is stated as formulas."""
         if friction not in self._of_kernel:
             self._of_kernel[friction] = self._in_the_kernel(self.law(friction))
         return self._of_kernel[friction]
 
     def _in_the_kernel(self, law: Law) -> KernelLaw:
-        own = self._each(law)
-        if any(each.kernel_source or not each.kernel_numbers for each in own):
+        own, source = self._each(law), law.kernel_source
+        if any(not each.kernel_numbers or each.kernel_source != source for each in own):
             return KernelLaw(())
+        numbers = [each.kernel_numbers[:5] for each in own]
+        degree, unit, speed_unit = numbers[0][1:4]  # of a law that is stated as formulas
         first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
-        place = np.hstack([self.along, self.offset, self.cos, self.sin, self.weight])
-        feet = np.hstack([place, [each.kernel_numbers[:5] for each in own]])
-        return KernelLaw((len(self._scatter), law.largest, float(law.associated), *first, *feet.ravel()), "FEET")
+        feet = np.hstack([self.along, self.offset, self.cos, self.sin, self.weight, numbers])
+        head = len(self._scatter), law.largest, float(law.associated), degree, unit, speed_unit
+        return KernelLaw((*head, *first, *feet.ravel()), ("FEET", "OWN_LAW") if source else ("FEET",), source)
 
     def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
         return FOOT, np.hypot(*self.velocities(velocity))

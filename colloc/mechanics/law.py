@@ -111,7 +111,7 @@ class KernelLaw(NamedTuple):
 
     numbers: tuple[float, ...]
     """Empty where it does not know the law."""
-    define: str = ""
+    defines: tuple[str, ...] = ()
     """What the kernel is compiled with; nothing for the usual one."""
     own_law: str = ""
     """C of the law (own_law.h)."""

@@ -53,7 +53,7 @@ _switched_off = False
 def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
     law = body.contact.kernel_law(friction)
-    return library(law.define, law.own_law) if body.in_series and law.numbers and not _switched_off else None
+    return library(law.defines, law.own_law) if body.in_series and law.numbers and not _switched_off else None
 
 
 @contextlib.contextmanager
@@ -68,10 +68,10 @@ def numpy_instead() -> Iterator[None]:
 
 
 @cache
-def library(define: str = "", own_law: str = "") -> ctypes.CDLL | None:
+def library(defines: tuple[str, ...] = (), own_law: str = "") -> ctypes.CDLL | None:
     """The kernel, loaded, and compiled before if need be, by itself, for feet or with a law's own C; None if that
     cannot be, with a `SlowWarning` unless nobody wants it."""
-    flags = (*_FLAGS, f"-D{define}") if define else _FLAGS
+    flags = (*_FLAGS, *(f"-D{name}" for name in defines))
     headers = {"own_law.h": own_law} if own_law else {}
     try:
         with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
