@@ -65,6 +65,7 @@ KEPT = {
     "small_gaits.png": "python -m scripts.infinitesimal_map --steps 20",
     "slopes.md": "python -m scripts.slopes",
     "slopes.png": "python -m scripts.slopes",
+    "feet.md": "python -m scripts.feet --output results/curated",
 }
 
 

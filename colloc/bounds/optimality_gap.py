@@ -21,6 +21,8 @@ CACHE = "bounds.sqlite"
 
 def refusal(problem: Problem) -> str:
     """Why no upper bound can be computed for the gaits of a problem, in a sentence; "" if one can."""
+    if isinstance(problem.body, Chain) and problem.body.feet:
+        return "upper bounds are computed for links that lie on the floor, not for feet; for these there is 1/min(mu)."
     if not isinstance(problem.body, Chain) or not isinstance(problem.friction, Friction):
         return (
             "upper bounds are computed for chains of links under Coulomb friction, or the elliptic law, only; for this one "
@@ -55,7 +57,7 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
 def _bounded(problem: Problem) -> bool:
     """Work that depends on the pace has no bound per distance: a slow gait pays as little as it likes."""
     on_level = problem.slope is None
-    return on_level and problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.friction)
+    return on_level and problem.objective == EFFICIENCY and problem.rotation == 0 and rate_independent(problem.law)
 
 
 def gap_line(problem: Problem, efficiency: float, bound: Bound | None, *, asked: bool = False) -> str:
@@ -65,6 +67,6 @@ def gap_line(problem: Problem, efficiency: float, bound: Bound | None, *, asked:
         return f"  {bound.report(efficiency)}"
     if not _bounded(problem):
         return f"  no upper bound on the {problem.objective.name} is known"
-    limit = 1.0 / problem.friction.smallest
+    limit = 1.0 / problem.law.smallest
     tighter = "" if asked or refusal(problem) else "; --bound computes a tighter one"
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

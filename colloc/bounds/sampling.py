@@ -20,6 +20,7 @@ from colloc.bounds.coulomb_motion import (
 )
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.system.errors import ProblemError
 
 _DELTA = 1e-6
 """Regularisation speed, at unit shape speed: solving costs half of what it does at 1e-9, the best small gait loses 1.5e-5."""
@@ -49,6 +50,10 @@ class Domain:
     body: Chain
     friction: Friction
     joint_limit: float
+
+    def __post_init__(self) -> None:
+        if self.body.feet:
+            raise ProblemError("upper bounds are computed for links that lie on the floor, not for feet; there is 1/min(mu).")
 
     def holds(self, angles: np.ndarray) -> np.ndarray:
         """Mask of shapes within the limits whose links do not cross."""

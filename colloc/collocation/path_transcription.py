@@ -130,7 +130,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near, far)
     kind = arc if isinstance(problem.gait, FreePath) else side
     full = layout.forces.size > 0
-    point = (full_path_point if full else path_point)(problem.body, problem.friction, kind)
+    point = (full_path_point if full else path_point)(problem.body, problem.law, kind)
     interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
     tau = np.tile(mesh.scheme.c, mesh.n)
     # a point that two intervals share would have two tangents at a corner: points of each interval are its own
@@ -139,7 +139,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     own = np.concatenate([layout.angles, layout.rates, layout.z, layout.forces]) if full else np.empty((0, tau.size), dtype=int)
     geometry.blocks["point"] = (point, np.concatenate([theta, own, geometry.shape[:, interval]]), given)
     if full:
-        limit = problem.body.largest_forces(problem.friction)
+        limit = problem.body.largest_forces(problem.law)
         geometry.lower[layout.forces], geometry.upper[layout.forces] = -limit, limit
 
     n_point, n_out = tau.size, point.n_out
@@ -154,7 +154,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
         quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
         quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
     ]
-    velocity = ImplicitVelocity(problem.body, problem.friction, n_point)
+    velocity = ImplicitVelocity(problem.body, problem.law, n_point)
     piece = geometry.piece
     place = ca.Function("place", [piece.shape, piece.given], [piece.angles, piece.direction]).map(n_point)
     unknown = ca.DM(np.full((3, n_point), np.nan))
@@ -169,10 +169,10 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
 
     def driven() -> BlockParts:
         gather = np.concatenate([layout.angles, layout.rates, layout.forces, here])
-        return driven_point(problem.body, problem.friction, piece.shape, piece.given, piece.speed), gather, given
+        return driven_point(problem.body, problem.law, piece.shape, piece.given, piece.speed), gather, given
 
     densities = {"length": lambda: (piece_pace(geometry.piece), here, given), "driven_work": driven}
-    besides = period_rows(problem, layout, mesh, densities, 1.0) | actuator_rows(problem, layout, problem.friction, 1.0)
+    besides = period_rows(problem, layout, mesh, densities, 1.0) | actuator_rows(problem, layout, problem.law, 1.0)
     for name, (parts, group) in besides.items():
         geometry.blocks[name] = parts
         groups.append(group)

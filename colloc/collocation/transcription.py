@@ -74,7 +74,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body, far)
-    friction = problem.friction.in_speeds_of(RADIANS)
+    friction = problem.law.in_speeds_of(RADIANS)
     point = point_function(problem.formulation, problem.body, friction, problem.slope)
     n_joint = problem.body.n_joint
     n_parameter = layout.parameters.shape[0]
@@ -136,7 +136,7 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
     upper[layout.parameters[:, 0]] = problem.gait.largest_parameters(problem.body, widest(problem.joint_limit))
     lower[layout.parameters] = -upper[layout.parameters]
     if layout.forces.size:
-        limit = problem.body.largest_forces(problem.friction)
+        limit = problem.body.largest_forces(problem.law)
         lower[layout.forces], upper[layout.forces] = -limit, limit
     for state in (layout.distance, layout.work):
         lower[state[0, 0]] = upper[state[0, 0]] = 0.0

@@ -31,7 +31,7 @@ def balanced_variables(
     unit = gait.speed_unit
     slow = delta * gait.delta_unit / unit
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
-    body, friction = problem.body, problem.friction.in_speeds_of(unit)
+    body, friction = problem.body, problem.law.in_speeds_of(unit)
     kind = kind_of_motion(problem, friction)
     begin = begin_of(kind, gait)
     along = kind.along(mesh, Shapes(angles, rates, slow, unit), begin)

@@ -22,13 +22,13 @@ def friction_unit(friction: Law) -> float:
 
 def in_friction_units(problem: Problem) -> tuple[Problem, float]:
     """The problem with its coefficients in units of `friction_unit`, and that unit."""
-    unit = friction_unit(problem.friction)
+    unit = friction_unit(problem.law)
     if unit == 1.0 or any(aim.degree is None for aim in problem.aims):
         return problem, 1.0
     least = tuple((aim, in_unit(value, 1 / unit, aim)) for aim, value in problem.at_least)
     limits = {name: _over(getattr(problem, name), unit) for name in ("torque_limit", "power_limit")}
     grade = problem.grade / unit  # the weight's pull is a force, too
-    return problem.with_(friction=problem.friction.in_units_of(unit), at_least=least, grade=grade, **limits), unit
+    return problem.with_(friction=problem.law.in_units_of(unit), at_least=least, grade=grade, **limits), unit
 
 
 def _over(limit: Limit | None, unit: float) -> Limit | None:

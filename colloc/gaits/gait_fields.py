@@ -25,6 +25,7 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.feet import FeetLaw, Foot
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.smooth.concertina import Concertina
@@ -43,6 +44,8 @@ GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases, PointedSe
 CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
+PARTS: tuple[type, ...] = (Foot, FeetLaw)
+"""What bodies and laws hold."""
 LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
 """Laws of friction that files can hold, Coulomb's first; a law of your own making is added to the list."""
 
@@ -57,8 +60,22 @@ def fields(value: Any) -> dict[str, Any]:
     """The kind of a gait, a class of gaits, a body or a law, and its fields as numbers, strings and lists."""
     stated = [f for f in dataclasses.fields(value) if f.metadata != STATED_IF_SET or getattr(value, f.name) != f.default]
     found = {f.name: getattr(value, f.name) for f in stated}
-    plain = {k: v.tolist() if isinstance(v, (np.ndarray, np.generic)) else v for k, v in found.items()}
-    return {KIND: type(value).__name__, **plain}
+    return {KIND: type(value).__name__, **{name: _plain(own) for name, own in found.items()}}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if isinstance(value, tuple) and any(dataclasses.is_dataclass(part) for part in value):
+        return [fields(part) for part in value]
+    return fields(value) if dataclasses.is_dataclass(value) else value
+
+
+def _revived(value: Any) -> Any:
+    """A part of a body or a law, such as a foot, from what `fields` made of it; anything else as it is."""
+    if isinstance(value, list) and any(isinstance(part, dict) for part in value):
+        return tuple(_revived(part) for part in value)
+    return _from((*LAWS, *PARTS), value) if isinstance(value, dict) and KIND in value else value
 
 
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
@@ -67,7 +84,7 @@ def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:
     kind = next((kind for kind in kinds if kind.__name__ == name), None)
     if kind is None:
         raise KeyError(f"{name} is none of {', '.join(kind.__name__ for kind in kinds)}")
-    return kind(**values)
+    return kind(**{name: _revived(value) for name, value in values.items()})
 
 
 def gait_from(given: dict[str, Any]) -> AnyGait:
@@ -82,7 +99,7 @@ def class_from(given: dict[str, Any]) -> AnyClass:
 
 def law_from(given: dict[str, Any]) -> Law:
     """The law that `fields` described; as `gait_from`."""
-    return _from(LAWS, given)
+    return _from((*LAWS, FeetLaw), given)
 
 
 def body_from(given: dict[str, Any]) -> Body:

@@ -148,7 +148,7 @@ class Problem:
         object.__setattr__(self, "gait", class_on(slope, self.gait))
         object.__setattr__(self, "grade", 0.0 if slope is None else slope.grade)
         usual = self.body.usual
-        start = (self.gait.delta_start or usual.delta_start) if self.friction.regularised else usual.delta
+        start = (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
         self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
@@ -235,6 +235,11 @@ class Problem:
         return ActuatorLimits(*(of_each(limit, self.body.n_joint) for limit in (self.torque_limit, self.power_limit)))
 
     @property
+    def law(self) -> Law:
+        """The law of friction of all that touches the floor: `friction`, unless feet of the body have their own."""
+        return self.body.law(self.friction)
+
+    @property
     def slope(self) -> Slope | None:
         """The slope the body is on; None on the level."""
         return slope_from(self.body, self.friction, self.grade, self.towards)
@@ -244,7 +249,7 @@ class Problem:
         """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
         if self.power_limit is not None:
             return "the joints' power is limited"
-        return "" if rate_independent(self.friction) else f"work depends on the pace under {self.friction.label}"
+        return "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"
 
     @property
     def aims(self) -> tuple[Objective, ...]:
@@ -273,7 +278,7 @@ class Problem:
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
-        if self.body.n_joint == 1 and self.friction.reversible:
+        if self.body.n_joint == 1 and self.law.reversible:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
                 "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
@@ -283,7 +288,7 @@ class Problem:
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         grade = f", grade {self.grade:g}" if self.grade else ""
-        scene = f"{coordinates}, {self.friction.label}{grade}, {self.gait.describe()}"
+        scene = f"{coordinates}, {self.law.label}{grade}, {self.gait.describe()}"
         return f"<Problem {self.name}: {best}{scene}, delta {self.delta:.0e}>"
 
     def with_(self, **changes: object) -> Problem:

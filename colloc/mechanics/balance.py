@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.floor_contact import Rest
 from colloc.mechanics.law import Law, Matrix
 from colloc.mechanics.link_friction import LinkForce, power
 from colloc.mechanics.links import TAIL, Links, LinkVelocity, Posture
@@ -40,10 +41,14 @@ class Moving(NamedTuple):
         load = None if self.load is None else self.load[:, chosen]
         return self._replace(angles=self.angles[:, chosen], rates=self.rates[:, chosen], load=load)
 
-    def with_link_at_rest(self, link: int) -> np.ndarray:
-        """Tail velocity ``(3, n_time)`` when one of the links does not move."""
-        still = np.zeros((3, self.angles.shape[1]))
-        return self.body.tail_velocity(self.body.posture(self.angles, link), self.rates, still, link)
+    def at_rest(self, rest: Rest) -> np.ndarray:
+        """Tail velocity ``(3, n_time)`` when a point of a link does not move, nor a link turn."""
+        link, along, offset, still = rest
+        body, posture = self.body, self.body.posture(self.angles, link)
+        w = 0.0 - body.relative_turning(self.rates, link)[still]
+        cos, sin = posture.cos[link], posture.sin[link]
+        arm_x, arm_y = along * cos - offset * sin, along * sin + offset * cos
+        return body.tail_velocity(posture, self.rates, np.stack([w * arm_y, -w * arm_x, w]), link)
 
 
 def instant(
@@ -52,19 +57,17 @@ def instant(
     """Posture, link velocities and friction for joint angles, joint rates ``(n_joint, n_time)`` and z ``(3, n_time)``."""
     posture = body.posture(angles, reference)
     velocity = body.velocity(posture, rates, z, reference)
-    own, pressure = friction.link_force(*velocity, body.length_column(), delta), body.pressure_column()
-    return Instant(posture, velocity, LinkForce(*(pressure * part for part in own)))
+    return Instant(posture, velocity, body.contact.force(friction, velocity, delta))
 
 
 def link_stiffness(body: Links, friction: Law, velocity: LinkVelocity, delta: Array) -> Matrix:
     """Minus the derivative of the friction on the links with respect to (vs, vn, w), 3 x 3 of ``(n_link, n_time)``."""
-    pressure = body.pressure_column()
-    return tuple(tuple(pressure * a for a in row) for row in friction.link_jacobian(*velocity, body.length_column(), delta))
+    return body.contact.stiffness(friction, velocity, delta)
 
 
 def dissipation_potential(body: Links, friction: Law, velocity: LinkVelocity, delta: Array) -> np.ndarray:
     """The function of z whose gradient is minus `net_force`, ``(n_time,)``; of associated laws only."""
-    return (body.pressure_column() * friction.link_potential(*velocity, body.length_column(), delta)).sum(axis=0)
+    return body.contact.potential(friction, velocity, delta).sum(axis=0)
 
 
 def net_force(posture: Posture, force: LinkForce) -> Array:
@@ -121,5 +124,4 @@ def secant_matrix(body: Links, friction: Law, posture: Posture, velocity: LinkVe
 
     One step of the paper's fixed point (eqs. ftbtilde to deltatilde) is ``z + A(z)^-1 net_force(z)``.
     """
-    secant, pressure = friction.link_secant(*velocity, body.length_column(), delta), body.pressure_column()
-    return _pulled_back(posture, tuple(tuple(pressure * a for a in row) for row in secant))
+    return _pulled_back(posture, body.contact.secant(friction, velocity, delta))

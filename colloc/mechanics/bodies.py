@@ -84,6 +84,10 @@ class Body(Protocol):
         """Number of forces that are variables of a full program."""
 
     @property
+    def force_names(self) -> tuple[str, ...]:
+        """What these are, for messages."""
+
+    @property
     def symmetries(self) -> tuple[str, ...]:
         """Of `colloc.gaits.symmetry`, those that its gaits may have."""
 
@@ -113,6 +117,9 @@ class Body(Protocol):
         """The same body on so many."""
 
     # mechanics
+    def law(self, friction: Law) -> Law:
+        """The law of friction of all of it that touches the floor, where the problem states `friction`."""
+
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         """The balance at any tail velocity z ``(3, n_time)``: the one statement of it, for NumPy and CasADi."""
 
@@ -210,6 +217,13 @@ class Body(Protocol):
 
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
         """Speeds of a few parts ``(n_part, n_time)``, and what a part is called: for drawing what sticks."""
+
+    def foot_places(self, angles: np.ndarray) -> np.ndarray:
+        """Where the feet of a body are, seen from the tail, ``(2, n_foot, n_time)``: `speeds` and `rubbing` are then
+        theirs. No rows for a body that lies on the floor."""
+
+    def imbalance(self, angles: np.ndarray) -> np.ndarray:
+        """How far from beneath the centre of mass its weight presses on the floor [body lengths], ``(n_time,)``."""
 
     def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Velocity of the head in the axes of a body that is named from it, and its heading in the body's own axes, turned by

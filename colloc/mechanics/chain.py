@@ -26,11 +26,13 @@ from colloc.mechanics.contact import (
 )
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
-from colloc.mechanics.link_friction import LinkForce
 from colloc.mechanics.links import Links
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import named_arguments
+
+BALANCED = 1e-9
+"""Body lengths by which the weights of feet may press beside the centre of mass and count as beneath it."""
 
 
 @named_arguments
@@ -47,6 +49,9 @@ class Chain(Links):
     weights : tuple of float
         Of the links from tail to head, in parts of the body's weight, 1; by default in proportion to their lengths. What a
         law says of a length is multiplied by the weight per length there, so drag of a fluid goes with the default only.
+    feet : int or tuple of Foot
+        What it stands on: so many on each link, evenly spread (one: its middle), or a `Foot` or `Wheel` each. By default the
+        links lie on the floor along their length.
 
     Examples
     --------
@@ -69,8 +74,12 @@ class Chain(Links):
 
     @property
     def n_force(self) -> int:
-        """Tangential and normal force and couple of every link."""
-        return 3 * self.n_link
+        """Those of what touches the floor."""
+        return self.contact.n_force
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        return self.contact.force_names
 
     @property
     def symmetries(self) -> tuple[str, ...]:
@@ -86,7 +95,10 @@ class Chain(Links):
         wide = f", {self.width:.4g} wide" if self.width else ""
         heavy = f", of weights {', '.join(f'{weight:.4g}' for weight in self.weights)}" if self.weights else ""
         lengths = ", ".join(f"{length:.4g}" for length in self.lengths)
-        return f"links of lengths {lengths} from the tail{wide} [body lengths]{heavy}"
+        stands = f", on {len(self.standing_on)} feet" if self.feet else ""
+        if self.largest_imbalance > BALANCED:
+            stands += f" (whose weights press up to {self.largest_imbalance:.3g} beside the centre of mass)"
+        return f"links of lengths {lengths} from the tail{wide}{stands} [body lengths]{heavy}"
 
     def sliding(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Sliding:
         now = instant(self, friction, angles, rates, z, delta)
@@ -94,20 +106,19 @@ class Chain(Links):
         return Sliding(net_force(now.posture, now.force), centre, total_power(now.velocity, now.force))
 
     def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
-        """Laws of the links, scaled like velocities (see `colloc.mechanics.law.Law.scaled_laws`)."""
-        n, posture, length, pressure = self.n_link, self.posture(angles), self.length_column(), self.pressure_column()
-        velocity = self.velocity(posture, rates, z)
-        force = LinkForce(forces[:n, :], forces[n : 2 * n, :], forces[2 * n :, :])
-        laws = friction.scaled_laws(*velocity, length, delta, LinkForce(*(part / pressure for part in force)))
+        """Laws scaled like velocities (see `colloc.mechanics.law.Law.scaled_laws`)."""
+        posture, contact = self.posture(angles), self.contact
+        velocity, force = self.velocity(posture, rates, z), contact.on_links(forces)
+        laws = contact.laws(friction, velocity, forces, delta)
         stack = namespace(angles, z, forces).stack
         centre = stack(list(self.centre_velocity(posture, velocity)))
         return Lifted(stack(laws), net_force(posture, force), centre, total_power(velocity, force))
 
     def forces(self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array) -> Array:
-        return namespace(angles, rates, z).stack(list(instant(self, friction, angles, rates, z, delta).force))
+        return self.contact.forces(friction, self.velocity(self.posture(angles), rates, z), delta)
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        return friction.largest_link_forces(self.length_column()) * np.tile(self.pressure_column(), (3, 1))
+        return self.contact.largest_forces(friction)
 
     def solve(
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, *, start: np.ndarray | None = None,
@@ -134,14 +145,10 @@ class Chain(Links):
         return all_balanced_velocities(self, friction, angles, rates, delta)
 
     def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
-        """Speed of the slowest point of each link, or tangential speed where directions differ; none where nothing is dry."""
-        velocity = self.velocity(self.posture(angles), rates, z)
-        if not friction.regularised:
-            return velocity.vs[:0]
-        if not friction.reversible:
-            return np.abs(velocity.vs)
-        beyond = np.maximum(np.abs(velocity.vn) - 0.5 * self.length_column() * np.abs(velocity.w), 0.0)
-        return np.hypot(velocity.vs, beyond)
+        """Speed of the slowest point of each link, or of each foot; along it where directions differ; none where nothing is
+        dry."""
+        law, velocity = self.law(friction), self.velocity(self.posture(angles), rates, z)
+        return self.contact.slowness(law, velocity) if law.regularised else velocity.vs[:0]
 
     @property
     def limited(self) -> np.ndarray:
@@ -204,20 +211,41 @@ class Chain(Links):
         self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray, count: int = ARROWS
     ) -> tuple[np.ndarray, np.ndarray]:
         posture = self.posture(angles)
-        velocity, many = self.velocity(posture, rates, z), max(2, count // self.n_link)
-        places, forces = [], []
-        for share in (np.arange(many) + 0.5) / many - 0.5:
-            along = share * self.length_column()
-            own = friction.density(velocity.vs, velocity.vn + along * velocity.w, delta)
-            fs, fn = (self.pressure_column() * part for part in own)
-            places.append([posture.x + along * posture.cos, posture.y + along * posture.sin])
-            forces.append([fs * posture.cos - fn * posture.sin, fs * posture.sin + fn * posture.cos])
-        return np.concatenate(places, axis=1), np.concatenate(forces, axis=1)
+        fs, fn = self.contact.at_points(friction, self.velocity(posture, rates, z), delta, count)
+        cos, sin = (part[self.contact.points(count)[0]] for part in posture[:2])
+        return self._points(angles, count), np.stack([fs * cos - fn * sin, fs * sin + fn * cos])
+
+    def _points(self, angles: np.ndarray, count: int) -> np.ndarray:
+        """Where it touches the floor, at about `count` points of a line, ``(2, n_point, n_time)``."""
+        link, *at = self.contact.points(count)
+        cos, sin, x, y = (part[link] for part in self.posture(angles))
+        along, offset = (part[:, None] for part in at)
+        return np.stack([x + along * cos - offset * sin, y + along * sin + offset * cos])
 
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
-        """Of the midpoints of the links."""
-        velocity = self.velocity(self.posture(angles), rates, z)
-        return "link", np.hypot(velocity.vs, velocity.vn)
+        """Of the midpoints of the links, or of the feet."""
+        return self.contact.speeds(self.velocity(self.posture(angles), rates, z))
+
+    def foot_places(self, angles: np.ndarray) -> np.ndarray:
+        return self._points(angles, self.n_link) if self.feet else np.zeros((2, 0, angles.shape[1]))
+
+    def imbalance(self, angles: np.ndarray) -> np.ndarray:
+        if not self.feet:
+            return np.zeros(angles.shape[1])
+        weight = np.array([foot.weight for foot in self.standing_on])
+        pressed = np.einsum("f,cft->ct", weight, self.foot_places(angles))
+        return np.hypot(*(pressed - self.centre(angles)))
+
+    @property
+    def largest_imbalance(self) -> float:
+        """`imbalance` at the worst shape, whatever the limits of the joints."""
+        path, weights = self.weighted_path(None), self.weight_column()[:, 0]
+        arms = -(weights @ path).astype(complex)
+        for foot in self.standing_on:
+            weight = float(foot.weight or 0.0)
+            arms += weight * path[foot.link]
+            arms[foot.link] += weight * ((foot.place - 0.5) * self.lengths[foot.link] + 1j * foot.offset)
+        return float(np.abs(arms).sum()) if self.feet else 0.0
 
     def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         link = self.velocity(self.posture(angles), rates, z)

@@ -28,6 +28,7 @@ def chain_motion(
 
     Under a load the actuators' power is that of friction less the load's.
     """
+    friction = body.law(friction)
     library, moving = native_kernel(body, friction), Moving(body, friction, angles, rates, delta, load)
     if library is None:
         return _named(_by_anchor(_values, (7,), moving, solved))
@@ -45,6 +46,7 @@ def chain_slopes(
 ) -> tuple[BalancedMotion, np.ndarray]:
     """The motion, and derivatives ``(6, 2 n_joint, n_time)`` of (z, centre, power) with respect to (angles, rates); under a
     load two columns more, with respect to its components."""
+    friction = body.law(friction)
     library, moving = native_kernel(body, friction), Moving(body, friction, angles, rates, delta, load)
     if library is not None:
         values, slopes = compiled_motion(library, moving, solved.anchor, solved.anchor_velocity, with_slopes=True)

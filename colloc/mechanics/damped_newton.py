@@ -183,8 +183,9 @@ def iterate(
 
     def evaluated(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """With the merit ``(n,)`` that a step has to reduce: the potential if there is one, else half the squared residual."""
-        state, force, potential = batch.evaluate(select, z, delta)
-        return state, force, 0.5 * np.sum(force * force, axis=0) if potential is None else potential
+        with np.errstate(over="ignore", invalid="ignore"):  # a step that leads so far away is not taken
+            state, force, potential = batch.evaluate(select, z, delta)
+            return state, force, 0.5 * np.sum(force * force, axis=0) if potential is None else potential
 
     n_time = z.shape[1]
     z = z.copy()

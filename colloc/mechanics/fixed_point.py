@@ -69,8 +69,7 @@ class _Batch:
     def slowest(self, z: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The slowest link of every instant, and the velocity of its midpoint, for z in the batch's own reference."""
         velocity = self.at(np.arange(z.shape[1]), z, delta).velocity
-        half = 0.5 * self.body.length_column()
-        anchor = np.argmin(np.abs(velocity.vs) + np.abs(velocity.vn) + half * np.abs(velocity.w), axis=0)
+        anchor = np.argmin(self.body.contact.slowest(velocity), axis=0)
         return anchor, self.rereferenced(z, delta, anchor)
 
     def rereferenced(self, z: np.ndarray, delta: np.ndarray, anchor: np.ndarray) -> np.ndarray:
@@ -172,24 +171,34 @@ def solve_balance(
         if load.shape != (2, n_time) or not np.isfinite(load).all():
             raise ProblemError(f"load must be finite with shape (2, {n_time}).")
     settings = float(tolerance), int(max_iterations), method
+    friction = body.law(friction)
     library = native_kernel(body, friction)
 
     solved = _numpy_balance if library is None else partial(compiled_balance, library)
     moving = Moving(body, friction, angles, rates, float(delta), load)
     found = _balanced(solved, moving, start, *settings) if method == "auto" else solved(moving, start, *settings)
     z, residual, iterations, anchor, velocity = found
-    return BalanceSolution(z, residual, iterations, residual <= tolerance, anchor, velocity)
+    return BalanceSolution(z, residual, iterations, residual <= _reachable(moving, tolerance), anchor, velocity)
+
+
+def _reachable(moving: Moving, tolerance: float) -> np.ndarray:
+    """The tolerance, or what rounding leaves of the forces where that is more, ``(n_time,)``."""
+    rounding, speed = moving.body.contact.rounding, np.abs(moving.rates).max(axis=0)
+    if not rounding:
+        return np.full(speed.size, tolerance)
+    return np.maximum(tolerance, rounding / relative_delta(moving.delta, np.maximum(speed, np.finfo(float).tiny))[0])
 
 
 def _balanced(
     solved: Callable[..., Found], moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> Found:
     """What `solved` finds directly, with each link at rest, from where friction is smoother, and last by the method given."""
-    found, middle = solved(moving, start, tolerance, max_iterations, "direct"), moving.body.n_link // 2
+    found = solved(moving, start, tolerance, max_iterations, "direct")
+    enough, contact = _reachable(moving, tolerance), moving.body.contact
 
     def again(begun: Callable[[Moving], np.ndarray | None], how: str = "direct") -> None:
         """Try anew where nothing was found yet."""
-        failed = np.flatnonzero(~(found[1] <= tolerance))
+        failed = np.flatnonzero(~(found[1] <= enough))
         if failed.size:
             there = moving.at(failed)
             new = solved(there, begun(there), tolerance, max_iterations, how)
@@ -200,9 +209,9 @@ def _balanced(
     def smoother(there: Moving) -> np.ndarray:
         return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
 
-    # unequal coefficients: the balance may have folds, beside which steps end; one of the links rests nearly
-    for link in (middle, *(link for link in range(moving.body.n_link) if link != middle)):
-        again(partial(Moving.with_link_at_rest, link=link))
+    # unequal coefficients: the balance may have folds, beside which steps end; one of the links, or feet, rests nearly
+    for rest in (*contact.rests, *contact.further_rests):
+        again(partial(Moving.at_rest, rest=rest))
     if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
         # several rest nearly, each where the others let it
         again(smoother)

@@ -8,7 +8,7 @@ or CasADi; forces are per length.
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -104,6 +104,17 @@ class Law(Protocol):
     @property
     def kernel_source(self) -> str:
         """C that the kernel is compiled with (own_law.h); empty where it has the law in closed form."""
+
+
+class KernelLaw(NamedTuple):
+    """The law of what touches the floor as the compiled kernel takes it."""
+
+    numbers: tuple[float, ...]
+    """Empty where it does not know the law."""
+    defines: tuple[str, ...] = ()
+    """What the kernel is compiled with; nothing for the usual one."""
+    own_law: str = ""
+    """C of the law (own_law.h)."""
 
 
 def rate_independent(law: Law) -> bool:

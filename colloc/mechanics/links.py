@@ -10,10 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.feet import Foot, checked_feet, read_alike_from_both_ends
+from colloc.mechanics.floor_contact import FloorContact, LineContact, PointContact
+from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import STATED_IF_SET, is_number
 from colloc.system.errors import ProblemError
@@ -49,6 +53,8 @@ class Links:
     """Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines."""
     weights: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
     """Of the links, in parts of the body's; by default the body is as heavy everywhere."""
+    feet: tuple[Foot, ...] | int = field(default=(), metadata=STATED_IF_SET)
+    """What it stands on, from tail to head; by default the links lie on the floor along their length."""
 
     def __post_init__(self) -> None:
         lengths, width = _numbers("lengths", self.lengths), self.width
@@ -63,6 +69,23 @@ class Links:
             _check_parts("weights", weights, "the body's weight")
         for name, value in (("lengths", lengths), ("width", float(width)), ("weights", weights)):
             object.__setattr__(self, name, value)
+        object.__setattr__(self, "feet", checked_feet(self.feet, self.weight_column()[:, 0]))
+
+    @property
+    def standing_on(self) -> tuple[Foot, ...]:
+        """The feet, one by one."""
+        return () if isinstance(self.feet, int) else self.feet
+
+    @cached_property
+    def contact(self) -> FloorContact:
+        """What touches the floor."""
+        if feet := self.standing_on:
+            return PointContact(np.array(self.lengths), feet)
+        return LineContact(self.length_column(), self.pressure_column())
+
+    def law(self, friction: Law) -> Law:
+        """The law of friction of what touches the floor, where the problem states `friction`."""
+        return self.contact.law(friction)
 
     @property
     def in_series(self) -> bool:
@@ -79,8 +102,9 @@ class Links:
 
     @property
     def symmetric(self) -> bool:
-        """Lengths and weights read the same from both ends."""
-        return all(np.allclose(own, own[::-1], rtol=0, atol=1e-14) for own in (self.lengths, self.weights))
+        """Lengths, weights and feet read the same from both ends."""
+        alike = all(np.allclose(own, own[::-1], rtol=0, atol=1e-14) for own in (self.lengths, self.weights))
+        return alike and read_alike_from_both_ends(self.standing_on, self.n_link)
 
     def length_column(self) -> np.ndarray:
         """Lengths as an ``(n_link, 1)`` column."""
@@ -111,6 +135,10 @@ class Links:
     def tangent_angles(self, angles: Array) -> Array:
         """Link tangent angles in the body frame, ``(n_link, n_time)``, from joint angles ``(n_joint, n_time)``."""
         return namespace(angles).matmul(self._joint_sum(TAIL), angles)
+
+    def relative_turning(self, rates: np.ndarray, link: int) -> np.ndarray:
+        """How fast the links turn relative to one of them, ``(n_link, n_time)``."""
+        return self._joint_sum(link) @ rates
 
     def posture(self, angles: Array, reference: int | None = TAIL) -> Posture:
         """Directions and midpoints of the links in the body frame, from joint angles ``(n_joint, n_time)``."""

@@ -52,8 +52,8 @@ _switched_off = False
 
 def native_kernel(body: Links = _ANY, friction: Law = _USUAL) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do: the one place that decides between them."""
-    known = body.in_series and friction.kernel_numbers and not _switched_off
-    return library(friction.kernel_source) if known else None
+    law = body.contact.kernel_law(friction)
+    return library(law.defines, law.own_law) if body.in_series and law.numbers and not _switched_off else None
 
 
 @contextlib.contextmanager
@@ -68,10 +68,11 @@ def numpy_instead() -> Iterator[None]:
 
 
 @cache
-def library(own_law: str = "") -> ctypes.CDLL | None:
-    """The kernel, loaded, and compiled before if need be, by itself or with a law's own C; None if that cannot be, with a
-    `SlowWarning` unless nobody wants it."""
-    flags, headers = ((*_FLAGS, "-DOWN_LAW"), {"own_law.h": own_law}) if own_law else (_FLAGS, {})
+def library(defines: tuple[str, ...] = (), own_law: str = "") -> ctypes.CDLL | None:
+    """The kernel, loaded, and compiled before if need be, by itself, for feet or with a law's own C; None if that
+    cannot be, with a `SlowWarning` unless nobody wants it."""
+    flags = (*_FLAGS, *(f"-D{name}" for name in defines))
+    headers = {"own_law.h": own_law} if own_law else {}
     try:
         with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
             file = kept_library("kernel", sources, _MAIN, flags, headers)
@@ -99,7 +100,8 @@ def address(array: np.ndarray | None) -> int | None:
 
 def _call(function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object) -> None:
     """Call a function of the kernel for all instants: with the chain, the law and the instants of a piece, then arguments."""
-    numbers = np.array(body.lengths), body.pressure_column().ravel(), np.array(friction.kernel_numbers, dtype=float)
+    law = np.array(body.contact.kernel_law(friction).numbers, dtype=float)
+    numbers = np.array(body.lengths), body.pressure_column().ravel(), law
     chain = (body.n_link, *map(address, numbers), n_time)
     _each_piece(n_time, lambda first, last: function(*chain, first, last, *arguments))
 

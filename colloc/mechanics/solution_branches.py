@@ -60,12 +60,11 @@ def all_balanced_velocities(
     >>> found.number, found.z[:, 2, 0].round(3), found.sign[:, 0]
     (array([3]), array([2.998, 2.96 , 2.994]), array([ 1.,  1., -1.]))
     """
+    friction = body.law(friction)
     moving = Moving(body, friction, angles, rates, delta, load)
     if friction.associated:
         return Branches(*_solved(moving, np.zeros((1, 3, angles.shape[1])), "auto"))
-    middle = body.n_link // 2
-    order = (middle, *(link for link in range(body.n_link) if link != middle))
-    z, sign = _solved(moving, np.stack([moving.with_link_at_rest(link) for link in order]))
+    z, sign = _solved(moving, np.stack([moving.at_rest(rest) for rest in body.contact.rests]))
     found = _distinct(z, sign, _speed(rates))
     doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
     if not doubtful.size:
@@ -88,7 +87,7 @@ def _solved(moving: Moving, starts: np.ndarray, method: str = "direct") -> tuple
     body, friction, angles, rates, delta, load = tiled = moving.at(np.tile(np.arange(n_time), count))
     at, start = (body, friction, angles, rates, delta), np.concatenate(list(starts), axis=1)
     solved = solve_balance(*at, load=load, start=start, tolerance=_TOLERANCE, method=method)
-    sign = np.where(solved.residual <= _ACCEPTED, np.sign(_determinant(tiled, solved)), 0.0)
+    sign = np.where((solved.residual <= _ACCEPTED) | solved.converged, np.sign(_determinant(tiled, solved)), 0.0)
     return np.stack(np.split(solved.z, count, axis=1)), sign.reshape(count, -1)
 
 

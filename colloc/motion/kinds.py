@@ -229,7 +229,7 @@ class SlowOnSlope:
 
 def kind_of_motion(problem: Problem, friction: Law | None = None) -> Kind:
     """How the body of a problem moves, or would under another law of friction."""
-    body, law, slope = problem.body, problem.friction if friction is None else friction, problem.slope
+    body, law, slope = problem.body, problem.law if friction is None else friction, problem.slope
     return SlowOnLevel(body, law, problem.gait.motion_symmetry) if slope is None else SlowOnSlope(body, law, slope)
 
 

@@ -156,6 +156,7 @@ def slow_enough(
     if loss > 0.5:
         raise ProblemError(f"loss must be at most 0.5, not {loss!r}.")
     chain, known = checked_inertia(body, gait), np.nan
+    friction = chain.law(friction)
     for intervals in _INTERVALS * 2 ** np.arange(_DOUBLED):
         edges = np.union1d(np.linspace(0.0, 1.0, intervals + 1), np.asarray(breaks, dtype=float))
         before, known = known, _froude(GaitOnMesh(chain, friction, gait, Mesh(scheme(SCHEME), edges)), friction, delta, loss)

@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.pictures.motion_frames import lab_outline
+from colloc.pictures.motion_frames import holding, lab_feet, lab_outline
 from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours
 from colloc.results.solution import Solution
 
@@ -35,7 +35,8 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     t = np.linspace(0.0, 1.0, count)
     motion = solution.sample(t)
     x, y = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
-    rise = float(np.ptp(y))
+    feet = lab_feet(solution.problem.body, motion.angles, motion.theta, motion.tail)
+    held, rise = holding(solution, motion), float(np.ptp(y))
     higher = max(1, round(_SEEN / rise)) if 0 < rise < _FLAT else 1
     y = higher * y
     width = np.ptp(x, axis=0)
@@ -45,6 +46,7 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
         draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body)
+        draw_feet(axes, feet[:, :, k] * [[1], [higher]] + [[shift[k]], [0]], held[:, k])
         axes.plot(motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
         axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, -3), color=GREY, **below)
@@ -84,6 +86,12 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body
     axes.plot(*ends[:, -1:], "o", color=colour, ms=5)
 
 
+def draw_feet(axes: Axes, places: np.ndarray, held: np.ndarray) -> None:
+    """Feet at places ``(2, n_foot)``, squares, those that hold filled."""
+    for chosen, colour in ((~held, "white"), (held, VERMILION)):
+        axes.plot(*places[:, chosen], "s", color=colour, mec=VERMILION, ms=3.5)
+
+
 def draw_lab(axes: Axes, solution: Solution) -> None:
     """Paths of the body's ends and its centre of mass in the lab, and the body at both ends of them, apart.
 
@@ -98,10 +106,12 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     periods = max(1, int(np.ceil(needed))) if apart else 1
     fine = solution.sample(np.linspace(0.0, periods, 600 * periods + 1))
     ends = lab_outline(solution.problem.body, fine.angles, fine.theta, fine.tail)
+    feet, held = lab_feet(solution.problem.body, fine.angles, fine.theta, fine.tail), holding(solution, fine)
     for path, colour, name in ((ends[:, 0], BLUE, "tail"), (ends[:, -1], ORANGE, "head"), (fine.centre, VERMILION, "centre")):
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
         draw_body(axes, ends[:, :, k], shade, solution.problem.body)
+        draw_feet(axes, feet[:, :, k], held[:, k])
         axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
     axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]")

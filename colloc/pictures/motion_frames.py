@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
-from colloc.results.motion import RigidMotion, turned
+from colloc.results.motion import RigidMotion, SampledMotion, turned
 from colloc.results.solution import Solution
 
+_HOLDS = 3.0
+"""Speed of a foot, in delta, up to which it holds: below friction is less than 95 % of what it can be."""
 _ARROW = 0.12
 """Length [body lengths] of the arrow of the largest friction."""
 
@@ -27,6 +29,8 @@ class Frames:
     arrow_base: np.ndarray
     arrow: np.ndarray
     """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow, n_time)`` each."""
+    holding: np.ndarray
+    """Of feet, which stand at the bases of the arrows: those that hold, ``(n_foot, n_time)``; no rows for a body without."""
     before: tuple[RigidMotion, ...]
     """What the periods before do to each one that is shown, the first of which has none before."""
 
@@ -48,6 +52,19 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
     return tail[:, None] + turned(np.stack(body.outline(angles)), theta)
 
 
+def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
+    """Lab positions of the feet of a body, ``(2, n_foot, n_time)``; no rows where it has none."""
+    return tail[:, None] + turned(body.foot_places(angles), theta)
+
+
+def holding(solution: Solution, motion: SampledMotion) -> np.ndarray:
+    """Which feet of a body hold at instants of its motion, ``(n_foot, n_time)``; no rows where it has none."""
+    body = solution.problem.body
+    if not body.foot_places(motion.angles).size:
+        return np.zeros((0, motion.t.size), dtype=bool)
+    return body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * solution.delta_per_period
+
+
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
     """Sample a solution's motion at `count` instants, both ends of the period included, and the friction that acts on it at
     about so many arrows along the body; `periods` are shown in a row."""
@@ -55,7 +72,7 @@ def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: 
     body, delta = problem.body, solution.delta_per_period
     motion = solution.sample(np.linspace(0.0, 1.0, count))
     ends = lab_outline(body, motion.angles, motion.theta, motion.tail)
-    places, forces = body.rubbing(problem.friction, motion.angles, motion.rates, delta, motion.z, arrows)
+    places, forces = body.rubbing(problem.law, motion.angles, motion.rates, delta, motion.z, arrows)
     period = RigidMotion(float(motion.theta[-1] - motion.theta[0]), complex(*(motion.centre[:, -1] - motion.centre[:, 0])))
     return Frames(
         motion.t,
@@ -64,5 +81,6 @@ def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: 
         motion.centre,
         motion.tail[:, None] + turned(places, motion.theta),
         turned(forces, motion.theta),
+        holding(solution, motion),
         tuple(period.repeated(k) for k in range(periods)),
     )

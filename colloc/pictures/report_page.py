@@ -37,6 +37,7 @@ PLAIN = {
     "joint limits": "No joint bends further than it may, at any instant.",
     "tangent angle": "The body bends no further from its own direction than it may, so that it cannot cross itself.",
     "self-contact": "No part of the body passes through another, at any instant.",
+    "statics": "How far the weights its feet are given press beside its centre of mass; a real body shifts its weight by that.",
     "actuators": "No joint has to do more than it can, at any instant.",
     "replay gap": "An independent replay of the motion finds the same value.",
     "replay error": "The replay itself is as exact as was asked for.",
@@ -189,6 +190,7 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     data: dict[str, Any] = {name: np.round(row, 4).tolist() for name, row in rows.items()}
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
+        "holding": shown.holding.astype(int).tolist(),
         "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
         "before": [np.array([np.exp(1j * b.rotation), b.shift]).view(float).round(6).tolist() for b in shown.before],
         "arrowScale": shown.arrow_scale, "grid": grid,

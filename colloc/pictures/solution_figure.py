@@ -47,7 +47,7 @@ def _headline(solution: Solution) -> str:
         near = f" with {relaxed.best.corners} corners, relaxed {relaxed.certificate.efficiency:.5f}"
     return (
         f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}{near}   "
-        f"{problem.friction.label},  δ = {solution.answer.delta:.0e}{verdict}\n"
+        f"{problem.law.label},  δ = {solution.answer.delta:.0e}{verdict}\n"
         f"class: {problem.gait.describe()}{'' if problem.slope is None else f';  {problem.slope.describe()} (x: uphill)'}"
         f"{f';  {solution.turning}' if solution.turning else ''}"
     )

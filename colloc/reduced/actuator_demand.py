@@ -40,12 +40,12 @@ _PHASES = np.arange(64) / 64
 def check_actuators_suffice(problem: Problem) -> None:
     """A `ProblemError` if no gait of a problem keeps the limits on its joints' torques and powers, whatever its efficiency."""
     limits = problem.actuator_limits
-    if not limits.names or problem.slope is not None or problem.friction.degree is None or _guess_keeps(problem):
+    if not limits.names or problem.slope is not None or problem.law.degree is None or _guess_keeps(problem):
         return
     stated = " and ".join(name for name in ("torque_limit", "power_limit") if getattr(problem, name) is not None)
     distance = max((least for aim, least in problem.at_least if aim.expression == "distance"), default=0.0)
-    needed = problem.friction.smallest * distance
-    if limits.power and problem.friction.degree == 0 and sum(limits.power) < needed:
+    needed = problem.law.smallest * distance
+    if limits.power and problem.law.degree == 0 and sum(limits.power) < needed:
         raise ProblemError(
             f"no gait keeps power_limit and goes as far as at_least asks: a distance of {distance:g} takes a power of "
             f"{needed:.3g} on average, and the joints together may deliver {sum(limits.power):.3g}."
@@ -90,7 +90,7 @@ def least_share(problem: Problem, enough: float = 0.0) -> float:
 
 def least_share_without_cusps(problem: Problem) -> float:
     """The same of torques, as every gait without cusps needs it somewhere; 0 where the class has others that go anywhere."""
-    limits, law = ActuatorLimits(torque=problem.actuator_limits.torque), problem.friction
+    limits, law = ActuatorLimits(torque=problem.actuator_limits.torque), problem.law
     if not (limits.names and problem.gait.without_cusps and problem.body.n_joint == 2 and law.reversible and law.degree == 0):
         return 0.0
     each = (np.linspace(-most, most, _SHAPES) for most in of_each(problem.joint_limit, 2))
@@ -131,7 +131,7 @@ def _senses(limits: ActuatorLimits) -> np.ndarray:
 
 def _shares(problem: Problem, limits: ActuatorLimits, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """In every sense that counts, ``(n_row, n)``."""
-    body, law, delta = problem.body, problem.friction, _delta(problem, rates)
+    body, law, delta = problem.body, problem.law, _delta(problem, rates)
     z = body.solve(law, angles, rates, delta).z
     return _senses(limits) @ limits.shares_in_balance(body, law, angles, rates, z, delta)
 
@@ -141,7 +141,7 @@ def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
 
     Variables are (y, direction, s); s is what all shares are below, in units of the first value.
     """
-    n, limits, body, law = problem.body.n_joint, problem.actuator_limits, problem.body, problem.friction
+    n, limits, body, law = problem.body.n_joint, problem.actuator_limits, problem.body, problem.law
     on_angles, on_rates = np.array(of_each(problem.joint_limit, n)), np.full(n, _slowest_pace(problem))
 
     def room(x: np.ndarray) -> np.ndarray:

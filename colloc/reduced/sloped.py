@@ -18,7 +18,7 @@ class SlopeSpace(HarmonicSpace):
         v = super().parameters(gait)
         if np.isnan(v[-1]):
             problem, v[-1] = self.problem, 0.0
-            kind = SlowOnLevel(problem.body, problem.friction, problem.gait.motion_symmetry)
+            kind = SlowOnLevel(problem.body, problem.law, problem.gait.motion_symmetry)
             level = ReducedMotion(kind, self.mesh, self)
             v[-1] = (problem.towards or 0.0) - np.angle(level.at(v, problem.delta_start).pose.place[-1])
         return v

@@ -37,7 +37,7 @@ class CollocatedMotion:
     def sliding(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> Sliding:
         """The body with given tail velocities."""
         delta = np.full((1, z.shape[1]), self.delta)
-        return self.problem.body.sliding(self.problem.friction, angles, rates, z, delta)
+        return self.problem.body.sliding(self.problem.law, angles, rates, z, delta)
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -47,7 +47,7 @@ class CollocatedMotion:
             unit = self.gait.speed_unit
             return x[layout.angles], unit * x[layout.rates], unit * x[layout.z]
         angles, rates = self.gait(self.mesh.times)
-        return angles, rates, problem.body.solve(problem.friction, angles, rates, self.delta).z
+        return angles, rates, problem.body.solve(problem.law, angles, rates, self.delta).z
 
     @cached_property
     def at_points(self) -> Sliding:
@@ -55,7 +55,7 @@ class CollocatedMotion:
         now, slope = self.sliding(*self._points), self.problem.slope
         if slope is None:
             return now
-        chain = checked_chain(self.problem.body, self.problem.friction, slope.grade)
+        chain = checked_chain(self.problem.body, self.problem.law, slope.grade)
         pull = load_wrench(chain, chain.posture(self._points[0]), slope.pull(self._theta[None]))
         return now._replace(force=now.force + pull)
 

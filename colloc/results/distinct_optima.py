@@ -143,7 +143,7 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     for outcome in solved:
         path = fourier_series(problem, outcome.gait)
         for members, near in found:
-            if are_one((members[0].value, near), (outcome.value, path), problem.body, problem.friction):
+            if are_one((members[0].value, near), (outcome.value, path), problem.body, problem.law):
                 members.append(outcome)
                 break
         else:

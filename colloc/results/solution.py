@@ -182,7 +182,7 @@ class Solution:
         """
         if self.problem.slope is not None:
             raise ProblemError("on a slope it is not known how slow is slow enough.")
-        at = self.problem.body, self.problem.friction, self.gait, self.answer.delta_per_period
+        at = self.problem.body, self.problem.law, self.gait, self.answer.delta_per_period
         return slow_enough(*at, loss, breaks=self.gait.corner_phases)
 
     @property

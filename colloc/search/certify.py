@@ -11,6 +11,7 @@ from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.gaits.symmetry import NONE
+from colloc.mechanics.chain import BALANCED
 from colloc.results.answer import REALISED, Answer
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
@@ -24,6 +25,8 @@ change is the body's own (`colloc.mechanics.bodies.Usual`)."""
 MOTIONS = 1e-2
 """Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
 
+_ANY_LEAN = 1.0
+"""Body lengths: reported, not judged. A real body would shift its weight between its feet, which the model does not."""
 ASTRAY, SEVERAL = 1e-3, 1e-3
 """On a slope: angle off the direction that was asked for; part of the period at which the motion is left open."""
 
@@ -63,8 +66,8 @@ def is_trivial(answer: Answer) -> bool:
     """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
     problem = answer.problem
     if problem.slope is not None:
-        return in_unit(answer.value, 1 / friction_unit(problem.friction), problem.objective) < NOWHERE
-    if abs(answer.efficiency) * problem.friction.smallest >= TRIVIAL_EFFICIENCY:
+        return in_unit(answer.value, 1 / friction_unit(problem.law), problem.objective) < NOWHERE
+    if abs(answer.efficiency) * problem.law.smallest >= TRIVIAL_EFFICIENCY:
         return False
     theta = answer.x[answer.layout.theta[0]]
     return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
@@ -144,7 +147,7 @@ def gait_certificate(
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
     settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "slope": problem.slope}
-    known = measured(problem.body, problem.friction, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
+    known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
         *before,
@@ -178,7 +181,7 @@ def gait_certificate(
 
 
 def _first_order(answer: Answer) -> list[Check]:
-    residual = np.abs(answer.motion.at_points.force).max() / answer.problem.friction.largest
+    residual = np.abs(answer.motion.at_points.force).max() / answer.problem.law.largest
     return [
         Check("KKT error", max(answer.kkt_error, answer.complementarity), KKT, "gradient of the Lagrangian, complementarity"),
         Check("constraint violation", answer.violation, VIOLATION, "largest violated equation or bound"),
@@ -218,6 +221,9 @@ def _motion(
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
     ]
+    if (lean := float(body.imbalance(angles).max())) > BALANCED:
+        beside = "way from the centre of mass to where the feet's weights press [body lengths]; reported, not judged"
+        checks.append(Check("statics", lean, _ANY_LEAN, beside))
     if claimed is not None:
         gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
@@ -273,7 +279,7 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
     if problem.slope is not None:
         meaning = "part of the period at which several motions are balanced; what they would change is not measured"
         return Check("one motion", fine.several, SEVERAL, meaning)
-    if problem.friction.associated:
+    if problem.law.associated:
         meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:
         meaning = "relative; other balanced motions of a smooth body are not looked for"

@@ -16,7 +16,6 @@ SMALLEST_DELTA = 1e-9
 that is solved for resolves 1e-16, so the gradient is known to about 1e-16/delta. Measured on one harmonic of three links: a KKT
 error of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9 and 2e-6 at 1e-10, where 1e-6 is allowed."""
 _COMPONENTS = ("force along the tail", "force across the tail", "torque about the tail")
-_LAWS = ("tangential force", "normal force", "couple")
 _PATH = {
     "path": "the joining of arcs to a path",
     "closure": "closure of the path",
@@ -57,8 +56,7 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         return f"the balance of {_COMPONENTS[component]}", float(mesh.times[point])
     if name == "force law":
         point, which = divmod(index, body.n_force)
-        kind, link = divmod(which, body.n_force // 3)
-        return f"the friction law of the {_LAWS[kind]} on link {link + 1}", float(mesh.times[point])
+        return f"the friction law of the {body.force_names[which]}", float(mesh.times[point])
     if name == ACTUATORS:
         point, which = divmod(index, len(transcription.problem.actuator_limits.names))
         return f"the limit on the {transcription.problem.actuator_limits.names[which]}", float(mesh.times[point])

@@ -174,7 +174,7 @@ def same_gait(problem: Problem, a: Optimum, b: Optimum) -> bool:
     if abs(a.objective - b.objective) > SAME_VALUE * max(abs(a.objective), abs(b.objective)):
         return False  # before the paths are transformed
     one, other = ((f.objective, fourier_series(problem, f.gait)) for f in (a, b))
-    return are_one(one, other, problem.body, problem.friction)
+    return are_one(one, other, problem.body, problem.law)
 
 
 def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:

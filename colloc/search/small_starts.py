@@ -48,7 +48,7 @@ def small_loops(problem: Problem) -> list[AnyGait]:
     list
         Gaits of the class that starts are drawn from, best first.
     """
-    if not rate_independent(problem.friction):
+    if not rate_independent(problem.law):
         return []
     own, loops = seed_class(problem), []
     for small, shape in _best_small_gaits(problem)[:_SHAPES]:
@@ -61,7 +61,7 @@ def small_loops(problem: Problem) -> list[AnyGait]:
 
 def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
     """The best small gait at every shape that was drawn, with the shape, best first; of equally good ones one."""
-    body, friction, shapes = problem.body, problem.friction, _drawn_shapes(problem)
+    body, friction, shapes = problem.body, problem.law, _drawn_shapes(problem)
     directions = np.hstack([one_joint(body.n_joint, half=False), unit_directions(body.n_joint, _DIRECTIONS, half=False)])
     count, delta = directions.shape[1], _DRY * problem.delta_start
     angles, rates = np.repeat(shapes, count, axis=1), np.tile(directions, shapes.shape[1])

@@ -31,6 +31,7 @@ class SmoothBody:
     formulations: tuple[str, ...] = (IMPLICIT,)
     """Forces on all nodes as variables would be too many for a full program."""
     n_force = 0
+    force_names: tuple[str, ...] = ()
     looks_for_all_velocities = False
     hinges = slice(0, 0)
     drawn_width = 0.0
@@ -93,6 +94,15 @@ class SmoothBody:
     def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
         """None: a point at rest moves along the body, and does not come and go."""
         return np.empty((0, angles.shape[1]))
+
+    def foot_places(self, angles: np.ndarray) -> np.ndarray:
+        return np.zeros((2, 0, angles.shape[1]))
+
+    def imbalance(self, angles: np.ndarray) -> np.ndarray:
+        return np.zeros(angles.shape[1])
+
+    def law(self, friction: Law) -> Law:
+        return friction
 
     def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
         raise NotImplementedError("a smooth body has no full program.")

@@ -119,7 +119,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
     try:
         found = replayer(problem.slope)(
             problem.body,
-            problem.friction,
+            problem.law,
             gait,
             problem.delta * gait.delta_unit,
             instants=instants,

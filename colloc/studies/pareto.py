@@ -159,5 +159,5 @@ def _value(solution: Solution, aim: Objective) -> float:
     if not np.isnan(value):
         return value
     problem, gait = solution.problem, solution.gait
-    at = (problem.body, problem.friction, gait, solution.delta_per_period)
+    at = (problem.body, problem.law, gait, solution.delta_per_period)
     return replayer(problem.slope)(*at, breaks=gait.corner_phases, objective=aim).value

@@ -109,7 +109,7 @@ def _cell(run: StudyRun, cell: Index, known_bound: KnownBound) -> dict[str, Any]
     row: dict[str, Any] = {"problem_hash": problem.hash, "starts": len(outcomes), "status": NOT_TRIED}
     row["starts_certified"] = sum(o.status == SOLVED for o in outcomes)
     row["seconds"] = sum(o.seconds for o in outcomes)
-    row["trivial_bound"] = 1.0 / problem.friction.smallest if rate_independent(problem.friction) else np.nan
+    row["trivial_bound"] = 1.0 / problem.law.smallest if rate_independent(problem.law) else np.nan
     bound = known_bound(problem)
     row["upper_bound"] = np.nan if bound is None else bound
     row["neighbour_value"], row["below_neighbour"] = run.neighbour_value(cell), int(run.below_neighbour(cell))
@@ -128,7 +128,7 @@ def _gait_row(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     row |= {"mean": gait.mean, "cos": gait.cos, "sin": gait.sin}
     row["at_slowest"] = int(on_speed_floor(problem, outcome.gait))
     if problem.body.n_joint > 1:
-        kind: GaitClass = gait_class(gait, problem.body, problem.friction)
+        kind: GaitClass = gait_class(gait, problem.body, problem.law)
         row |= {name: getattr(kind, name) for name in ("bilateral", "antipodal", "retraced", "winding", "wave", "forward")}
         row["gait_class"] = kind.label
     return row

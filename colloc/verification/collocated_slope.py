@@ -47,7 +47,7 @@ class SlopeCourse(NamedTuple):
 def slope_course(problem: Problem, gait: Any, delta: float, error: float) -> SlopeCourse:
     """The motion of a gait without breaks, delta per period."""
     assert problem.slope is not None
-    body, friction, grade = problem.body, problem.friction, problem.slope.grade
+    body, friction, grade = problem.body, problem.law, problem.slope.grade
     on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
     course = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
     return SlopeCourse(lambda t: course.at(t)[:5], error)

@@ -83,7 +83,7 @@ def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray
     def shares(part: Mapping[str, float]) -> dict[str, float]:
         return _shares(problem, part, length)
 
-    of = (problem.body, problem.friction, gait)
+    of = (problem.body, problem.law, gait)
     return fine_motion(*of, delta, edges, tolerance, shares, problem.uses("driven_work"))
 
 
@@ -156,7 +156,7 @@ class _Own(NamedTuple):
 def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Own:
     problem, gait, delta, fine = known
     nodes = left[:, None] + (right - left)[:, None] * rule.c
-    at = problem.body, problem.friction, gait, delta, nodes
+    at = problem.body, problem.law, gait, delta, nodes
     rates = rates_at(*at, fine.velocity(nodes), problem.uses("driven_work"))
     pose, weights = CollocatedPose(rule, right - left, rates.z[2], rates.centre), (right - left)[:, None] * rule.b
     spent, delivered = (weights * rates.power).sum(axis=1), (weights * rates.driven).sum(axis=1)

@@ -67,7 +67,7 @@ class MeshPlan:
 
 def kink_knots(problem: Problem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
     """Phases of the kinks of a gait's velocities, one for each group of very close ones."""
-    kinks = kink_phases(problem.body, problem.friction, gait, delta, fine)
+    kinks = kink_phases(problem.body, problem.law, gait, delta, fine)
     apart = _ONE_KINK * problem.gait.fraction
     knots: list[float] = []
     for kink in kinks:
@@ -146,7 +146,7 @@ def planned_mesh(
         return _split_on_slope(known, mesh.scheme, knots, tolerance, aim, most_points)
     given = scheme(problem.scheme)
     kinks = kink_knots(problem, gait, delta, fine)
-    switches = not problem.friction.reversible
+    switches = not problem.law.reversible
     best: MeshPlan | None = None
     for rule in _family(given):
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself kinked

@@ -6,18 +6,32 @@
 
 #include <stddef.h>
 
-#ifdef OWN_LAW
-#include "link_quadrature.h"
-#else
-#include "link_friction.h"
-#endif
+#include "vectors.h"
 
 typedef struct {
+    int number;                        /* from 0 at the tail */
     double length, pressure, cos, sin; /* pressure: weight per length over the body's; direction in the body frame */
     double x, y;             /* midpoint, seen from that of the reference */
     double rate;             /* of the joint behind the link (0 at the tail) */
     double load_x, load_y;   /* its share of an outside force on the body */
 } Link;
+
+#if defined FEET
+#include "feet.h"
+#elif defined OWN_LAW
+#include "link_quadrature.h"
+#else
+#include "link_friction.h"
+#endif
+
+#ifndef FEET
+/* How fast the link moves at most, up to a factor: the anchor is where that is least. */
+static inline double slowest_speed(const Sliding *k, const Law *law, const Link *link)
+{
+    (void)law;
+    return fabs(k->vs) + fabs(k->vn) + 0.5 * link->length * fabs(k->w);
+}
+#endif
 
 /* Net force and torque, and what a step has to reduce: the potential less the load's power, or half the squared residual
    without one. */
@@ -35,6 +49,7 @@ static inline void find_directions(
     for (int i = 0; i < n; ++i) {
         if (i > 0)
             phi += angle[(i - 1) * stride];
+        link[i].number = i;
         link[i].length = length[i];
         link[i].pressure = pressure[i];
         link[i].cos = cos(phi);
@@ -145,15 +160,15 @@ static inline Total evaluate(
     Total total = {{0.0, 0.0, 0.0}, 0.0};
     find_velocities(n, link, k, reference, z);
     for (int i = 0; i < n; ++i) {
-        find_roots(&k[i], law, link[i].length, delta);
-        find_force(&k[i], law, link[i].length, link[i].pressure);
+        find_roots(&k[i], law, &link[i], delta);
+        find_force(&k[i], law, &link[i]);
         double f[2];
         outer_force(&link[i], &k[i], f);
         total.force[0] += f[0];
         total.force[1] += f[1];
         total.force[2] += link[i].x * f[1] - link[i].y * f[0] + k[i].couple;
         if (law->associated)
-            total.merit += link[i].pressure * dissipation(&k[i], law, link[i].length) - load_power(&link[i], &k[i]);
+            total.merit += dissipation(&k[i], law, &link[i]) - load_power(&link[i], &k[i]);
     }
     if (!law->associated)
         total.merit = 0.5 * (total.force[0] * total.force[0] + total.force[1] * total.force[1] + total.force[2] * total.force[2]);
@@ -171,9 +186,9 @@ static inline void pull_back(
         const double arm_s = link[i].x * s - link[i].y * c, arm_n = link[i].x * c + link[i].y * s;
         Matrix3 K;
         if (newton)
-            find_slopes(&k[i], law, link[i].length, link[i].pressure, delta, K);
+            find_slopes(&k[i], law, &link[i], delta, K);
         else
-            find_secants(&k[i], law, link[i].length, link[i].pressure, delta, K);
+            find_secants(&k[i], law, &link[i], delta, K);
         for (int j = 0; j < 3; ++j) {
             Vector3 column;
             for (int row = 0; row < 3; ++row)

@@ -132,8 +132,7 @@ static inline bool moved_anchor(const int n, State *s)
     int slowest = 0;
     double least = INFINITY;
     for (int i = 0; i < n; ++i) {
-        const Sliding *k = &s->now[i];
-        const double speed = fabs(k->vs) + fabs(k->vn) + 0.5 * s->link[i].length * fabs(k->w);
+        const double speed = slowest_speed(&s->now[i], &s->law, &s->link[i]);
         if (speed < least)
             least = speed, slowest = i;
     }

@@ -60,7 +60,7 @@ static inline void balance_instants(
 
 /* `load` (2, n_time), in the body's axes, or NULL. Returns 0, or 1 without memory. */
 int colloc_balance(
-    int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
+    int n, const double *length, const double *pressure, const double *law_numbers, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
     const double *angles, const double *rates, double delta, const double *load, const double *start, double tolerance, long long budget,
     int method, double *z, double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
@@ -81,7 +81,7 @@ int colloc_balance(
    derivatives of the first of them with respect to joint angles and rates, and to the load if there is one,
    (DIFFERENTIATED_ROWS, 2 (n - 1) (+ 2), n_time). */
 int colloc_motion(
-    int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
+    int n, const double *length, const double *pressure, const double *law_numbers, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
     const double *angles, const double *rates, double delta, const double *load, const long long *anchor, const double *anchor_velocity,
     double *values, double *slopes)
 {
@@ -111,7 +111,7 @@ int colloc_motion(
         Matrix3 left;
         pull_back(n, link, k, &law, own_delta, true, left);
         for (int i = 0; i < n; ++i)
-            find_slopes(&k[i], &law, link[i].length, link[i].pressure, own_delta, K[i]);
+            find_slopes(&k[i], &law, &link[i], own_delta, K[i]);
         for (int column = 0; column < columns; ++column) {
             const bool of_load = column >= 2 * n_joint, of_rate = column >= n_joint && !of_load;
             if (of_load)
@@ -139,7 +139,7 @@ int colloc_motion(
    velocities and loads in the middle link's axes. Then potential and power (n_time), minus the friction on each link in its own
    axes (n, 3, n_time), force and torque left over (2, n_time), and what power these have (n_time). */
 int colloc_loaded(
-    int n, const double *length, const double *pressure, const double law_numbers[6], ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
+    int n, const double *length, const double *pressure, const double *law_numbers, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
     const double *angles, const double *rates, const double *load, const double *start, double delta, int steps, double *velocity, double *potential,
     double *power, double *forces, double *residual, double *leftover_power)
 {

@@ -57,8 +57,9 @@ static inline double h_series(double q)
 }
 
 /* Fill in a2 to h from vs, vn, w. */
-static inline void find_roots(Sliding *k, const Law *law, double length, double delta)
+static inline void find_roots(Sliding *k, const Law *law, const Link *link, double delta)
 {
+    const double length = link->length;
     const double vs = k->stretched = stretch(law, k->vs) * k->vs;
     const double a2 = vs * vs + delta * delta, half = 0.5 * length * k->w;
     const double y0 = k->vn - half, y1 = k->vn + half;
@@ -77,9 +78,10 @@ static inline void find_roots(Sliding *k, const Law *law, double length, double 
     k->g = 1.0 + q * k->h;
 }
 
-/* Friction on the link from a2 to h; `pressure` multiplies it, here and below. */
-static inline void find_force(Sliding *k, const Law *law, double length, double pressure)
+/* Friction on the link from a2 to h; its pressure multiplies it, here and below. */
+static inline void find_force(Sliding *k, const Law *law, const Link *link)
 {
+    const double length = link->length, pressure = link->pressure;
     const double per_S = 1.0 / k->S, l3 = length * length * length, mu_t = pressure * law->mu_t;
     k->fs = -pressure * tangential(law, k->vs) * k->stretched * 2.0 * length * k->g * per_S;
     k->fn = -mu_t * 2.0 * k->vn * length * per_S;
@@ -100,15 +102,15 @@ static inline double unit_of_force(const Law *law, double delta, double largest_
 }
 
 /* Dissipation potential of the link: mu times the integral of r. */
-static inline double dissipation(const Sliding *k, const Law *law, double length)
+static inline double dissipation(const Sliding *k, const Law *law, const Link *link)
 {
-    return law->mu_t * length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g);
+    return link->pressure * (law->mu_t * link->length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g));
 }
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w). */
-static inline void find_slopes(const Sliding *k, const Law *law, double length, double pressure, double delta, Matrix3 slopes)
+static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 slopes)
 {
-    const double vs = k->stretched, vn = k->vn, w = k->w;
+    const double vs = k->stretched, vn = k->vn, w = k->w, length = link->length, pressure = link->pressure;
     const double mu_s = pressure * tangential(law, k->vs), mu_t = pressure * law->mu_t, more = stretch(law, k->vs);
     const double l3 = length * length * length, per_S = 1.0 / k->S, per_r = 1.0 / k->r0r1;
     const double a2J0 = length * k->S * k->Q * per_r;
@@ -124,8 +126,9 @@ static inline void find_slopes(const Sliding *k, const Law *law, double length, 
 }
 
 /* Minus force over velocity with r frozen: the law of the paper's fixed point. */
-static inline void find_secants(const Sliding *k, const Law *law, double length, double pressure, double delta, Matrix3 secants)
+static inline void find_secants(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 secants)
 {
+    const double length = link->length, pressure = link->pressure;
     const double mu_s = pressure * tangential(law, k->vs), mu_t = pressure * law->mu_t, S = k->S, l3 = length * length * length;
     const double I0 = 2.0 * length * k->g / S, I1 = -2.0 * k->vn * k->w * l3 * k->h / (S * S * S);
     const double I2 = l3 / S * (0.5 * k->Q + (2.0 * k->vn * k->vn - k->a2) * k->h / (S * S));

@@ -42,24 +42,12 @@ static Law law_of(const double number[6])
     return law;
 }
 
-/* The speed in whose units balances are solved: the law need not be homogeneous. */
-static inline double speed_unit_of(double largest_rate)
-{
-    (void)largest_rate;
-    return 1.0;
-}
-
-/* Friction on a body that moves at the largest rate, see `force_unit` in colloc/mechanics/damped_newton.py. */
-static inline double unit_of_force(const Law *law, double delta, double largest_rate)
-{
-    const double degree = isnan(law->degree) ? 1.0 : law->degree;
-    const double speed = isnan(law->degree) ? 1.0 : largest_rate;
-    return law->largest * pow(speed, degree) * pow(hypot(1.0, delta / speed), degree - 1.0);
-}
+#include "own_units.h"
 
 /* The nodes of the link. */
-static inline void find_roots(Sliding *k, const Law *law, double length, double delta)
+static inline void find_roots(Sliding *k, const Law *law, const Link *link, double delta)
 {
+    const double length = link->length;
     (void)law;
     k->delta = delta;
     const double a = sqrt(k->vs * k->vs + delta * delta), half = 0.5 * length * k->w;
@@ -87,10 +75,10 @@ static inline void find_roots(Sliding *k, const Law *law, double length, double 
     }
 }
 
-/* Friction on the link from its nodes; `pressure` multiplies it, here and below. */
-static inline void find_force(Sliding *k, const Law *law, double length, double pressure)
+/* Friction on the link from its nodes; its pressure multiplies it, here and below. */
+static inline void find_force(Sliding *k, const Law *law, const Link *link)
 {
-    (void)length;
+    const double pressure = link->pressure;
     const double s = law->speed_unit;
     k->fs = k->fn = k->couple = 0.0;
     for (int i = 0; i < ALL_NODES; ++i) {
@@ -103,14 +91,13 @@ static inline void find_force(Sliding *k, const Law *law, double length, double 
     }
 }
 
-static inline double dissipation(const Sliding *k, const Law *law, double length)
+static inline double dissipation(const Sliding *k, const Law *law, const Link *link)
 {
-    (void)length;
     const double s = law->speed_unit;
     double total = 0.0;
     for (int i = 0; i < ALL_NODES; ++i)
         total += k->weight[i] * potential(s * k->vs, s * k->y[i], s * k->delta);
-    return total / (s * law->unit);
+    return link->pressure * (total / (s * law->unit));
 }
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w); or, where `steep`, a multiple of 1 in its place that
@@ -135,14 +122,14 @@ static inline void add_slopes(const Sliding *k, const Law *law, double pressure,
     }
 }
 
-static inline void find_slopes(const Sliding *k, const Law *law, double length, double pressure, double delta, Matrix3 slopes)
+static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 slopes)
 {
-    (void)length, (void)delta;
-    add_slopes(k, law, pressure, false, slopes);
+    (void)delta;
+    add_slopes(k, law, link->pressure, false, slopes);
 }
 
-static inline void find_secants(const Sliding *k, const Law *law, double length, double pressure, double delta, Matrix3 secants)
+static inline void find_secants(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 secants)
 {
-    (void)length, (void)delta;
-    add_slopes(k, law, pressure, true, secants);
+    (void)delta;
+    add_slopes(k, law, link->pressure, true, secants);
 }

@@ -125,6 +125,9 @@
     line(x, y, colours.ink, data.width * unit || 5);
     for (let k = data.hinges[0]; k < data.hinges[1]; k++) disc(x[k], y[k], 3.2, colours.paper, colours.ink);
     disc(x[last], y[last], 6, colours.ink);
+    // feet, those that hold filled
+    const [feetX, feetY] = placed(data.arrowX, data.arrowY, position);
+    at(data.holding, position).forEach((holds, k) => disc(feetX[k], feetY[k], 4.5, holds > 0.5 ? red : colours.paper, red));
     const [[centreX], [centreY]] = placed([data.centre[0]], [data.centre[1]], position);
     disc(centreX, centreY, 3.5, red);
     if (arrows.checked) {

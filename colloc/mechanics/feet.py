@@ -1,0 +1,267 @@
+"""Feet: points of a chain that touch the floor, each with its share of the weight and, if it has one, a friction of its own.
+
+A foot sits on a link, `place` along it from its tail end (0) to its head end (1), and `offset` to the left of its middle line.
+`colloc.mechanics.floor_contact` says what friction does there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law, Matrix
+from colloc.numerics.arrays import Array, namespace
+from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments
+from colloc.system.errors import ProblemError
+
+_SAME = 1e-9
+"""Within which numbers of feet are one [body lengths, weights, rad]."""
+_MOST = 20
+"""Feet on a link that `feet=` takes as a number: with more a line is meant."""
+
+
+@named_arguments
+@dataclass(frozen=True)
+class Foot:
+    """A point of a chain that touches the floor.
+
+    Parameters
+    ----------
+    link : int
+        The link it is on, 0 at the tail.
+    place : float
+        Where on the link, from 0 (the end towards the tail) to 1.
+    weight : float, optional
+        What it bears, in parts of the body's weight; by default its part of what its link weighs.
+    offset : float
+        How far it sits to the left of the link's middle line [body lengths].
+    friction : Law, optional
+        Of its own; by default that of the problem.
+    angle : float
+        Of the direction that counts as its forward one, to the left of the link's [rad].
+
+    Examples
+    --------
+    Three links on three feet, the outer ones near the ends:
+
+    >>> from colloc import Chain, Foot
+    >>> Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2, 0.9))).symmetric
+    True
+    """
+
+    link: int
+    place: float = 0.5
+    weight: float | None = None
+    offset: float = field(default=0.0, metadata=STATED_IF_SET)
+    friction: Law | None = field(default=None, metadata=STATED_IF_SET)
+    angle: float = field(default=0.0, metadata=STATED_IF_SET)
+
+    def __post_init__(self) -> None:
+        if not is_whole(self.link):
+            raise ProblemError(f"the link of a foot must be a whole number, 0 for the tail's, not {self.link!r}.")
+        if not (is_number(self.place) and 0 <= self.place <= 1):
+            raise ProblemError(
+                f"the place of a foot must lie on its link, from 0 (the end towards the tail) to 1, not {self.place!r}."
+            )
+        if self.weight is not None and not (is_number(self.weight) and 0 < self.weight <= 1):
+            raise ProblemError(f"the weight of a foot must be a positive part of the body's, at most 1, not {self.weight!r}.")
+        for name in ("offset", "angle"):
+            if not is_number(getattr(self, name)):
+                raise ProblemError(f"the {name} of a foot must be a finite number, not {getattr(self, name)!r}.")
+        if self.friction is not None and not isinstance(self.friction, Law):
+            raise ProblemError(f"the friction of a foot must be a law of friction, not {type(self.friction).__name__}.")
+
+    def from_head(self, n_link: int) -> Foot:
+        """The same foot on the body named from its other end."""
+        return replace(self, link=n_link - 1 - self.link, place=1.0 - self.place, offset=-self.offset)
+
+    @property
+    def mirrored(self) -> Foot:
+        """The foot on the body's mirror image."""
+        return replace(self, offset=-self.offset, angle=-self.angle)
+
+    def is_like(self, other: Foot) -> bool:
+        """Whether two feet are one, up to rounding."""
+        own, its = ((f.link, f.place, f.weight or 0.0, f.offset) for f in (self, other))
+        turns = 1 if self.friction is None or not self.friction.reversible else 2
+        turned = abs(np.sin(0.5 * turns * (self.angle - other.angle)))
+        return self.friction == other.friction and bool(turned < _SAME and np.allclose(own, its, rtol=0, atol=_SAME))
+
+
+def Wheel(link: int, place: float = 0.5, rolling: float = 0.02, sideways: float = 1.0, angle: float = 0.0, **foot: Any) -> Foot:
+    """A passive wheel: a foot that slides easily along its rolling direction, and hardly across it.
+
+    Parameters
+    ----------
+    link, place
+        As of a `Foot`.
+    rolling, sideways : float
+        Coefficients of friction along its rolling direction, either way, and across it.
+    angle : float
+        Of the rolling direction, to the left of the link's [rad].
+    **foot
+        Weight and offset, as of a `Foot`.
+
+    Returns
+    -------
+    Foot
+
+    Examples
+    --------
+    >>> from colloc import Wheel
+    >>> Wheel(0).friction.label
+    'friction (1, 0.02, 0.02)'
+    """
+    for name, value in (("rolling", rolling), ("sideways", sideways)):
+        if not (is_number(value) and value > 0):
+            raise ProblemError(f"the coefficient {name} of a wheel must be positive and finite, not {value!r}.")
+    return Foot(link, place, friction=Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling), angle=angle, **foot)
+
+
+def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot, ...]:
+    """The feet of a body whose links weigh `weights` ``(n_link,)``, from tail to head, each with its weight.
+
+    A number means so many on each link, evenly spread. `ProblemError` for feet that no body can have.
+    """
+    if is_whole(feet):
+        if not 0 <= feet <= _MOST:
+            raise ProblemError(f"body.feet must be 0 (a line) to {_MOST} on each link, not {feet}.")
+        each = [(2 * k + 1) / (2 * feet) for k in range(feet)]
+        feet = [Foot(link, place) for link in range(weights.size) for place in each]
+    given = tuple(feet) if isinstance(feet, Iterable) else (feet,)
+    stated = tuple(foot for foot in given if isinstance(foot, Foot))
+    if len(stated) < len(given):
+        raise ProblemError("body.feet must be the number of feet on each link, or a sequence of Foot and Wheel.")
+    if not stated:
+        return ()
+    for foot in stated:
+        if not 0 <= foot.link < weights.size:
+            raise ProblemError(f"a foot stands on link {foot.link}, but the links are numbered 0 to {weights.size - 1}.")
+    borne = [_weight(foot, stated, weights) for foot in stated]
+    shared, total = tuple(replace(foot, weight=weight) for foot, weight in zip(stated, borne, strict=True)), sum(borne)
+    if abs(total - 1.0) > _SAME:
+        carried = sorted(set(range(weights.size)) - {foot.link for foot in stated})
+        hint = f"; no foot is on link {', '.join(map(str, carried))}, so say who bears its weight" if carried else ""
+        raise ProblemError(f"the weights of the feet must add up to 1, not {total:.6g}{hint}.")
+    if len({(foot.link, foot.place, foot.offset) for foot in shared}) < 2:
+        raise ProblemError("a body needs feet at two points at least: on one it would spin freely.")
+    if not _same_set(shared, [foot.mirrored for foot in shared]):
+        raise ProblemError(
+            "the feet differ between left and right (offset, angle), which the search takes for alike: give every foot that is "
+            "offset or turned its mirror image on the same link."
+        )
+    return tuple(sorted(shared, key=lambda foot: (foot.link, foot.place, foot.offset)))
+
+
+def _weight(foot: Foot, feet: tuple[Foot, ...], weights: np.ndarray) -> float:
+    """What a foot bears: as stated, or its part of what the other feet of its link leave of the link's weight."""
+    if foot.weight is not None:
+        return float(foot.weight)
+    others = [other.weight for other in feet if other.link == foot.link]
+    left = float(weights[foot.link]) - sum(weight for weight in others if weight is not None)
+    if left <= 0:
+        raise ProblemError(f"the feet on link {foot.link} bear all that it weighs: give the last of them a weight, too.")
+    return left / others.count(None)
+
+
+def _same_set(feet: tuple[Foot, ...], others: list[Foot]) -> bool:
+    left = list(others)
+    for foot in feet:
+        match = next((other for other in left if foot.is_like(other)), None)
+        if match is None:
+            return False
+        left.remove(match)
+    return True
+
+
+def read_alike_from_both_ends(feet: tuple[Foot, ...], n_link: int) -> bool:
+    """Whether the feet are the same for a body named from its other end."""
+    return _same_set(feet, [foot.from_head(n_link) for foot in feet])
+
+
+def _at_points_only(*_: Any) -> Any:
+    raise ProblemError("feet have laws of friction of their own: this one is none for a body that lies on its links.")
+
+
+@dataclass(frozen=True)
+class FeetLaw:
+    """The laws of friction of feet that do not all have the same, foot by foot, as one; a `colloc.mechanics.law.Law` at points.
+
+    Arrays have a row for each foot.
+    """
+
+    laws: tuple[Law, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "laws", tuple(self.laws))
+
+    kernel_numbers: ClassVar[tuple[float, ...]] = ()
+    kernel_source = ""
+    link_force = link_jacobian = link_secant = link_potential = scaled_laws = largest_link_forces = staticmethod(
+        _at_points_only
+    )
+
+    @property
+    def degree(self) -> float | None:
+        degrees = {law.degree for law in self.laws}
+        return degrees.pop() if len(degrees) == 1 else None
+
+    @property
+    def reversible(self) -> bool:
+        return all(law.reversible for law in self.laws)
+
+    @property
+    def associated(self) -> bool:
+        return all(law.associated for law in self.laws)
+
+    @property
+    def regularised(self) -> bool:
+        return any(law.regularised for law in self.laws)
+
+    @property
+    def smallest(self) -> float:
+        return min(law.smallest for law in self.laws)
+
+    @property
+    def largest(self) -> float:
+        return max(law.largest for law in self.laws)
+
+    @property
+    def label(self) -> str:
+        return " and ".join(dict.fromkeys(law.label for law in self.laws)) + " by foot"
+
+    def describe(self) -> str:
+        counted = {law: self.laws.count(law) for law in self.laws}
+        return "; ".join(f"{count} feet: {law.describe()}" for law, count in counted.items())
+
+    def in_units_of(self, unit: float) -> FeetLaw:
+        return FeetLaw(tuple(law.in_units_of(unit) for law in self.laws))
+
+    def in_speeds_of(self, unit: float) -> FeetLaw:
+        return FeetLaw(tuple(law.in_speeds_of(unit) for law in self.laws))
+
+    def _rows(self, of: Callable[[Law, Array, Array], Any], vs: Array, vn: Array) -> list[Any]:
+        return [of(law, vs[i : i + 1, :], vn[i : i + 1, :]) for i, law in enumerate(self.laws)]
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
+        rows = self._rows(lambda law, s, n: law.density(s, n, delta), vs, vn)
+        stack = namespace(vs, vn, delta).stack
+        return stack([row[0] for row in rows]), stack([row[1] for row in rows])
+
+    def _matrices(self, rows: list[Matrix], *arrays: Array) -> Matrix:
+        stack = namespace(*arrays).stack
+        return tuple(tuple(stack([row[i][j] for row in rows]) for j in range(2)) for i in range(2))
+
+    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        return self._matrices(self._rows(lambda law, s, n: law.density_jacobian(s, n, delta), vs, vn), vs, vn, delta)
+
+    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        return self._matrices(self._rows(lambda law, s, n: law.density_secant(s, n, delta), vs, vn), vs, vn, delta)
+
+    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
+        rows = self._rows(lambda law, s, n: law.density_potential(s, n, delta), vs, vn)
+        return namespace(vs, vn, delta).stack(rows)

@@ -1,0 +1,156 @@
+"""Bodies on feet through the whole search: certified, kept, drawn; and what feet cannot do yet is refused in a sentence."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+from shared.instants import random_instants
+
+from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Problem, ProblemError, Wheel, load, save, solve_balance
+from colloc.bounds.optimality_gap import refusal
+from colloc.bounds.sampling import Domain
+from colloc.commands.main import main as colloc
+from colloc.gaits.friction_unit import in_friction_units
+from colloc.gaits.harmonic import Fourier
+from colloc.pictures.motion_frames import frames
+from colloc.search.solve import solve
+from colloc.verification.replay import replay
+
+KNOWN = Fourier([-1.287, 1.287], [[0.687], [-0.687]], [[1.206], [1.206]])
+"""A gait of three links on a foot each that a program of its own has found, whose efficiency there is .676."""
+PAPER = Fourier([0.0, 0.0], [[2.859], [-2.859]], [[1.302], [1.302]])
+"""The paper's best gait on a line (problems/three_link.py)."""
+
+
+@pytest.fixture(scope="module")
+def on_feet(solved):
+    return solved("three_link_feet")[0]
+
+
+def test_three_links_on_a_foot_each_go_three_times_as_far_for_their_work_as_on_a_line(on_feet):
+    assert on_feet.certificate.passed
+    assert on_feet.certificate.efficiency > 0.77
+    assert abs(on_feet.certificate.efficiency_at_zero_delta - on_feet.certificate.efficiency) < 1e-3
+    # the feet press beneath the centre of mass in every shape
+    assert "statics" not in [check.name for check in on_feet.certificate.checks]
+
+
+def played(gait, feet, delta, count=300):
+    """Distance over work of three equal links of equal friction by a program of its own: feet as complex numbers in the frame
+    of the tail, the balance by SciPy, the path by the midpoint rule."""
+    angles, rates = gait.angles((np.arange(count) + 0.5) / count), gait.rates((np.arange(count) + 0.5) / count)
+    places = (np.arange(feet) + 0.5) / feet
+    z, heading, way, work = np.zeros(3), 0.0, 0.0, 0.0
+    for q, r in zip(angles.T, rates.T, strict=True):
+        step = np.exp(1j * np.cumsum([0.0, *q])) / 3
+        turn = np.cumsum([0.0, *r])
+
+        def motion(z, step=step, turn=turn):
+            w = 1j * (z[2] + turn) * step
+            ends = (origin + np.concatenate([[0.0], np.cumsum(a)[:-1]]) for origin, a in ((0.0, step), (z[0] + 1j * z[1], w)))
+            at, velocity = (end + np.outer(places, along) for end, along in zip(ends, (step, w), strict=True))
+            return at, velocity, -velocity / np.sqrt(abs(velocity) ** 2 + delta**2) / (3 * feet)
+
+        def balance(z, motion=motion):
+            at, _, force = motion(z)
+            return np.array([force.sum().real, force.sum().imag, (at.conj() * force).imag.sum()])
+
+        starts = z, [0, 0, -turn[1]], [0, 0, -turn[2]], [0, 0, 0], [0, 1, -turn[1]]
+        tries = (root(balance, start, tol=1e-12) for start in starts)
+        z = next(found.x for found in tries if np.abs(found.fun).max() < 1e-10)
+        _, velocity, force = motion(z)
+        middle = heading + 0.5 * z[2] / count
+        way += velocity.mean() * np.exp(1j * middle) / count
+        work -= (force * velocity.conj()).real.sum() / count
+        heading += z[2] / count
+    return abs(way) / work
+
+
+@pytest.mark.parametrize(("gait", "feet"), [(KNOWN, 1), (PAPER, 1), (PAPER, 2), (PAPER, 4)])
+def test_a_replay_is_that_of_a_program_of_its_own(gait, feet):
+    assert replay(Chain(feet=feet), Friction(), gait, 1e-1).efficiency == pytest.approx(played(gait, feet, 1e-1), rel=2e-3)
+
+
+def test_gaits_on_more_and_more_feet_do_what_they_do_on_a_line():
+    on_line = replay(Chain(), Friction(), PAPER, 1e-3).efficiency
+    found = [replay(Chain(feet=n), Friction(), PAPER, 1e-3).efficiency for n in (1, 2, 4, 16)]
+    np.testing.assert_allclose(found[:1], 0.285, atol=1e-3)
+    assert abs(found[-1] - on_line) < 5e-4
+
+
+def test_the_half_of_a_bilateral_gait_is_as_good_as_the_whole():
+    half = solve(Problem("half", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=1e-3), 2)
+    assert half.certificate.passed
+    whole = replay(Chain(feet=1), Friction(), half.gait, half.delta_per_period)
+    assert whole.efficiency == pytest.approx(half.certificate.efficiency, rel=1e-5)
+    assert abs(whole.rotation) < 1e-6
+
+
+def test_a_solution_on_feet_is_kept_and_verified(on_feet, tmp_path, capsys):
+    save(on_feet, tmp_path / "kept.h5")
+    assert load(tmp_path / "kept.h5").problem.body == Chain(feet=1)
+    assert colloc(["verify", str(tmp_path / "kept.h5"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["certified"]
+
+
+def test_a_film_shows_which_feet_hold(on_feet):
+    shown = frames(on_feet, 101)
+    assert shown.holding.shape == (3, 101)
+    moved = np.hypot(*np.diff(shown.arrow_base, axis=2))
+    both = shown.holding[:, 1:] & shown.holding[:, :-1]
+    assert both.any()
+    assert moved[both].max() < 0.02 * moved.max()
+    assert frames(on_feet, 11).arrow_base.shape[1] == 3
+
+
+def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
+    """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own size."""
+    wheels = Chain(feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(3)))
+    one, other = (Problem("wheels", body=wheels, friction=law) for law in (Friction(), Elliptic(7, 8, 9)))
+    assert one.law == other.law
+    scaled, unit = in_friction_units(other)
+    assert scaled.law == one.law.in_units_of(unit)
+    assert 0.1 < scaled.law.smallest < 10
+    assert Problem.from_dict(scaled.to_dict()).law == scaled.law
+    angles, rates = random_instants(20)
+    z, same, again = (solve_balance(wheels, law, angles, rates, 1e-3).z for law in (Friction(), Elliptic(7, 8, 9), scaled.law))
+    np.testing.assert_array_equal(z, same)
+    np.testing.assert_allclose(z, again, atol=1e-9)
+
+
+def test_a_certificate_says_how_far_the_feet_press_beside_the_centre_of_mass(solved):
+    worm = solved("inchworm")[0]
+    statics = next(check for check in worm.certificate.checks if check.name == "statics")
+    angles = worm.gait.angles(np.linspace(0, 1, 2001))
+    assert statics.value == pytest.approx(worm.problem.body.imbalance(angles).max(), rel=1e-3)
+    assert statics.value < worm.problem.body.largest_imbalance
+    assert "beside the centre of mass" in worm.problem.body.describe()
+
+
+def test_the_way_from_the_centre_of_mass_is_largest_where_all_links_pull_one_way():
+    body = Chain((0.2, 0.3, 0.5), feet=(Foot(0, 0.3, 0.7), Foot(2, 0.9, 0.3)))
+    assert body.imbalance(np.zeros((2, 1)))[0] == pytest.approx(abs(0.7 * 0.06 + 0.3 * 0.95 - 0.5))
+    angles = np.random.default_rng(0).uniform(-np.pi, np.pi, (2, 20000))
+    worst = body.imbalance(angles).max()
+    assert 0.999 * body.largest_imbalance < worst <= body.largest_imbalance * (1 + 1e-12)
+    assert Chain(feet=3).largest_imbalance < 1e-15
+
+
+def test_what_feet_cannot_do_yet_is_refused():
+    with pytest.raises(ProblemError, match="on feet cannot be put on a slope"):
+        Problem("hill", body=Chain(feet=1), grade=0.1)
+    with pytest.raises(ProblemError, match="not for feet"):
+        Domain(Chain(feet=1), Friction(), 2.0)
+    assert "not for feet" in refusal(Problem("bound", body=Chain(feet=1)))
+    with pytest.raises(ProblemError, match="read the same from both ends"):
+        Problem("half", body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=Harmonic(1, "bilateral"))
+
+
+def test_init_writes_a_problem_on_feet(tmp_path, capsys):
+    from colloc.gaits.problem_file import read_problem_file
+
+    assert colloc(["init", str(tmp_path / "mine.py"), "--links", "4", "--feet", "2"]) == 0
+    assert read_problem_file(tmp_path / "mine.py").problem.body == Chain((0.25,) * 4, feet=2)
+    assert colloc(["init", str(tmp_path / "other.py"), "--feet", "99"]) == 2
+    assert "0 (a line) to 20" in capsys.readouterr().err
