@@ -20,6 +20,8 @@ import numpy as np
 from colloc.numerics.mesh import Mesh
 
 _CLOSED, _STEPS = 1e-12, 60
+_ROUNDED = 1e-11
+"""Newton's step that counts as none: where rates are steep, rounding leaves more of the equations than `_CLOSED`."""
 _SHARES = 0.5 ** np.arange(7)
 """Of Newton's step, tried until the equations are off by less."""
 
@@ -94,6 +96,9 @@ class CollocatedStates:
             if off < _CLOSED or not now.known:
                 break
             step, step_start = self._newton(now.on_states, left_over, open_by)
+            if np.abs(step).max() < _ROUNDED:
+                off = 0.0
+                break
             for share in _SHARES:
                 after, begin = states - share * step, start - share * step_start
                 now, left_over, open_by, off_then = self._residual(rates, after, begin)

@@ -28,6 +28,8 @@ _INTERVALS, _DOUBLED = 50, 6
 """Of the first mesh, and how many there are, each of twice as many."""
 _ACCURACY = 0.02
 """Relative, of a loss, and of what a finer mesh may change in the Froude number for it."""
+_VISCOUS, _WETTER = 3.0, 10**0.5
+"""Delta [body lengths per period] at which friction is as good as viscous, and the factor from each tried to the next."""
 _POWER = 1.5
 """Of the Froude number, to which the change of the efficiency is in proportion; between 1 and 2 where it is small."""
 _FIRST, _FASTEST, _FARTHEST = 0.3, 10.0, np.log(5.0)
@@ -80,16 +82,28 @@ class GaitOnMesh:
     def played(self, delta: float, froude: float, near: Played) -> Played:
         """The motion in which all periods are alike, by Newton's method from another: a slow one, or one at a pace like it.
 
+        Where that does not lead there, as on feet that hold, it is reached through more viscous friction.
+
         Raises
         ------
         NotConvergedError
             If none is found.
         """
         equations = CollocatedStates(self._mesh, free=np.ones(3, dtype=bool))
-        begin = near.states[:, 0]
-        states, _, held = equations.solved(lambda now: self._momentum_rates(now, delta, froude), begin, near.states)
+
+        def found(delta: float, near: Played) -> tuple[np.ndarray, bool]:
+            begin = near.states[:, 0]
+            states, _, held = equations.solved(lambda now: self._momentum_rates(now, delta, froude), begin, near.states)
+            return states, held
+
+        states, held = found(delta, near)
         if not held:
-            raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
+            if delta > _VISCOUS:
+                raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
+            wetter = _WETTER * delta
+            states, held = found(delta, self.played(wetter, froude, self.slow(wetter)))
+            if not held:
+                raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
         now = momentum_rates(self._body, self._friction, self._angles, self._rates, states, delta=delta, froude=froude)
         return self._summed(states, now.z[2], now.power)
 
