@@ -88,6 +88,8 @@ class Kind(Protocol):
     """States of a period; a gait's last parameters are where they begin."""
     periods: float
     """A whole period over the part that is solved."""
+    bends: bool
+    """Whether it matters what the sum of all joint angles changes by over that part; else `Passed.bend` may be 0."""
 
     def along(
         self,
@@ -125,6 +127,7 @@ class SlowOnLevel:
     def __init__(self, body: Body, friction: Law, symmetry: str) -> None:
         self.body, self.friction, self._symmetry = body, friction, symmetry
         self.periods = 1.0 / fraction(symmetry)
+        self.bends = (heading_shares(symmetry) or (0.0, 0.0))[1] != 0.0
 
     def along(
         self,
@@ -171,6 +174,7 @@ class SlowOnSlope:
 
     states: tuple[str, ...] = ("theta",)
     periods: float = 1.0
+    bends: bool = False
 
     def __init__(self, body: Body, friction: Law, slope: Slope) -> None:
         self.body, self.friction, self._slope = body, friction, slope
