@@ -139,10 +139,10 @@ class ReducedMotion:
         shares = kind.shares(s.passed)
         side, rotation, bend, work = (np.array(column) for column in zip(*shares.values(), strict=True))
         on_theta, on_centre = s.pose.on_pose(side)
-        turned, spent = (part[:, None, None, None] * self._weight for part in (rotation, work))
-        rows, on_begin = kind.through_pose(
-            mesh, s.pose, on_theta, np.concatenate([turned, on_centre, spent], axis=1), on_states
-        )
+        rows = np.empty((side.size, 4, *self._weight.shape))
+        rows[:, 0], rows[:, 3] = (part[:, None, None] * self._weight for part in (rotation, work))
+        rows[:, 1:3] = on_centre
+        on_begin = kind.through_pose(mesh, s.pose, on_theta, rows, on_states)
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
@@ -158,5 +158,6 @@ class ReducedMotion:
             on_shape = np.concatenate([on_shape, (weight * s.pace * slope).T[None]])
             on_pace = np.concatenate([on_pace, (weight * density)[None]])
         found = self.shapes.pulled_back(v, on_shape, on_pace)
-        found[: len(shares), v.size - len(kind.states) :] += on_begin
+        if kind.states:
+            found[: len(shares), -len(kind.states) :] += on_begin
         return dict(zip((*shares, *self._besides), found, strict=True))
