@@ -40,7 +40,6 @@ def balanced_variables(
     centre, weight, points = np.array(now.centre), unit * stage_weights(mesh), mesh.points
     pose = CollocatedPose.on_mesh(mesh, unit * z[OMEGA], unit * centre, first_theta(kind, begin))
     power = (weight * now.power[points]).sum(axis=1)
-    # a gait with both symmetries has another program
     shares = kind.shares(Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(power.sum())))
     sides = np.array([shares[name].side for name in ("distance", "work")]) / kind.periods
     ahead, climbed = (pose.place * np.conj(sides)[:, None]).real

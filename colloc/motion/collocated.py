@@ -10,8 +10,6 @@ Everything that is said of a collocated motion on the level follows from here. W
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
 from colloc.numerics.mesh import Mesh
@@ -32,7 +30,10 @@ def point_weights(mesh: Mesh) -> np.ndarray:
 
 def sums(increments: np.ndarray, start: float | complex = 0.0) -> np.ndarray:
     """A quantity at the edges, ``(n + 1,)``, from its increments over the intervals, ``(n,)``."""
-    return start + np.concatenate([[0.0], np.cumsum(increments)])
+    found = np.empty(increments.size + 1, dtype=increments.dtype)
+    found[0] = 0.0
+    np.cumsum(increments, out=found[1:])
+    return start + found
 
 
 class CollocatedPose:
@@ -52,11 +53,28 @@ class CollocatedPose:
         Orientation at the begin [rad].
     """
 
+    rotations: np.ndarray
+    """By how much the body turns over each interval [rad], ``(n,)``."""
+    theta: np.ndarray
+    """Orientation at the edges, ``(n + 1,)``."""
+    stage_theta: np.ndarray
+    """Orientation at the stages, ``(n, s)``."""
+    velocity: np.ndarray
+    """Velocity of the centre of mass in the plane at the stages, complex, ``(n, s)``."""
+    place: np.ndarray
+    """Centre of mass in the plane at the edges, complex, from 0, ``(n + 1,)``."""
+
     def __init__(self, scheme: Scheme, h: np.ndarray, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0) -> None:
-        self._scheme, self._h, self._omega, self._theta_0 = scheme, h, omega, theta_0
+        self._scheme, self._h, self._omega, self._centre = scheme, h, omega, centre
         self._weight = h[:, None] * scheme.b
+        # searches make one for every gait they try
         self._turned = h[:, None] * (omega @ scheme.A.T)
-        self._velocity = np.exp(1j * self._turned) * centre
+        self.rotations = (self._weight * omega).sum(axis=1)
+        self.theta = sums(self.rotations, theta_0)
+        self.stage_theta = self.theta[:-1, None] + self._turned
+        self._turn = np.exp(1j * self.stage_theta)
+        self.velocity = self._turn * centre
+        self.place = sums((self._weight * self.velocity).sum(axis=1))
 
     @classmethod
     def on_mesh(cls, mesh: Mesh, omega: np.ndarray, centre: np.ndarray, theta_0: float = 0.0) -> CollocatedPose:
@@ -64,35 +82,10 @@ class CollocatedPose:
         c = centre[0] + 1j * centre[1]
         return cls(mesh.scheme, mesh.h, omega[mesh.points], c[mesh.points], theta_0)
 
-    @cached_property
-    def rotations(self) -> np.ndarray:
-        """By how much the body turns over each interval [rad], ``(n,)``."""
-        return (self._weight * self._omega).sum(axis=1)
-
-    @cached_property
+    @property
     def displacements(self) -> np.ndarray:
         """Displacement over each interval in the axes the body has at its begin, complex, ``(n,)``."""
-        return (self._weight * self._velocity).sum(axis=1)
-
-    @cached_property
-    def theta(self) -> np.ndarray:
-        """Orientation at the edges, ``(n + 1,)``."""
-        return sums(self.rotations, self._theta_0)
-
-    @cached_property
-    def stage_theta(self) -> np.ndarray:
-        """Orientation at the stages, ``(n, s)``."""
-        return self.theta[:-1, None] + self._turned
-
-    @cached_property
-    def velocity(self) -> np.ndarray:
-        """Velocity of the centre of mass in the plane at the stages, complex, ``(n, s)``."""
-        return np.exp(1j * self.theta[:-1])[:, None] * self._velocity
-
-    @cached_property
-    def place(self) -> np.ndarray:
-        """Centre of mass in the plane at the edges, complex, from 0, ``(n + 1,)``."""
-        return sums((self._weight * self.velocity).sum(axis=1))
+        return (self._weight * np.exp(1j * self._turned) * self._centre).sum(axis=1)
 
     def at(self, k: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Orientation and place, complex, at fractions tau of intervals k, ``(n_time,)`` each, by the scheme's polynomials."""
@@ -104,9 +97,12 @@ class CollocatedPose:
         """Derivatives of the displacements along directions ``(m,)``, complex, whose size counts: with respect to the
         orientation at the stages, ``(m, n, s)``, and to both components of the velocity of the centre of mass in the axes of
         the body, ``(m, 2, n, s)``."""
-        back = self._weight * np.conj(sides)[:, None, None]
-        on_centre = np.conj(np.exp(1j * self.stage_theta) * back)
-        return -(back * self.velocity).imag, np.stack([on_centre.real, on_centre.imag], axis=1)
+        on_theta, on_centre = np.zeros((sides.size, *self._weight.shape)), np.zeros((sides.size, 2, *self._weight.shape))
+        for row in np.flatnonzero(sides):
+            back = self._weight * np.conj(sides[row])
+            along = np.conj(self._turn * back)
+            on_theta[row], on_centre[row] = -(back * self.velocity).imag, (along.real, along.imag)
+        return on_theta, on_centre
 
     def on_rates(self, on_theta: np.ndarray) -> np.ndarray:
         """Derivatives with respect to the rotation rate, from those with respect to the orientation, ``(m, n, s)`` both."""

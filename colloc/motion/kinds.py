@@ -88,6 +88,8 @@ class Kind(Protocol):
     """States of a period; a gait's last parameters are where they begin."""
     periods: float
     """A whole period over the part that is solved."""
+    bends: bool
+    """Whether it matters what the sum of all joint angles changes by over that part; else `Passed.bend` may be 0."""
 
     def along(
         self,
@@ -105,10 +107,10 @@ class Kind(Protocol):
 
     def through_pose(
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of m numbers with respect to (rotation rate, velocity of the centre, power) at the stages, ``(m, 4, n,
-        s)``, and to the begin of the states, ``(m, n_state)``, from those at a given orientation, those with respect to the
-        orientation, ``(m, n, s)``, and those of the outputs with respect to the states."""
+    ) -> np.ndarray:
+        """Add what m numbers owe to the orientation to their derivatives `on_out` with respect to (rotation rate, velocity of
+        the centre, power) at the stages, ``(m, 4, n, s)``, from those with respect to the orientation, ``(m, n, s)``, and those
+        of the outputs with respect to the states; and give those with respect to the begin of the states, ``(m, n_state)``."""
 
     def counted(self, passed: Passed) -> dict[str, float]:
         """What a whole period comes to."""
@@ -125,6 +127,7 @@ class SlowOnLevel:
     def __init__(self, body: Body, friction: Law, symmetry: str) -> None:
         self.body, self.friction, self._symmetry = body, friction, symmetry
         self.periods = 1.0 / fraction(symmetry)
+        self.bends = (heading_shares(symmetry) or (0.0, 0.0))[1] != 0.0
 
     def along(
         self,
@@ -145,10 +148,9 @@ class SlowOnLevel:
 
     def through_pose(
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        turned = on_out.copy()
-        turned[:, 0] += pose.on_rates(on_theta)
-        return turned, np.empty((len(on_out), 0))
+    ) -> np.ndarray:
+        on_out[:, 0] += pose.on_rates(on_theta)
+        return np.empty((len(on_out), 0))
 
     def _axis(self, passed: Passed) -> complex:
         return complex(np.exp(1j * heading(self._symmetry, passed.displacement, passed.rotation, passed.bend)))
@@ -171,6 +173,7 @@ class SlowOnSlope:
 
     states: tuple[str, ...] = ("theta",)
     periods: float = 1.0
+    bends: bool = False
 
     def __init__(self, body: Body, friction: Law, slope: Slope) -> None:
         self.body, self.friction, self._slope = body, friction, slope
@@ -206,13 +209,12 @@ class SlowOnSlope:
 
     def through_pose(
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    ) -> np.ndarray:
         at_points = on_out.reshape(*on_out.shape[:2], -1)
         of_theta = on_theta.reshape(len(on_theta), 1, -1) + np.einsum("mrt,rkt->mkt", at_points, on_states[OUTPUTS])
         on_begin, on_rates = CollocatedStates(mesh).pulled_back(on_states[None, OMEGA], of_theta)
-        turned = on_out.copy()
-        turned[:, 0] += on_rates.reshape(on_theta.shape)
-        return turned, on_begin
+        on_out[:, 0] += on_rates.reshape(on_theta.shape)
+        return on_begin
 
     def counted(self, passed: Passed) -> dict[str, float]:
         """Not a number where the joints brake."""

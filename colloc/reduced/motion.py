@@ -51,7 +51,7 @@ class _State:
     along: Along
     out: np.ndarray
     pose: CollocatedPose
-    work: float
+    passed: Passed
 
     @property
     def solved(self) -> BalanceSolution:
@@ -82,9 +82,12 @@ class ReducedMotion:
         out = np.vstack([now.z[OMEGA], now.centre, now.power])
         out[:, ~along.held] = np.nan
         omega, cx, cy, power = (out * pace).reshape(4, -1, mesh.n_point).sum(axis=1)
-        pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]), first_theta(self._kind, begin))
+        first = first_theta(self._kind, begin)
+        pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]), first)
         work = float((self._weight * power[mesh.points]).sum())
-        found = _State(v.copy(), delta, angles, rates, pace, along, out, pose, work)
+        bend = self._bend(rates, pace) if self._kind.bends else 0.0
+        passed = Passed(complex(pose.place[-1]), float(pose.theta[-1]) - first, bend, work)
+        found = _State(v.copy(), delta, angles, rates, pace, along, out, pose, passed)
         if not self._kind.states or along.held.all():  # a search goes on from states that there are
             self._last = found
         return found
@@ -99,20 +102,16 @@ class ReducedMotion:
         moved = np.concatenate([angles - near.angles, rates - near.rates])
         return None, near.solved.z + np.einsum("ijt,jt->it", slopes[:3], moved)
 
-    def _passed(self, s: _State) -> Passed:
-        """What the solved part comes to."""
-        bend = float((self._weight * self._bending(s)).sum())
-        return Passed(complex(s.pose.place[-1]), float(s.pose.rotations.sum()), bend, s.work)
-
-    def _bending(self, s: _State) -> np.ndarray:
-        """Rate of the sum of all joint angles at the stages, ``(n, s)``."""
-        return (s.rates.sum(axis=0) * s.pace).reshape(-1, self.mesh.n_point).sum(axis=0)[self.mesh.points]
+    def _bend(self, rates: np.ndarray, pace: np.ndarray) -> float:
+        """Change of the sum of all joint angles over the solved part [rad]."""
+        bending = (rates.sum(axis=0) * pace).reshape(-1, self.mesh.n_point).sum(axis=0)
+        return float((self._weight * bending[self.mesh.points]).sum())
 
     def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
         """What a period comes to, as the kind of motion counts it, and, if asked for, the length of the path and the driven
         work; NaN where there is no motion."""
         s = self.at(v, delta)
-        found = self._kind.counted(self._passed(s))
+        found = self._kind.counted(s.passed)
         for name in self._besides:
             found[name] = self._kind.periods * float((self._density(name, s)[0] * s.pace) @ self._on_columns(s))
         return found
@@ -137,13 +136,13 @@ class ReducedMotion:
         s, mesh, kind = self.at(v, delta), self.mesh, self._kind
         slopes, on_states = kind.slopes(Moving(s.angles, s.rates, delta), s.along)
         self._near = (s, slopes)
-        shares = kind.shares(self._passed(s))
+        shares = kind.shares(s.passed)
         side, rotation, bend, work = (np.array(column) for column in zip(*shares.values(), strict=True))
         on_theta, on_centre = s.pose.on_pose(side)
-        turned, spent = (part[:, None, None, None] * self._weight for part in (rotation, work))
-        rows, on_begin = kind.through_pose(
-            mesh, s.pose, on_theta, np.concatenate([turned, on_centre, spent], axis=1), on_states
-        )
+        rows = np.empty((side.size, 4, *self._weight.shape))
+        rows[:, 0], rows[:, 3] = (part[:, None, None] * self._weight for part in (rotation, work))
+        rows[:, 1:3] = on_centre
+        on_begin = kind.through_pose(mesh, s.pose, on_theta, rows, on_states)
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
@@ -159,5 +158,6 @@ class ReducedMotion:
             on_shape = np.concatenate([on_shape, (weight * s.pace * slope).T[None]])
             on_pace = np.concatenate([on_pace, (weight * density)[None]])
         found = self.shapes.pulled_back(v, on_shape, on_pace)
-        found[: len(shares), v.size - len(kind.states) :] += on_begin
+        if kind.states:
+            found[: len(shares), -len(kind.states) :] += on_begin
         return dict(zip((*shares, *self._besides), found, strict=True))
