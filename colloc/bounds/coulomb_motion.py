@@ -95,7 +95,7 @@ def all_motions(
     body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
 ) -> tuple[CoulombMotion, np.ndarray]:
     """All balanced motions for shapes and joint rates ``(n_joint, n)``, and of which of these each is, ``(n_motion,)``."""
-    if friction.associated:
+    if body.law(friction).associated:
         return _one_motion(body, friction, angles, rates, delta)
     found = all_balanced_velocities(body, friction, angles, rates, delta)
     root, source = np.nonzero(found.sign)

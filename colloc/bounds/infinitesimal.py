@@ -147,7 +147,7 @@ def small_gait(
     """
     columns = _Columns(body, friction, shape, _DELTA)
     motion = columns.motion(_first_directions(body, columns.shape, directions))
-    turn = np.pi if friction.reversible else 2 * np.pi
+    turn = np.pi if body.law(friction).reversible else 2 * np.pi
     value, heading = max((best_mixture(motion, h)[0], h) for h in np.arange(headings) * (turn / headings))
     for _ in range(rounds):
         new_value, weights, multipliers = best_mixture(motion, heading)

@@ -79,7 +79,7 @@ def check_symmetric(problem: Any) -> None:
     needed = {BILATERAL, ANTIPODAL} if symmetry == BOTH else {symmetry}
     if not needed <= set(problem.body.symmetries):
         raise ProblemError(
-            f"gaits of symmetry {symmetry} need a body whose lengths read the same from both ends; "
+            f"gaits of symmetry {symmetry} need a body whose lengths, weights and feet read the same from both ends; "
             f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
         )
     for name in ("joint_limit", "torque_limit", "power_limit"):

@@ -257,6 +257,7 @@ def replay(
     """
     if instants < 4 or instants % 2:
         raise ProblemError(f"instants must be an even number of at least 4, not {instants!r}.")
+    friction = body.law(friction)
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
     counts = [2 * max(1, round(instants * (b - a) / 8)) for a, b in pairwise(ends)]
     edges = np.concatenate([np.linspace(a, b, n + 1)[:-1] for (a, b), n in zip(pairwise(ends), counts, strict=True)] + [[1.0]])

@@ -117,6 +117,8 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     z, same, again = (solve_balance(wheels, law, angles, rates, 1e-3).z for law in (Friction(), Elliptic(7, 8, 9), scaled.law))
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
+    stated, resolved = (replay(wheels, law, KNOWN, 1e-2, tolerance=1e-4, instants=200) for law in (Friction(), one.law))
+    assert stated.work == resolved.work
 
 
 def test_a_certificate_says_how_far_the_feet_press_beside_the_centre_of_mass(solved):
