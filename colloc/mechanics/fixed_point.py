@@ -181,12 +181,13 @@ def solve_balance(
     return BalanceSolution(z, residual, iterations, residual <= _reachable(moving, tolerance), anchor, velocity)
 
 
-def _reachable(moving: Moving, tolerance: float) -> np.ndarray:
+def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
     """The tolerance, or what rounding leaves of the forces where that is more, ``(n_time,)``."""
-    rounding, speed = moving.body.contact.rounding, np.abs(moving.rates).max(axis=0)
+    rounding = moving.body.contact.rounding
     if not rounding:
-        return np.full(speed.size, tolerance)
-    return np.maximum(tolerance, rounding / relative_delta(moving.delta, np.maximum(speed, np.finfo(float).tiny))[0])
+        return tolerance
+    speed = np.maximum(np.abs(moving.rates).max(axis=0), np.finfo(float).tiny)
+    return np.maximum(tolerance, rounding / relative_delta(moving.delta, speed)[0])
 
 
 def _balanced(
