@@ -22,6 +22,7 @@ SUBCOMMANDS = {
     "report": ("report", "one self-contained web page about a result, to read or to send"),
     "animate": ("animate", "the motion as GIF or MP4"),
     "export": ("export", "joint angles over time for a robot, as CSV or JSON"),
+    "robot": ("robot", "speed, power and torques of a result on a robot of so many metres and kilograms"),
     "completion": ("completion", "what the Tab key needs to complete all this in bash"),
 }
 """Name to module of this package with a ``main(arguments)`` that returns an exit code, and what it does."""

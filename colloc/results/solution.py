@@ -232,14 +232,29 @@ class Solution:
         """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""
         return bound("animate")(self, Path(path), **options)
 
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the web page of `colloc report`."""
-        return bound("report")(self, Path(path))
+    def report(self, path: str | os.PathLike[str], *, robot: Any = None) -> Path:
+        """Write the web page of `colloc report`; with what `robot` returns also its sheet."""
+        return bound("report")(self, Path(path), robot=robot)
 
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
         """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`: ``solution.export("mine.csv",
         period=4)``; returns what the file says about them. Options as for `colloc.pictures.export.write_export`."""
         return bound("export")(self, Path(path), **options)
+
+    def robot(self, length: float, mass: float, period: float, **options: Any) -> Any:
+        """A `colloc.results.robot.Robot`: speed, power and torques of the gait on a robot of so many metres and kilograms.
+
+        Options as there: `gravity`, `max_speed`, `max_torque`.
+
+        Examples
+        --------
+        >>> import colloc
+        >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+        >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
+        >>> round(robot.facts["cost_of_transport"], 2)
+        3.85
+        """
+        return bound("robot")(self, length, mass, period, **options)
 
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
