@@ -16,7 +16,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import Sliding
 from colloc.numerics.mesh import Mesh
-from colloc.results.answer import Alternative, Answer, Step
+from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import SAMPLES, Column, RigidMotion, SampledMotion, motion_columns, motion_dataset, motion_frame
@@ -175,6 +175,8 @@ class Solution:
     @property
     def standing(self) -> list[str]:
         """What the gait is the best of, and what else the search met."""
+        if self.answer.program in (PRESCRIBED, EVALUATED):
+            return ["none: the gait was given"]
         if self.starts == 1 or not self.others:
             return ["local optimum, from one start"]
         best, *others = self.others

@@ -56,6 +56,14 @@ REFUSED = {
         f"good.h5 --period 4 --{option}"
         for option in ("rate nan", "max-speed 0", "max-speed 1 2 3", "periods 0", "format x", "mass 1")
     ],
+    "evaluate": [
+        "",
+        "problem.py",
+        "problem.py nope.csv",
+        "nope.py text.h5",
+        "problem.py text.h5",
+        "problem.py text.h5 --period x",
+    ],
     "robot": ["", "nope.h5 --length 1 --mass 1 --period 1", "good.h5", "good.h5 --length 1 --mass 1"]
     + [f"good.h5 --{words}" for words in ("length 0 --mass 1 --period 1", "length 1 --mass nan --period 1")]
     + [f"good.h5 --length 1 --mass 1 --period {words}" for words in ("-5", "1 --max-speed 0", "1 --max-torque 1 2 3")],
