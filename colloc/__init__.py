@@ -44,6 +44,8 @@ bind(
         "plot_gait": "colloc.pictures.solution_figure:draw_gait",
         "animate": "colloc.pictures.movie:write_movie",
         "report": "colloc.pictures.report_page:write_report",
+        "robot": "colloc.results.robot:Robot",
+        "plot_robot": "colloc.pictures.robot_figure:robot_figure",
         "export": "colloc.pictures.export:write_export",
         "plot_front": "colloc.pictures.front_figure:front_figure",
     }

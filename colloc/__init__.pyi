@@ -26,6 +26,7 @@ from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.pareto import pareto_front as pareto_front
 from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
+from colloc.search.evaluate import evaluate as evaluate
 from colloc.search.certify import certify as certify
 from colloc.verification.replay import replay as replay
 from colloc.verification.slope import slope_motion as slope_motion

@@ -10,7 +10,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import add_printing, add_result, new_parser, output_kind, output_path, tell
+from colloc.commands.options import (
+    add_printing,
+    add_result,
+    add_robot,
+    new_parser,
+    output_kind,
+    output_path,
+    robot_options,
+    tell,
+)
 from colloc.commands.verify import check_trusted
 from colloc.results.store import load
 
@@ -23,9 +32,11 @@ number of samples, and the sample after the last is the first one again.
   colloc export results/three_link.h5 --period 4                          50 samples a second
   colloc export results/three_link.h5 --max-speed 2.0 --rate 100          as fast as 2 rad/s allow
   colloc export results/three_link.h5 --max-speed 2.0 1.0 --format json   a limit for each joint
+  colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3    with torques [N m] and powers [W]
 
-CSV: '#' lines about the result, then time_s, joint_1_rad, ..., joint_1_rad_per_s, ... (mode_1_rad, ... of a smooth body). Joint
-angles count from tail to head; each is a link's direction less that of the link behind it, positive counter-clockwise."""
+CSV: '#' lines about the result, then time_s, joint_1_rad, ..., joint_1_rad_per_s, ... (mode_1_rad, ... of a smooth body) and,
+with --length and --mass, joint_1_N_m, ..., joint_1_W, ... Joint angles count from tail to head; each is a link's direction less
+that of the link behind it, positive counter-clockwise."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -34,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--rate", type=float, default=50.0, metavar="HZ", help="samples a second (default: 50)")
     parser.add_argument("--period", type=float, metavar="S", help="seconds a period takes")
     parser.add_argument("--max-speed", type=float, nargs="+", metavar="V", help="joint speed limit(s) [rad/s], one or one each")
+    add_robot(parser)
     parser.add_argument("--periods", type=int, default=1, metavar="N", help="repeat the period N times (default: 1)")
     parser.add_argument("--format", choices=("csv", "json"), default=None, help="default: by the suffix of --output, else csv")
     parser.add_argument("--output", metavar="PATH", help="folder or file (default: beside the result)")
@@ -52,6 +64,7 @@ def _export(options: argparse.Namespace) -> int:
     check_trusted(solution, options.result)
     path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('csv', 'json'))}"))
     settings = {"period": options.period, "max_speed": options.max_speed, "rate": options.rate, "periods": options.periods}
+    settings |= robot_options(options)
     facts = solution.export(path, **settings)
     samples = facts["samples_per_period"] * options.periods
     fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])

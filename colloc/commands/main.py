@@ -17,11 +17,13 @@ SUBCOMMANDS = {
     "open": ("open", "what an archive of starts holds; the whole result of one of them"),
     "sweep": ("sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
     "pareto": ("pareto", "what two objectives cost each other: a front of certified gaits"),
+    "evaluate": ("evaluate", "what a gait of your own achieves: joint angles from a CSV file, replayed and certified"),
     "verify": ("verify", "check a result again by independent replay, without CasADi"),
     "compare": ("compare", "hold two results against each other"),
     "report": ("report", "one self-contained web page about a result, to read or to send"),
     "animate": ("animate", "the motion as GIF or MP4"),
     "export": ("export", "joint angles over time for a robot, as CSV or JSON"),
+    "robot": ("robot", "speed, power and torques of a result on a robot of so many metres and kilograms"),
     "completion": ("completion", "what the Tab key needs to complete all this in bash"),
 }
 """Name to module of this package with a ``main(arguments)`` that returns an exit code, and what it does."""

@@ -79,6 +79,22 @@ def add_result(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", metavar="FILE.h5", help="a result that colloc solve wrote")
 
 
+def add_robot(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
+    """The size and mass of a robot, in SI units."""
+    parser.add_argument("--length", type=float, required=required, metavar="M", help="of the robot, stretched [m]")
+    parser.add_argument("--mass", type=float, required=required, metavar="KG", help="of the robot [kg]")
+    parser.add_argument("--gravity", type=float, default=9.81, metavar="G", help="default: 9.81 m/s^2")
+
+
+def robot_options(options: argparse.Namespace) -> dict[str, float]:
+    """Its values by name; none where neither was given. `ProblemError` where one is missing."""
+    if options.length is None and options.mass is None:
+        return {}
+    if options.length is None or options.mass is None:
+        raise ProblemError(f"a robot needs --length and --mass; --{'length' if options.length is None else 'mass'} is missing.")
+    return {name: getattr(options, name) for name in ("length", "mass", "gravity")}
+
+
 def add_printing(parser: argparse.ArgumentParser) -> None:
     """``--json`` and ``--quiet``."""
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output, and nothing else")

@@ -10,10 +10,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from colloc.commands.ending import OK, run
-from colloc.commands.options import add_printing, add_result, new_parser, output_path, tell
+from colloc.commands.options import add_printing, add_result, add_robot, new_parser, output_path, robot_options, tell
 from colloc.gaits.problem_file import Reference
 from colloc.pictures.report_page import write_report
+from colloc.results.robot import Robot
+from colloc.results.solution import Solution
 from colloc.results.store import load
+from colloc.system.errors import ProblemError
 from colloc.system.progress import StatusLine
 
 _EPILOG = """\
@@ -21,7 +24,8 @@ The page needs no network and no other file: certificate, animation with frictio
 mesh, problem source, versions, and how to reproduce it. Results that failed get a page too.
 
   colloc report results/three_link.h5                 results/three_link.html
-  colloc report results/three_link.h5 --figures       also results/three_link-*.pdf and .png, one panel each"""
+  colloc report results/three_link.h5 --figures       also results/three_link-*.pdf and .png, one panel each
+  colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5          with speed, power and torques of a robot"""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -29,6 +33,8 @@ def _parser() -> argparse.ArgumentParser:
     add_result(parser)
     parser.add_argument("--problem", metavar="FILE.py", help="problem file whose REFERENCE to hold the result against")
     parser.add_argument("--figures", action="store_true", help="also write publication figures, PDF and PNG, one panel each")
+    add_robot(parser)
+    parser.add_argument("--period", type=float, metavar="S", help="of the robot: seconds a period takes")
     parser.add_argument("--output", metavar="PATH", help="folder, or .html file (default: beside the result)")
     add_printing(parser)
     return parser
@@ -45,7 +51,7 @@ def _report(options: argparse.Namespace) -> int:
     path = output_path(options.output, source.with_suffix(".html"))
     with StatusLine(enabled=not (options.quiet or options.json)) as line:
         line.say("writing the page")
-        write_report(solution, path, _reference(options.problem), source.parent)
+        write_report(solution, path, _reference(options.problem), source.parent, robot=_robot(solution, options))
         figures: list[Path] = []
         if options.figures:
             from colloc.pictures.publication import save_panels
@@ -57,6 +63,13 @@ def _report(options: argparse.Namespace) -> int:
     saved = f"saved {path} ({size / 1000:.0f} kB, self-contained)"
     tell(options, facts, [saved, *(f"  {figure}" for figure in figures)])
     return OK
+
+
+def _robot(solution: Solution, options: argparse.Namespace) -> Robot | None:
+    size = robot_options(options)
+    if bool(size) != (options.period is not None):
+        raise ProblemError("the page of a robot needs --length, --mass and --period.")
+    return Robot(solution, **size, period=options.period) if size else None
 
 
 def _reference(problem_file: str | None) -> Reference | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference
-from colloc.results.answer import PRESCRIBED, REALISED, REDUCED
+from colloc.results.answer import EVALUATED, PRESCRIBED, REALISED, REDUCED
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 
@@ -25,7 +25,11 @@ def summary_lines(solution: Solution, reference: Reference | None, *, verbose: b
     certificate = solution.certificate
     lines = [verdict]
     if certificate.replayed:
-        alone = solution.answer.program in (PRESCRIBED, REALISED)  # what these are the best of, `_search_lines` tells
+        alone = solution.answer.program in (
+            PRESCRIBED,
+            REALISED,
+            EVALUATED,
+        )  # what these are the best of, `_search_lines` tells
         best = solution.problem.objective
         lines = [
             verdict if alone else f"{verdict} ({solution.standing[0]})",
@@ -92,6 +96,8 @@ def _search_lines(solution: Solution) -> list[str]:
     answer = solution.answer
     if answer.program == PRESCRIBED:
         return [f"nothing is free: the motion is prescribed, measured on a mesh of {answer.edges.size - 1} intervals"]
+    if answer.program == EVALUATED:
+        return [f"nothing is sought: the gait was given, measured on a mesh of {answer.edges.size - 1} intervals"]
     if answer.program == REALISED:
         intervals = answer.edges.size - 1
         return [f"a polygon that repeats what a relaxed gait mixes, measured on {intervals} intervals", *solution.standing]

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.gait_fields import fields
+from colloc.results.robot import GRAVITY, Robot
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.replaced_file import replaced_file
@@ -31,6 +32,9 @@ def write_export(
     max_speed: float | Sequence[float] | None = None,
     rate: float = 50.0,
     periods: int = 1,
+    length: float | None = None,
+    mass: float | None = None,
+    gravity: float = GRAVITY,
 ) -> dict[str, Any]:
     """Write joint angles (or amplitudes of modes) and their speeds at equal steps of time.
 
@@ -48,6 +52,10 @@ def write_export(
         Samples a second.
     periods : int
         How often the period is repeated.
+    length, mass : float, optional
+        Of the robot [m], [kg]: then torques [N m] and powers [W] of the joints are written too.
+    gravity : float
+        [m/s^2]
 
     Returns
     -------
@@ -58,7 +66,7 @@ def write_export(
     ------
     ProblemError
         If neither `period` nor `max_speed` is given, the period is too short for the limits, a number or the ending of the
-        path is unusable, or the solution holds a prescribed motion.
+        path is unusable, the solution holds a prescribed motion, or only one of `length` and `mass` is given.
     """
     if periods < 1:
         raise ProblemError(f"periods must be at least 1, not {periods}.")
@@ -68,8 +76,16 @@ def write_export(
         raise ProblemError(f"{solution.problem.name} is a prescribed motion of a smooth body: it has no joints to export.")
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     trajectory = timed(solution.gait, rate, period, limits, keep_pace=bool(solution.problem.paced_by))
-    facts = _about(solution, trajectory, rate, limits)
-    text = (_csv if path.suffix == ".csv" else _json)(facts, trajectory, periods, solution.gait.coordinate)
+    facts, series = _about(solution, trajectory, rate, limits), {"rad": trajectory.angles, "rad_per_s": trajectory.speeds}
+    if length is not None or mass is not None:
+        if length is None or mass is None:
+            raise ProblemError("torques need both the length and the mass of the robot.")
+        torques = Robot(solution, length, mass, trajectory.period, gravity).torques(trajectory.phase)
+        series |= {"N_m": torques, "W": torques * trajectory.speeds}
+        facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
+    time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
+    series = {unit: np.tile(rows, periods) for unit, rows in series.items()}
+    text = (_csv if path.suffix == ".csv" else _json)(facts, time, series, solution.gait.coordinate)
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
     return facts
@@ -100,26 +116,21 @@ def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.n
     }
 
 
-def _repeated(trajectory: Trajectory, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time, angles and speeds of several periods in a row."""
-    time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
-    return time, np.tile(trajectory.angles, periods), np.tile(trajectory.speeds, periods)
-
-
-def _csv(facts: dict[str, Any], trajectory: Trajectory, periods: int, coordinate: str) -> str:
-    """Comma-separated values, with the facts in '#' lines."""
-    time, angles, speeds = _repeated(trajectory, periods)
-    names = [f"{coordinate}_{j}_{unit}" for unit in ("rad", "rad_per_s") for j in range(1, len(angles) + 1)]
+def _csv(facts: dict[str, Any], time: np.ndarray, series: dict[str, np.ndarray], coordinate: str) -> str:
+    """Comma-separated values, with the facts in '#' lines; of every unit a column for each joint."""
+    names = [f"{coordinate}_{j}_{unit}" for unit, rows in series.items() for j in range(1, len(rows) + 1)]
     text = io.StringIO()
     for key, value in facts.items():
         text.write(f"# {key}: {json.dumps(value)}\n")
     text.write(",".join(["time_s", *names]) + "\n")
-    np.savetxt(text, np.concatenate([time[None], angles, speeds]).T, fmt="%.9g", delimiter=",")
+    np.savetxt(text, np.concatenate([time[None], *series.values()]).T, fmt="%.9g", delimiter=",")
     return text.getvalue()
 
 
-def _json(facts: dict[str, Any], trajectory: Trajectory, periods: int, coordinate: str) -> str:
+_WHAT = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
+
+
+def _json(facts: dict[str, Any], time: np.ndarray, series: dict[str, np.ndarray], coordinate: str) -> str:
     """One JSON object."""
-    time, angles, speeds = _repeated(trajectory, periods)
-    arrays = {"time_s": time.tolist(), "angles_rad": angles.tolist(), "speeds_rad_per_s": speeds.tolist()}
-    return json.dumps({**facts, "coordinate": coordinate, **arrays}) + "\n"
+    arrays = {f"{_WHAT[unit]}_{unit}": rows.tolist() for unit, rows in series.items()}
+    return json.dumps({**facts, "coordinate": coordinate, "time_s": time.tolist(), **arrays}) + "\n"

@@ -19,7 +19,9 @@ from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
+from colloc.pictures.robot_figure import robot_panels
 from colloc.pictures.style import INK, styled
+from colloc.results.robot import Robot
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.replaced_file import replaced_file
 
@@ -75,9 +77,9 @@ def environment() -> Environment:
     return made
 
 
-def report_page(solution: Solution, reference: Reference | None = None, gap: str = "") -> str:
+def report_page(solution: Solution, reference: Reference | None = None, gap: str = "", *, robot: Robot | None = None) -> str:
     """The page as a string, also of a solution that failed: what does not exist is left out. The reference is the value to hold
-    the result against, `gap` a sentence about the upper bound."""
+    the result against, `gap` a sentence about the upper bound; `robot` gets a section of its own."""
     found: dict[str, Any] = {}
     errors = mesh_errors(solution)
     drawn = {name: panel for name, panel in panels(solution).items() if name not in ("filmstrip", "lab")}
@@ -98,6 +100,9 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
         _picture(drawn["convergence"], f"{solution.problem.objective.name} at each level"),
         _picture(drawn["mesh"], f"mesh: error of {solution.mesh.n} intervals"),
     ]
+    found |= {"robot": robot, "robot_pictures": []}
+    if robot is not None:
+        found["robot_pictures"] = [_picture(panel, f"{what} of the joints") for what, panel in robot_panels(robot).items()]
     found |= {"motion": motion_data(frames(solution), body), "errors": float(errors.sum())}
     return (
         environment()
@@ -122,14 +127,22 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
     )
 
 
-def write_report(solution: Solution, path: Path, reference: Reference | None = None, known: Path | None = None) -> Path:
-    """Write the page; `known` is the folder where upper bounds are kept, by default that of the page."""
+def write_report(
+    solution: Solution,
+    path: Path,
+    reference: Reference | None = None,
+    known: Path | None = None,
+    *,
+    robot: Robot | None = None,
+) -> Path:
+    """Write the page; `known` is the folder where upper bounds are kept, by default that of the page. With a `robot`
+    (`Solution.robot`) the page has its sheet."""
     gap = ""
     if solution.certificate.replayed:
         bound = upper_bound(solution.problem, known or path.parent, compute=False)
         gap = gap_line(solution.problem, solution.certificate.efficiency, bound)
     with replaced_file(path) as temporary:
-        Path(temporary).write_text(report_page(solution, reference, gap), encoding="utf-8")
+        Path(temporary).write_text(report_page(solution, reference, gap, robot=robot), encoding="utf-8")
     return path
 
 

@@ -14,7 +14,7 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.collocated_motion import CollocatedMotion
 
-REDUCED, PRESCRIBED, REALISED = "reduced", "prescribed", "realised"
+REDUCED, PRESCRIBED, REALISED, EVALUATED = "reduced", "prescribed", "realised", "evaluated"
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import Sliding
 from colloc.motion.with_inertia import slow_enough
 from colloc.numerics.mesh import Mesh
-from colloc.results.answer import Alternative, Answer, Step
+from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import SAMPLES, Column, RigidMotion, SampledMotion, motion_columns, motion_dataset, motion_frame
@@ -188,6 +188,8 @@ class Solution:
     @property
     def standing(self) -> list[str]:
         """What the gait is the best of, and what else the search met."""
+        if self.answer.program in (PRESCRIBED, EVALUATED):
+            return ["none: the gait was given"]
         if self.starts == 1 or not self.others:
             return ["local optimum, from one start"]
         best, *others = self.others
@@ -245,14 +247,29 @@ class Solution:
         """Write the motion as GIF or MP4, by the ending of `path`; options as for `colloc.pictures.movie.write_movie`."""
         return bound("animate")(self, Path(path), **options)
 
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the web page of `colloc report`."""
-        return bound("report")(self, Path(path))
+    def report(self, path: str | os.PathLike[str], *, robot: Any = None) -> Path:
+        """Write the web page of `colloc report`; with what `robot` returns also its sheet."""
+        return bound("report")(self, Path(path), robot=robot)
 
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
         """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`: ``solution.export("mine.csv",
         period=4)``; returns what the file says about them. Options as for `colloc.pictures.export.write_export`."""
         return bound("export")(self, Path(path), **options)
+
+    def robot(self, length: float, mass: float, period: float, **options: Any) -> Any:
+        """A `colloc.results.robot.Robot`: speed, power and torques of the gait on a robot of so many metres and kilograms.
+
+        Options as there: `gravity`, `max_speed`, `max_torque`.
+
+        Examples
+        --------
+        >>> import colloc
+        >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+        >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
+        >>> round(robot.facts["cost_of_transport"], 2)
+        3.85
+        """
+        return bound("robot")(self, length, mass, period, **options)
 
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""

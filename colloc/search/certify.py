@@ -12,7 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.chain import BALANCED
-from colloc.results.answer import REALISED, Answer
+from colloc.results.answer import EVALUATED, REALISED, Answer
 from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.verification.mesh_error import mesh_error
@@ -67,10 +67,15 @@ def is_trivial(answer: Answer) -> bool:
     problem = answer.problem
     if problem.slope is not None:
         return in_unit(answer.value, 1 / friction_unit(problem.law), problem.objective) < NOWHERE
-    if abs(answer.efficiency) * problem.law.smallest >= TRIVIAL_EFFICIENCY:
+    if not goes_nowhere(answer):
         return False
     theta = answer.x[answer.layout.theta[0]]
     return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
+
+
+def goes_nowhere(answer: Answer) -> bool:
+    """Whether what a gait on the level travels is nothing for its work; it may turn."""
+    return abs(answer.efficiency) * answer.problem.law.smallest < TRIVIAL_EFFICIENCY
 
 
 def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:
@@ -109,6 +114,8 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     at = problem, gait, answer.delta_per_period, gait.corner_phases, instants, tolerance
     if answer.program == REALISED:  # it need not be an optimum, nor is it collocated to be measured by that
         return gait_certificate(*at)
+    if answer.program == EVALUATED:
+        return gait_certificate(*at, claimed=answer.value, after=tuple(_mesh(answer)))
     before = (*_first_order(answer), _second_order(answer))
     return gait_certificate(*at, claimed=answer.value, before=before, after=(*_class(answer), *_mesh(answer)))
 

@@ -1,8 +1,10 @@
-"""Gaits that are collocated as they are, by no optimiser: prescribed motions, and finite gaits that stand for relaxed ones."""
+"""Gaits that are collocated as they are, by no optimiser: prescribed motions, gaits that are given, and finite ones that stand
+for relaxed ones."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,27 +13,51 @@ from colloc.collocation.layout import problem_layout
 from colloc.collocation.warm_start import balanced_variables
 from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.harmonic import Fourier
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.answer import PRESCRIBED, REALISED, Answer, Step
+from colloc.results.answer import EVALUATED, PRESCRIBED, REALISED, Answer, Step
+from colloc.search.certify import goes_nowhere
 from colloc.search.refine import MESHES
 from colloc.verification.refinement import planned_mesh
 
 
 def prescribed_answer(problem: Problem) -> Answer:
     """What a prescribed motion achieves on a mesh that meets the problem's tolerance; its message says what is missing."""
-    begin, gait = time.perf_counter(), problem.gait.member(np.empty(0), problem.body.n_joint)
-    mesh, message = Mesh(scheme(problem.scheme), problem.gait.edges(problem.intervals)), ""
-    kept = np.array(problem.gait.stages)
+    gait = problem.gait.member(np.empty(0), problem.body.n_joint)
+    edges, kept = problem.gait.edges(problem.intervals), np.array(problem.gait.stages)
+    return _on_a_fine_mesh(problem, gait, edges, kept, lambda mesh: as_it_is(problem, mesh, gait, np.empty(0), PRESCRIBED))
+
+
+def evaluated_answer(problem: Problem, gait: Fourier) -> Answer:
+    """The same of a series whose class is that of the problem, all harmonics without symmetry; it starts at the phase that
+    fixes the start of the class. Of a gait that goes nowhere, which no mesh would resolve, on a first mesh."""
+    parameters = problem.gait.parameters(gait)
+    member, edges = problem.gait.member(parameters, gait.n_joint), np.linspace(0.0, 1.0, problem.intervals + 1)
+
+    def answer_on(mesh: Mesh) -> Answer:
+        return as_it_is(problem, mesh, member, parameters, EVALUATED)
+
+    first = answer_on(Mesh(scheme(problem.scheme), edges))
+    if goes_nowhere(first):
+        return replace(first, history=(first.step,))
+    return _on_a_fine_mesh(problem, member, edges, np.empty(0), answer_on)
+
+
+def _on_a_fine_mesh(
+    problem: Problem, gait: AnyGait, edges: np.ndarray, kept: np.ndarray, answer_on: Callable[[Mesh], Answer]
+) -> Answer:
+    """The answer on a mesh that meets the problem's tolerance for a gait, and on which the phases `kept` are knots."""
+    begin, mesh, message = time.perf_counter(), Mesh(scheme(problem.scheme), edges), ""
     for _ in range(MESHES if problem.mesh_tolerance > 0 else 0):
         plan = planned_mesh(problem, mesh, gait, problem.delta, problem.mesh_tolerance, kept=kept)
         if plan is None:
             break
         mesh = Mesh(scheme(plan.scheme), plan.edges)
         message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
-    answer = replace(as_it_is(problem, mesh, gait, np.empty(0), PRESCRIBED), message=message)
+    answer = replace(answer_on(mesh), message=message)
     answer = replace(answer, seconds=time.perf_counter() - begin)
     return replace(answer, history=(answer.step,))
 

@@ -12,6 +12,7 @@ T = int s dt, with level = 0, is the fastest: some joint is at its limit all the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from scipy.optimize import brentq
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import Path
 
-_PHASES = 20001
+_PHASES = np.linspace(0.0, 1.0, 20001)
 _MOST_SAMPLES = 2_000_000
 
 
@@ -70,14 +71,9 @@ def timed(
     """
     if not np.isfinite(rate) or rate <= 0:
         raise ProblemError(f"the sample rate must be positive, not {rate:g}.")
-    t = np.linspace(0.0, 1.0, _PHASES)
-    vertices, _ = path(t)
-    # the path as a polygon (off by less than 1e-6 rad), so that limits hold exactly between the samples too
-    moved = np.abs(np.diff(vertices, axis=1)) * (t.size - 1)
-    most = np.full(len(moved), np.inf) if limits is None else _one_each(limits, len(moved))
-    slowest = (moved / most[:, None]).max(axis=0)
-    if keep_pace:
-        slowest = np.full_like(slowest, slowest.max())
+    vertices, _ = path(_PHASES)
+    most = np.full(len(vertices), np.inf) if limits is None else one_each(limits, len(vertices), "joint speed limit")
+    slowest = _slowest(vertices, most, keep_pace)
     shortest = float(slowest.mean())
     if period is None and limits is None:
         raise ProblemError("a trajectory needs a period in seconds or joint speed limits.")
@@ -97,19 +93,39 @@ def timed(
     clock = np.concatenate([[0.0], np.cumsum(pace) / pace.size])
     clock *= period / clock[-1]
     time = np.arange(count) / rate
-    phase = np.interp(time, clock, t)
+    phase = np.interp(time, clock, _PHASES)
     angles = np.stack([np.interp(time, clock, joint) for joint in vertices])
     index = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, pace.size - 1)
     speeds = np.clip(path(phase)[1] / pace[index], -most[:, None], most[:, None])
     return Trajectory(time, phase, angles, speeds, period)
 
 
-def _one_each(limits: np.ndarray | float, n_joint: int) -> np.ndarray:
+def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:
+    """Seconds that a path takes at least with joint speeds ``(n_joint,)`` [rad/s], at its own pace or at any.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> round(shortest_period(colloc.ellipse(A0=0, A1=0.5, B1=0), np.array([2.0, 2.0])), 3)
+    1.0
+    """
+    return float(_slowest(path(_PHASES)[0], limits, keep_pace).mean())
+
+
+def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.ndarray:
+    """Seconds per phase that speed limits ask for, on every side of a path as a polygon, ``(n - 1,)``: it is off by less than
+    1e-6 rad, and limits hold exactly between the samples too."""
+    slowest = (np.abs(np.diff(vertices, axis=1)) * (_PHASES.size - 1) / limits[:, None]).max(axis=0)
+    return np.full_like(slowest, slowest.max()) if keep_pace else slowest
+
+
+def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
+    """Limits that are positive numbers, ``(n_joint,)``, from one for all or one each; `what` one of them is."""
     given = np.asarray(limits, dtype=float).ravel()
     if given.size not in (1, n_joint):
-        raise ProblemError(f"{given.size} joint speed limits for {n_joint} joints; give one for all, or one each.")
+        raise ProblemError(f"{given.size} {what}s for {n_joint} joints; give one for all, or one each.")
     if not np.isfinite(given).all() or given.min() <= 0:
-        raise ProblemError(f"joint speed limits must be positive, not {given.tolist()}.")
+        raise ProblemError(f"{what}s must be positive, not {given.tolist()}.")
     return np.broadcast_to(given, n_joint)
 
 

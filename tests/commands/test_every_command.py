@@ -48,11 +48,25 @@ REFUSED = {
     "sweep": ["", "nope.py", "fails.py", "problem.py", "study.py --workers 0", "study.py --chunk 0", "study.py --workers x"],
     "verify": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --tolerance 0", "good.h5 --tolerance nan"],
     "compare": ["", "good.h5", "good.h5 nope.h5", "text.h5 good.h5"],
-    "report": ["", "nope.h5", "text.h5", "good.h5 --problem nope.py", "good.h5 --output x.txt"],
+    "report": ["", "nope.h5", "text.h5", "good.h5 --problem nope.py", "good.h5 --output x.txt", "good.h5 --period 1"],
     "animate": ["", "nope.h5", "text.h5"]
     + [f"good.h5 --{option}" for option in ("periods 0", "seconds nan", "fps 0", "width 0", "format avi", "output x.avi")],
     "export": ["", "nope.h5", "text.h5", "good.h5"]
-    + [f"good.h5 --period 4 --{option}" for option in ("rate nan", "max-speed 0", "max-speed 1 2 3", "periods 0", "format x")],
+    + [
+        f"good.h5 --period 4 --{option}"
+        for option in ("rate nan", "max-speed 0", "max-speed 1 2 3", "periods 0", "format x", "mass 1")
+    ],
+    "evaluate": [
+        "",
+        "problem.py",
+        "problem.py nope.csv",
+        "nope.py text.h5",
+        "problem.py text.h5",
+        "problem.py text.h5 --period x",
+    ],
+    "robot": ["", "nope.h5 --length 1 --mass 1 --period 1", "good.h5", "good.h5 --length 1 --mass 1"]
+    + [f"good.h5 --{words}" for words in ("length 0 --mass 1 --period 1", "length 1 --mass nan --period 1")]
+    + [f"good.h5 --length 1 --mass 1 --period {words}" for words in ("-5", "1 --max-speed 0", "1 --max-torque 1 2 3")],
     "pareto": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
     + [f"problem.py --{option}" for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")],
     "completion": ["--no-such", "x"],

@@ -1,0 +1,71 @@
+"""Command line: what a gait of one's own achieves, from a file of joint angles over time; a result like any other.
+
+Exit codes: 0 all checks hold, 2 bad problem, file or option, 3 not replayed, 4 a check fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from colloc.commands.ending import run
+from colloc.commands.options import add_printing, add_verbose, new_parser, output_path, tell
+from colloc.commands.solve import EXIT
+from colloc.commands.summary import kept_facts, kept_lines, summary_dict, summary_lines
+from colloc.gaits.problem_file import read_problem_file
+from colloc.results.gait_difference import gait_difference
+from colloc.results.kept import save_result
+from colloc.results.store import load
+
+_EPILOG = """\
+The file has a line for each instant: its time, then the angle of each joint, from tail to head. Names and '#' lines are
+optional; what colloc export writes can be read. Angles are radians, or degrees with --degrees or names that end in _deg.
+
+  colloc evaluate problems/three_link.py mine.csv                                    results/mine.h5
+  colloc evaluate problems/three_link.py mine.csv --best results/three_link.h5       and by what it differs from that
+  colloc animate results/mine.h5"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("evaluate", "What a gait of your own achieves: replayed, certified, saved as a result.", _EPILOG)
+    parser.add_argument("problem", help="a Python file that states PROBLEM: body, friction and limits are meant")
+    parser.add_argument("gait", metavar="GAIT.csv", help="times and joint angles")
+    parser.add_argument("--best", metavar="FILE.h5", help="a result to hold the gait against")
+    parser.add_argument(
+        "--period", type=float, metavar="T", help="in the file's unit of time (default: the file is one period)"
+    )
+    parser.add_argument("--harmonics", type=int, metavar="N", help="of the fit (default: as many as the samples are worth)")
+    parser.add_argument("--degrees", action="store_true", help="angles are degrees")
+    parser.add_argument("--output", metavar="PATH", help="folder or .h5 file (default: results/GAIT.h5)")
+    add_printing(parser)
+    add_verbose(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _evaluate, arguments)
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    from colloc.search.evaluate import evaluate
+
+    stated = read_problem_file(options.problem)
+    best = None if options.best is None else load(options.best)
+    given = {"period": options.period, "harmonics": options.harmonics, "degrees": options.degrees}
+    default = Path("results") / f"{Path(options.gait).stem}.h5"
+    solution = evaluate(stated.problem.with_(name=default.stem), options.gait, **given)
+    difference = None if best is None else gait_difference(solution, best)
+    path = output_path(options.output, default)
+    saved = save_result(solution, path)
+    facts = {**summary_dict(solution, saved[0].path, None, None), "kept": kept_facts(saved)}
+    lines = summary_lines(solution, None, verbose=options.verbose)
+    if best is not None and difference is not None:
+        facts["best"] = {"file": options.best, "value": best.value, **difference._asdict()}
+        lines.append(
+            f"  yours {solution.value:.4g}, best {best.value:.4g}; the largest difference is {difference.largest} "
+            f"({max(difference):.2g} of {difference.total:.2g} rad r.m.s.)"
+        )
+    tell(options, facts, [*lines, f"  saved {saved[0].path}", *kept_lines(saved)])
+    return EXIT[solution.status]

@@ -1,0 +1,60 @@
+"""Command line: what a gait does on a robot of so many metres and kilograms: speed, power, torques.
+
+Exit codes: 0 printed, 2 bad file or option.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from colloc.commands.ending import OK, run
+from colloc.commands.options import add_printing, add_result, add_robot, new_parser, output_path, robot_options, tell
+from colloc.commands.verify import check_trusted
+from colloc.results.robot import Robot
+from colloc.results.store import load
+
+_EPILOG = """\
+The robot is as long as its links together, and its mass is spread over them as the problem says. Motion is taken to be slow:
+inertia is not computed. The friction coefficients are those of the problem.
+
+  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5
+  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --max-speed 2.0 --max-torque 2.5 2.0
+  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --figure        results/three_link.robot.png"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("robot", "What a gait does on a robot: speed, work, power, torques, the shortest period.", _EPILOG)
+    add_result(parser)
+    add_robot(parser, required=True)
+    parser.add_argument("--period", type=float, required=True, metavar="S", help="seconds a period takes")
+    parser.add_argument("--max-speed", type=float, nargs="+", metavar="V", help="of the joints [rad/s], one or one each")
+    parser.add_argument("--max-torque", type=float, nargs="+", metavar="M", help="of the joints [N m], one or one each")
+    parser.add_argument("--figure", action="store_true", help="also draw torque, speed and power over time")
+    parser.add_argument("--output", metavar="PATH", help="folder or .png file of the figure (default: beside the result)")
+    add_printing(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _robot, arguments)
+
+
+def _robot(options: argparse.Namespace) -> int:
+    source = Path(options.result)
+    solution = load(source)
+    check_trusted(solution, options.result)
+    motors = {"max_speed": options.max_speed, "max_torque": options.max_torque}
+    robot = Robot(solution, **robot_options(options), period=options.period, **motors)
+    facts, lines = dict(robot.facts), robot.lines()
+    if options.figure or options.output:
+        path = output_path(options.output, source.with_suffix(".robot.png"))
+        from colloc.pictures.style import save
+
+        save(robot.plot(), path.with_suffix(""), kinds=("png",))
+        facts["figure"] = str(path)
+        lines.append(f"saved {path}")
+    tell(options, facts | {"notes": robot.sentences()}, lines)
+    return OK

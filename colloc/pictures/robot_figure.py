@@ -1,0 +1,37 @@
+"""Torque, speed and power of every joint of a robot over a period."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from colloc.pictures.publication import COLUMN, Panel
+from colloc.pictures.style import SERIES, Picture, styled
+from colloc.results.robot import Robot
+
+_SHOWN = {"torque": "N·m", "speed": "rad/s", "power": "W"}
+
+
+def robot_figure(robot: Robot) -> Figure:
+    """Torque, speed and power over a period, one below the other."""
+    with styled():
+        figure = Picture(figsize=(6.4, 6.4))
+        for axes, panel in zip(figure.subplots(len(_SHOWN), sharex=True), robot_panels(robot).values(), strict=True):
+            panel.draw(axes)
+            axes.label_outer()
+    return figure
+
+
+def robot_panels(robot: Robot) -> dict[str, Panel]:
+    """What is shown to its panel."""
+    return {what: Panel(COLUMN, 2.2, partial(_draw, robot=robot, what=what)) for what in _SHOWN}
+
+
+def _draw(axes: Axes, robot: Robot, what: str) -> None:
+    t = robot.columns["t"].values
+    for j, row in enumerate(robot.columns[f"joint_{what}s"].values):
+        axes.plot(t, row, color=SERIES[j % len(SERIES)], lw=1.3, label=f"joint {j + 1}")
+    axes.set(xlim=(0, t[-1]), xlabel="time  [s]", ylabel=f"{what}  [{_SHOWN[what]}]")
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=4, borderaxespad=0)

@@ -1,0 +1,249 @@
+"""A gait on a robot of so many metres and kilograms: the one module that knows units.
+
+Everything else counts lengths in body lengths L, forces in weights m g and time in periods T. So a torque is one in m g L,
+work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. Motion is taken to be slow:
+inertia is in none of the numbers, and the *Froude number* Fr = L / (g T^2), the inertia of a body that covers its length in a
+period over its weight, has to be far below the coefficients of friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from colloc.mechanics.actuators import joint_moments
+from colloc.mechanics.bodies import FULL
+from colloc.mechanics.law import rate_independent
+from colloc.results.motion import Column, motion_dataset
+from colloc.results.solution import Solution
+from colloc.system.arguments import check_finite
+from colloc.system.errors import ProblemError
+from colloc.system.late_binding import bound
+from colloc.verification.trajectory import one_each, shortest_period
+
+if TYPE_CHECKING:
+    import xarray
+
+GRAVITY = 9.81
+_INSTANTS, _A_SIDE = 2000, 8
+"""Of a period at least, and of every side of a polygon."""
+
+
+def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
+    """Torques of the joints' motors in balance [weight x body length] at phases t ``(n_time,)``, ``(n_joint, n_time)``.
+
+    Raises
+    ------
+    ProblemError
+        If the body has no joints that forces on its parts would turn, or it is on a slope.
+    """
+    problem = solution.problem
+    if FULL not in problem.body.formulations:
+        raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
+    if problem.slope is not None:
+        raise ProblemError(f"{problem.name} is on a slope: torques of joints that lift weight are not worked out.")
+    (angles, rates), near = solution.gait(t), solution.sample(t).z
+    at = problem.law, angles, rates
+    z = problem.body.solve(*at, solution.delta_per_period, start=near).z
+    delta = solution.delta_per_period
+    return np.asarray(joint_moments(problem.body, at[0], angles, problem.body.forces(*at, z, delta), delta))
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """What a gait does on a robot: `colloc.Solution.robot` makes it, and ``print`` shows it.
+
+    Parameters
+    ----------
+    solution : Solution
+    length : float
+        Of the robot, from tail to head, stretched [m].
+    mass : float
+        [kg]
+    period : float
+        Of the gait [s].
+    gravity : float
+        [m/s^2]
+    max_speed, max_torque : float or (n_joint,), optional
+        Of the motors [rad/s], [N m]: then the shortest period is told, and whether the torques suffice.
+
+    Raises
+    ------
+    ProblemError
+        If a number is not positive, the body has no joints, it is on a slope, or `max_speed` or `max_torque` is given where
+        torques depend on the pace.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
+    >>> round(robot.facts["work_per_period_J"], 1)
+    36.4
+    """
+
+    solution: Solution = field(repr=False)
+    length: float
+    mass: float
+    period: float
+    gravity: float = GRAVITY
+    max_speed: float | Sequence[float] | None = None
+    max_torque: float | Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        check_finite(positive=True, **{name: getattr(self, name) for name in ("length", "mass", "period", "gravity")})
+        problem, n = self.solution.problem, self.solution.gait.n_joint
+        for name, unit in (("max_speed", "speed"), ("max_torque", "torque")):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, one_each(getattr(self, name), n, f"joint {unit} limit"))
+                if not rate_independent(problem.law):
+                    raise ProblemError(
+                        f"{name} asks for another pace, and torques depend on it under {problem.law.label}: leave it "
+                        "out, or solve again with the coefficients in units of that period."
+                    )
+
+    @property
+    def torque_unit(self) -> float:
+        """m g L [N m], which is that of work too [J]."""
+        return self.mass * self.gravity * self.length
+
+    @property
+    def froude(self) -> float:
+        """L / (g T^2)."""
+        return self.length / (self.gravity * self.period**2)
+
+    def torques(self, t: np.ndarray) -> np.ndarray:
+        """Of the joints [N m] at phases t ``(n_time,)``, ``(n_joint, n_time)``."""
+        return self.torque_unit * joint_torques(self.solution, t)
+
+    @cached_property
+    def columns(self) -> dict[str, Column]:
+        """The motion over a period at the gait's own pace: name to values, units and dimensions."""
+        n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
+        t = np.arange(n + 1) / n
+        motion = self.solution.sample(t)
+        torques, speeds = self.torques(t), motion.rates / self.period
+        return {
+            "t": Column(t * self.period, "s", ("t",)),
+            "joint_angles": Column(motion.angles, "rad", ("joint", "t")),
+            "joint_speeds": Column(speeds, "rad/s", ("joint", "t")),
+            "joint_torques": Column(torques, "N m", ("joint", "t")),
+            "joint_powers": Column(torques * speeds, "W", ("joint", "t")),
+            "theta": Column(motion.theta, "rad", ("t",)),
+            "centre": Column(self.length * motion.centre, "m", ("axis", "t")),
+            "tail": Column(self.length * motion.tail, "m", ("axis", "t")),
+        }
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The motion over a period as an xarray Dataset whose units are SI ones."""
+        return motion_dataset(self.columns, {name: value for name, value in self.facts.items() if value is not None})
+
+    def plot(self) -> Any:
+        """Torque, speed and power of every joint over a period, as a matplotlib Figure."""
+        return bound("plot_robot")(self)
+
+    @cached_property
+    def facts(self) -> dict[str, Any]:
+        """All numbers by names that end in their units (JSON)."""
+        measured, problem = self.solution.measured, self.solution.problem
+        torques, speeds, powers = (self.columns[f"joint_{name}"].values for name in ("torques", "speeds", "powers"))
+        work, total = self.torque_unit * measured.work, powers.sum(axis=0)
+        facts = {
+            "name": problem.name,
+            "status": self.solution.status,
+            "length_m": float(self.length),
+            "mass_kg": float(self.mass),
+            "period_s": float(self.period),
+            "gravity_m_per_s2": float(self.gravity),
+            "speed_m_per_s": measured.distance * self.length / self.period,
+            "body_lengths_per_period": measured.distance,
+            "work_per_period_J": work,
+            "motor_work_per_period_J": self.period * float(_mean(np.maximum(powers, 0.0)).sum()),
+            "mean_power_W": work / self.period,
+            "peak_power_W": float(total.max()),
+            "cost_of_transport": measured.work / measured.distance,
+            "froude_number": self.froude,
+            "froude_number_over_friction": self.froude / problem.law.smallest,
+            "peak_torque_N_m": np.abs(torques).max(axis=1).tolist(),
+            "rms_torque_N_m": np.sqrt(_mean(torques**2)).tolist(),
+            "peak_speed_rad_per_s": np.abs(speeds).max(axis=1).tolist(),
+            "rms_speed_rad_per_s": np.sqrt(_mean(speeds**2)).tolist(),
+            "peak_joint_power_W": powers.max(axis=1).tolist(),
+        }
+        return facts | self._motors(np.abs(torques).max(axis=1))
+
+    def _motors(self, peak: np.ndarray) -> dict[str, Any]:
+        """What the motors' data say; nothing of what is not given."""
+        found: dict[str, Any] = {}
+        if self.max_speed is not None:
+            gait, limits = self.solution.gait, np.asarray(self.max_speed)
+            found["max_speed_rad_per_s"] = limits.tolist()
+            found["shortest_period_s"] = shortest_period(gait, limits, keep_pace=True)
+            if not self.solution.problem.paced_by:
+                found["shortest_period_paced_by_speed_s"] = shortest_period(gait, limits)
+        if self.max_torque is not None:
+            found["max_torque_N_m"] = np.asarray(self.max_torque).tolist()
+            found["torque_used"] = (peak / self.max_torque).tolist()
+        return found
+
+    def lines(self) -> list[str]:
+        """The sheet for people."""
+        f = self.facts
+        found = [
+            f"{f['name']}: {self.length:g} m, {self.mass:g} kg, {self.period:g} s a period ({f['status']})",
+            f"  speed              {f['speed_m_per_s']:.4g} m/s; {f['body_lengths_per_period']:.4g} body lengths a period",
+            f"  work               {f['work_per_period_J']:.4g} J a period; "
+            f"{f['motor_work_per_period_J']:.4g} J if motors take none back",
+            f"  power              mean {f['mean_power_W']:.4g} W, peak {f['peak_power_W']:.4g} W",
+            f"  cost of transport  {f['cost_of_transport']:.4g}",
+            "",
+            "             torque [N m]      speed [rad/s]     power [W]",
+            "             peak     r.m.s.   peak     r.m.s.   peak",
+        ]
+        names = ("peak_torque_N_m", "rms_torque_N_m", "peak_speed_rad_per_s", "rms_speed_rad_per_s", "peak_joint_power_W")
+        for j, row in enumerate(zip(*(f[name] for name in names), strict=True), 1):
+            found.append(f"  joint {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip())
+        return [*found, "", *(f"  {sentence}" for sentence in self.sentences())]
+
+    def sentences(self) -> list[str]:
+        """What has to be known of the numbers."""
+        f, problem = self.facts, self.solution.problem
+        said = []
+        if "shortest_period_s" in f:
+            paced = f.get("shortest_period_paced_by_speed_s")
+            more = "" if paced is None else f", {paced:.3g} s as colloc export --max-speed paces it"
+            said.append(f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the gait's own pace{more}.")
+        if "torque_used" in f:
+            worst = int(np.argmax(f["torque_used"]))
+            peak, has = f["peak_torque_N_m"][worst], f["max_torque_N_m"][worst]
+            if f["torque_used"][worst] > 1:
+                limit = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
+                said.append(
+                    f"Joint {worst + 1} needs {peak:.3g} N m and has {has:.3g}. Torques of dry friction do not depend on the "
+                    f"pace, so no period helps: solve with torque_limit=({limit})."
+                )
+            else:
+                said.append(f"The torques suffice at any pace: joint {worst + 1} uses {100 * peak / has:.3g} % of its own.")
+        if not rate_independent(problem.law):
+            said.append(
+                f"Torques depend on the pace under {problem.law.label}: its coefficients are taken to be those in units "
+                "of this period."
+            )
+        said.append(
+            f"Inertia is not computed. Froude number L/(g T^2) = {f['froude_number']:.2g}, over the least friction coefficient "
+            f"{f['froude_number_over_friction']:.2g}: the smaller, the better the numbers hold; 0.01 is not "
+            "small for every gait."
+        )
+        return said
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    """Over a period of equal steps, whose last instant is the first again."""
+    return np.asarray(values[..., :-1].mean(axis=-1))

@@ -1,0 +1,160 @@
+"""On a robot: metres, kilograms and seconds, held against the forces of dense points that know of no other units."""
+
+import json
+
+import numpy as np
+import pandas
+import pytest
+from scipy.optimize import minimize
+
+import colloc
+from colloc.commands.main import main
+from colloc.pictures.report_page import report_page
+
+SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
+POINTS = 400
+"""A link."""
+
+
+@pytest.fixture(scope="module")
+def robot(three_link):
+    return three_link.robot(**SIZE)
+
+
+def in_metres(solution, seconds):
+    """Points ``(n_link, POINTS)`` of the body [m], complex, with its tail link at rest on the x axis, and the ends of links."""
+    angles = solution.gait.angles(np.array([seconds / SIZE["period"]]))[:, 0]
+    heading = np.concatenate([[0.0], np.cumsum(angles)])
+    links = SIZE["length"] * np.array(solution.problem.body.lengths) * np.exp(1j * heading)
+    ends = np.concatenate([[0.0], np.cumsum(links)])
+    return ends[:-1, None] + links[:, None] * (np.arange(POINTS) + 0.5) / POINTS, ends
+
+
+def friction_of_points(solution, seconds, gravity=9.81):
+    """Force [N] and velocity [m/s] of every point where all of them balance, and the points."""
+    step = 1e-5 * SIZE["period"]
+    bending = (in_metres(solution, seconds + step)[0] - in_metres(solution, seconds - step)[0]) / (2 * step)
+    points = in_metres(solution, seconds)[0]
+    slow = solution.answer.delta * SIZE["length"] / SIZE["period"]
+    weight = SIZE["mass"] * gravity * np.array(solution.problem.body.lengths)[:, None] / POINTS
+
+    def moved(z):
+        velocity = z[0] + 1j * z[1] + 1j * z[2] * points + bending
+        return -weight * velocity / np.sqrt(abs(velocity) ** 2 + slow**2), velocity
+
+    def dissipated(z):
+        """Whose least value is the balance; its slopes are the forces and the moment that are left over."""
+        force, velocity = moved(z)
+        left_over = -np.array([force.sum().real, force.sum().imag, (points.conj() * force).imag.sum()])
+        return (weight * np.sqrt(abs(velocity) ** 2 + slow**2)).sum(), left_over
+
+    found = minimize(dissipated, np.zeros(3), jac=True, method="BFGS", options={"gtol": 1e-4 * SIZE["mass"] * gravity})
+    assert found.success
+    return *moved(found.x), points
+
+
+def test_torques_and_power_are_those_of_the_forces_on_dense_points(three_link, robot):
+    for seconds in (0.7, 1.3, 2.5, 4.0):
+        force, velocity, points = friction_of_points(three_link, seconds)
+        ends = in_metres(three_link, seconds)[1]
+        torques = robot.torques(np.array([seconds / SIZE["period"]]))[:, 0]
+        for joint, torque in enumerate(torques, 1):
+            arm = points[joint:] - ends[joint]
+            assert torque == pytest.approx(-(arm.conj() * force[joint:]).imag.sum(), rel=2e-3)
+        power = -(force.conj() * velocity).real.sum()
+        speeds = three_link.gait.rates(np.array([seconds / SIZE["period"]]))[:, 0] / SIZE["period"]
+        assert torques @ speeds == pytest.approx(power, rel=1e-3)
+
+
+def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_link, robot):
+    facts, columns = robot.facts, robot.columns
+    seconds, powers = columns["t"].values, columns["joint_powers"].values.sum(axis=0)
+    assert powers[:-1].mean() * 5 == pytest.approx(facts["work_per_period_J"], rel=1e-4)
+    assert facts["mean_power_W"] == pytest.approx(facts["work_per_period_J"] / 5)
+    way = np.linalg.norm(columns["centre"].values[:, -1] - columns["centre"].values[:, 0])
+    assert facts["speed_m_per_s"] * 5 == pytest.approx(way, rel=1e-4)
+    assert facts["cost_of_transport"] == pytest.approx(facts["work_per_period_J"] / (3 * 9.81 * way), rel=1e-4)
+    speeds = np.diff(columns["joint_angles"].values) / np.diff(seconds)
+    assert facts["peak_speed_rad_per_s"] == pytest.approx(np.abs(speeds).max(axis=1), rel=1e-4)
+
+
+def test_no_end_joint_carries_more_than_its_link_swung_broadside(robot):
+    """mu m g / 3 at a sixth of the length."""
+    assert max(robot.facts["peak_torque_N_m"]) <= 3 * 9.81 / 3 * 1.2 / 6 * (1 + 1e-9)
+
+
+def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
+    """Friction is proportional to the weight, torques to the length too; the pace is in speeds and powers alone."""
+    other = three_link.robot(length=2.4, mass=6, period=10, gravity=9.81 / 2).facts
+    for name, factor in (("work_per_period_J", 2), ("mean_power_W", 1), ("speed_m_per_s", 1), ("froude_number", 1)):
+        assert other[name] == pytest.approx(factor * robot.facts[name]), name
+    assert other["peak_torque_N_m"] == pytest.approx(2 * np.array(robot.facts["peak_torque_N_m"]))
+    assert other["rms_speed_rad_per_s"] == pytest.approx(np.array(robot.facts["rms_speed_rad_per_s"]) / 2)
+    assert other["cost_of_transport"] == pytest.approx(1 / three_link.efficiency)
+
+
+def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(three_link, tmp_path):
+    facts = three_link.robot(**SIZE, max_speed=[2.0, 3.0]).facts
+    at_it = three_link.robot(1.2, 3, facts["shortest_period_s"]).facts
+    assert max(np.array(at_it["peak_speed_rad_per_s"]) / [2, 3]) == pytest.approx(1, rel=1e-4)
+    exported = three_link.export(tmp_path / "x.csv", max_speed=[2, 3], rate=1000)
+    assert facts["shortest_period_paced_by_speed_s"] == pytest.approx(exported["period_s"], abs=2e-3)
+    assert facts["shortest_period_paced_by_speed_s"] < facts["shortest_period_s"]
+
+
+def test_weak_motors_are_told_the_limit_to_solve_with(three_link, robot):
+    assert "The torques suffice at any pace" in str(three_link.robot(**SIZE, max_torque=4))
+    weak = three_link.robot(**SIZE, max_torque=[4, 1.5])
+    assert "Joint 2 needs 1.96 N m and has 1.5" in str(weak)
+    assert f"torque_limit=({4 / robot.torque_unit:.4g}, {1.5 / robot.torque_unit:.4g})" in str(weak)
+
+
+def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
+    friction = colloc.Viscous(normal=2, tangential=1)
+    problem = colloc.Problem(
+        "paced", colloc.ellipse(0.0, 1.2, 0.8), gait=colloc.Harmonic(1), delta=1e-2, friction=friction, objective="towing"
+    )
+    swimmer = unsolved(problem)
+    assert "coefficients are taken to be those in units of this period" in str(swimmer.robot(**SIZE))
+    for name in ("max_speed", "max_torque"):
+        with pytest.raises(colloc.ProblemError, match=f"{name} asks for another pace, and torques depend on it"):
+            swimmer.robot(**SIZE, **{name: 1.0})
+
+
+@pytest.mark.parametrize("wrong", [{"length": 0}, {"period": -5}, {"mass": float("nan")}, {"max_speed": [1, 2, 3]}])
+def test_unusable_numbers_are_refused_by_name(three_link, wrong):
+    with pytest.raises(colloc.ProblemError, match=r"must be a positive finite number|3 joint speed limits for 2 joints"):
+        three_link.robot(**(SIZE | wrong))
+
+
+def test_a_smooth_body_has_no_torques_to_tell(unsolved):
+    guess = colloc.Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]])
+    soft = colloc.ModalBody(2, panels=4)
+    gait = colloc.Harmonic(1, "antipodal")
+    solution = unsolved(colloc.Problem("soft", guess, soft, colloc.Friction(3), gait, intervals=6))
+    with pytest.raises(colloc.ProblemError, match="smooth body: it has no joints"):
+        _ = solution.robot(**SIZE).facts
+
+
+def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, capsys):
+    file = colloc.save(three_link, tmp_path / "x.h5")
+    words = ["--length", "1.2", "--mass", "3", "--period", "5"]
+    assert main(["robot", str(file), *words, "--json", "--figure"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    for name, value in robot.facts.items():
+        assert told[name] == (value if isinstance(value, str) else pytest.approx(value, rel=1e-9)), name
+    assert (tmp_path / "x.robot.png").stat().st_size > 10_000
+    assert main(["export", str(file), *words, "--rate", "100"]) == 0
+    columns = pandas.read_csv(tmp_path / "x.csv", comment="#")
+    torques = np.stack([columns["joint_1_N_m"], columns["joint_2_N_m"]])
+    np.testing.assert_allclose(torques, robot.torques(np.arange(500) / 500), rtol=1e-4, atol=2e-3)
+    np.testing.assert_allclose(columns["joint_2_W"], torques[1] * columns["joint_2_rad_per_s"], atol=1e-6)
+    assert "cost of transport  3.846" in report_page(three_link, robot=robot)
+    assert "cost of transport" not in report_page(three_link)
+
+
+def test_the_motion_has_units(robot):
+    dataset = robot.to_xarray()
+    assert [dataset[f"joint_{name}"].units for name in ("torques", "speeds", "powers")] == ["N m", "rad/s", "W"]
+    assert dataset.sel(joint=2).joint_torques.shape == dataset.t.shape
+    assert float(dataset.t[-1]) == SIZE["period"]

@@ -1,0 +1,182 @@
+"""A gait of one's own: whatever way the angles are given, what comes out is what a replay of them says."""
+
+import json
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc.commands.main import main
+from colloc.gaits.fitted_gait import fitted_gait
+from colloc.results.gait_difference import gait_difference
+
+GAIT = colloc.Fourier([0.2, -0.1], [[0.9, 0.1], [0.3, 0.0]], [[0.0, 0.1], [0.8, -0.1]])
+PROBLEM = colloc.Problem("mine", delta=1e-3)
+T = np.arange(60) / 60
+
+
+@pytest.fixture(scope="module")
+def evaluated():
+    return colloc.evaluate(PROBLEM, GAIT)
+
+
+def written(path, time, angles, header="t,joint_1,joint_2"):
+    rows = [",".join(f"{value:.12g}" for value in row) for row in np.concatenate([time[None], angles]).T]
+    path.write_text("\n".join(["# measured", *([header] if header else []), *rows]) + "\n")
+    return path
+
+
+def test_it_is_what_a_replay_of_the_angles_says(evaluated):
+    replayed = colloc.replay(PROBLEM.body, PROBLEM.friction, GAIT, 1e-3)
+    assert evaluated.success
+    assert evaluated.efficiency == pytest.approx(replayed.efficiency, rel=1e-6)
+    assert evaluated.rotation == pytest.approx(replayed.rotation, abs=1e-6)
+    assert evaluated.turning  # which is told
+    assert {"replay gap", "mesh error", "self-contact"} <= {check.name for check in evaluated.certificate.checks}
+    assert not {"KKT error", "second order"} & {check.name for check in evaluated.certificate.checks}
+    assert evaluated.standing == ["none: the gait was given"]
+
+
+def test_every_way_to_give_a_gait_gives_the_same_one(tmp_path):
+    angles, unequal = GAIT.angles(T), np.sort(np.random.default_rng(0).uniform(0, 3, 200))
+    closed = np.concatenate([angles, angles[:, :1]], axis=1)
+    degrees = written(tmp_path / "d.csv", 2 * T, np.degrees(angles), "time_s,joint_1_deg,joint_2_deg")
+    ways = {
+        "array": fitted_gait(angles, 2),
+        "closed array": fitted_gait(closed, 2),
+        "function": fitted_gait(GAIT.angles, 2),
+        "file": fitted_gait(written(tmp_path / "a.csv", 5 * T + 3, angles), 2),
+        "file without names": fitted_gait(str(written(tmp_path / "b.csv", 5 * T, angles, "")), 2),
+        "degrees by name": fitted_gait(degrees, 2),
+        "degrees if said": fitted_gait(np.degrees(angles), 2, degrees=True),
+    }
+    for way, found in ways.items():
+        assert found.gait.n_harmonic == 2, way
+        np.testing.assert_allclose(found.gait.angles(T), angles, atol=1e-9, err_msg=way)
+        assert found.largest < 1e-9, way
+    several = written(tmp_path / "c.csv", unequal * 7, GAIT.angles(unequal - unequal[0]))
+    np.testing.assert_allclose(fitted_gait(several, 2, period=7).gait.angles(T), angles, atol=1e-9)
+
+
+def test_noise_is_smoothed_and_what_is_left_out_is_stated():
+    rng = np.random.default_rng(1)
+    t = np.arange(400) / 400
+    found = fitted_gait(GAIT.angles(t) + 0.02 * rng.normal(size=(2, 400)), 2)
+    assert found.gait.n_harmonic == 2
+    assert found.rms == pytest.approx(0.02, rel=0.1)
+    # least squares averages: the error is that of the noise times the root of coefficients over samples
+    assert np.sqrt(((found.gait.angles(t) - GAIT.angles(t)) ** 2).mean()) < 2 * 0.02 * np.sqrt(5 / 400)
+    assert f"400 samples: off by {found.rms:.1e} rad r.m.s." in found.describe()
+
+
+def test_a_corner_is_rounded_off_and_said():
+    found = fitted_gait(lambda t: np.stack([np.abs(4 * t - 2) - 1, np.sin(2 * np.pi * t)]), 2)
+    assert 1e-4 < found.rms < found.largest < 0.05
+
+
+def test_an_exported_gait_comes_back_as_it_was(evaluated, tmp_path):
+    evaluated.export(tmp_path / "x.csv", period=4, length=1, mass=2)
+    again = colloc.evaluate(PROBLEM, tmp_path / "x.csv")
+    assert again.efficiency == pytest.approx(evaluated.efficiency, rel=1e-6)
+
+
+def test_a_retraced_gait_goes_nowhere_and_that_is_said():
+    there_and_back = colloc.evaluate(PROBLEM, colloc.Fourier([0.3, 0.1], [[0.8], [0.5]], np.zeros((2, 1))))
+    assert not there_and_back.success
+    assert abs(there_and_back.distance) < 1e-6
+    assert "It goes nowhere for its work" in there_and_back.message
+
+
+@pytest.mark.slow
+def test_links_that_cross_fail_their_check_and_no_other():
+    crossing = colloc.Fourier([2.0, 2.0], [[0.9], [0.0]], [[0.0], [0.9]])
+    found = colloc.evaluate(PROBLEM, crossing)
+    assert found.status == "certificate failed"
+    assert [check.name for check in found.certificate.failures] == ["self-contact"]
+    assert "It fails: self-contact" in found.message
+
+
+def test_kept_and_loaded_it_is_the_same(evaluated, tmp_path):
+    loaded = colloc.load(colloc.save(evaluated, tmp_path / "x.h5"))
+    assert loaded.message == evaluated.message
+    assert loaded.status == "solved"
+    assert colloc.certify(loaded.answer).efficiency == pytest.approx(evaluated.efficiency, rel=1e-6)
+    assert loaded.robot(1.2, 3, 5).facts["cost_of_transport"] == pytest.approx(1 / evaluated.efficiency)
+
+
+@pytest.mark.parametrize(
+    ("changed", "differs"),
+    [
+        (colloc.Fourier([0.0, 0.4], [[0.8], [0.0]], [[0.0], [0.8]]), "the offset of the joints"),
+        (colloc.Fourier([0.0, 0.0], [[1.2], [0.0]], [[0.0], [0.9]]), "the amplitude"),
+        (colloc.Fourier([0.0, 0.0], [[0.8], [0.3]], [[0.0], [0.8 * 0.927]]), "the phase between the joints"),
+        (colloc.Fourier([0.0, 0.0], [[0.8, 0.2], [0.0, 0.0]], [[0.0, 0.0], [0.8, 0.1]]), "the higher harmonics"),
+    ],
+)
+def test_by_what_gaits_differ(changed, differs):
+    first = colloc.Fourier([0.0, 0.0], [[0.8], [0.0]], [[0.0], [0.8]])
+    best, mine = colloc.evaluate(PROBLEM, first), colloc.evaluate(PROBLEM, changed)
+    found = gait_difference(mine, best)
+    assert found.largest == differs
+    assert gait_difference(mine, mine).total < 1e-9
+    # the parts add up to the mean square at the start phase where the gaits are nearest
+    t = np.arange(512) / 512
+    images = [sign * first.angles(way * t + s) for sign in (1, -1) for way in (1, -1) for s in t]
+    images += [image[::-1] for image in images]
+    nearest = min(np.sqrt(((mine.gait.angles(t) - image) ** 2).sum(axis=0).mean()) for image in images)
+    assert found.total == pytest.approx(nearest, rel=1e-3)
+
+
+def test_the_command_says_yours_and_the_best(tmp_path, monkeypatch, capsys, evaluated):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('p', delta=1e-3)\n")
+    written(tmp_path / "own.csv", T, colloc.Fourier(GAIT.mean, 0.8 * GAIT.cos, 0.8 * GAIT.sin).angles(T))
+    colloc.save(evaluated, "best.h5")
+    assert main(["evaluate", "p.py", "own.csv", "--best", "best.h5"]) == 0
+    said = capsys.readouterr().out
+    assert "own: solved" in said
+    assert f"best {evaluated.value:.4g}; the largest difference is the amplitude" in said
+    assert main(["compare", "results/own.h5", "best.h5"]) == 1
+    capsys.readouterr()
+    assert main(["evaluate", "p.py", "own.csv", "--best", "best.h5", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["best"]["amplitude"] > 0.1
+
+
+BAD = {
+    "t,a,b\n0,1,nan\n1,2,3\n2,1,1\n3,1,2\n": "sample 1: '0,1,nan' is not 3 finite numbers",
+    "t,a\n0,1\n1,2\n2,1\n": "1 column of angles, and the body has 2 joints",
+    "t,a,b\n0,0,0\n1,1,0\n1,0,1\n": "do not rise after sample 2",
+    "t,a,b\n0,0,0\n1,1,0\n": "holds 2 samples",
+    "t,a,b\n0,0,0\n1,90,0\n2,0,90\n": "an angle of 90 rad: if angles are degrees, say so",
+    "": "holds 0 samples",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_bad_files_are_refused_in_a_sentence(text, tmp_path):
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(colloc.ProblemError, match=BAD[text]):
+        colloc.evaluate(PROBLEM, tmp_path / "bad.csv")
+
+
+@pytest.mark.parametrize(
+    ("given", "settings", "complaint"),
+    [
+        (np.zeros((3, 20)), {}, "angles of 3 joints, and the body has 2"),
+        (np.full((2, 20), np.nan), {}, "no finite angle of joint 1 at sample 1"),
+        (GAIT.angles(T[:20]), {}, "does not close"),
+        (GAIT.angles(T), {"period": -1}, "period must be positive"),
+        (GAIT.angles(T), {"harmonics": 40}, "60 samples determine 1 to 29 harmonics"),
+        (0.01 * GAIT.angles(T), {}, "hardly moves"),
+        ("nowhere.csv", {}, "cannot read nowhere.csv"),
+        ({"a": 1}, {}, "must be joint angles"),
+    ],
+)
+def test_what_is_no_gait_is_refused_in_a_sentence(given, settings, complaint):
+    with pytest.raises(colloc.ProblemError, match=complaint):
+        colloc.evaluate(PROBLEM, given, **settings)
+
+
+def test_where_a_gait_cannot_be_evaluated_alone_another_way_is_named():
+    with pytest.raises(colloc.ProblemError, match=r"colloc\.slope_motion"):
+        colloc.evaluate(colloc.Problem("up", gait=colloc.Harmonic(1), grade=0.1), GAIT)
