@@ -42,7 +42,7 @@ ORDER = (
             "troubleshooting.md",
         ),
     ),
-    ("Reference", ("known.md", "limits.md", "commands.md", "api.md", "modules.md", "changelog.md", "cite.md")),
+    ("Reference", ("reference.md", "known.md", "limits.md", "commands.md", "api.md", "modules.md", "changelog.md", "cite.md")),
     (
         "Explanation",
         ("theory.md", "search.md", "gait_classes.md", "relaxed.md", "bound.md", "bodies.md", "smooth_bodies.md"),
