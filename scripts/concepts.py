@@ -49,9 +49,8 @@ def body_and_friction(ax: Axes) -> Axes:
         low, high = sorted((heading, heading + np.degrees(angle)))
         ax.add_patch(Arc(tuple(at), 0.24, 0.24, theta1=low, theta2=high, color=BLUE, lw=1.5))
         middle = np.radians(0.5 * (low + high))
-        ax.text(
-            *(at + 0.17 * np.array([np.cos(middle), np.sin(middle)])), f"$q_{joint + 1}$", color=BLUE, ha="center", va="center"
-        )
+        x, y = at + 0.17 * np.array([np.cos(middle), np.sin(middle)])
+        ax.text(x, y, f"$q_{joint + 1}$", color=BLUE, ha="center", va="center")
     ax.text(ends[0, 0] - 0.03, ends[1, 0], "tail", ha="right", va="center", color=GREY)
     ax.text(ends[0, -1] + 0.04, ends[1, -1], "head", ha="left", va="center", color=GREY)
     left = float(ends[0, -1]) + 0.45
@@ -59,10 +58,17 @@ def body_and_friction(ax: Axes) -> Axes:
     draw_chain(ax, np.array([[left, left + 1 / 3], [y, y]]))
     centre = np.array([left + 1 / 6, y])
     for step, label in ((np.array([0.36, 0]), "forwards: $\\mu_f$"), (np.array([-0.36, 0]), "backwards: $\\mu_b$")):
-        ax.annotate("", centre + step, centre + 0.58 * step, arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2})
-        ax.text(*(centre + step + np.array([0, -0.05])), label, ha="center", va="top", color=ORANGE)
+        ax.annotate(
+            "", (*(centre + step),), (*(centre + 0.58 * step),), arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2}
+        )
+        ax.text(centre[0] + step[0], centre[1] - 0.05, label, ha="center", va="top", color=ORANGE)
     for side in (1, -1):
-        ax.annotate("", centre + np.array([0, 0.19 * side]), centre, arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2})
+        ax.annotate(
+            "",
+            (centre[0], centre[1] + 0.19 * side),
+            (centre[0], centre[1]),
+            arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2},
+        )
     ax.text(centre[0], centre[1] + 0.21, "sideways: $\\mu_t$", ha="center", va="bottom", color=ORANGE)
     ax.set(aspect="equal", xlim=(ends[0, 0] - 0.12, left + 0.72), ylim=(y - 0.3, y + 0.34))
     ax.set_axis_off()
@@ -112,7 +118,7 @@ def smoothed_friction(ax: Axes) -> Axes:
 def triangle(size: float) -> colloc.Corners:
     """Move one joint by `size`, then the other, then both back."""
     c = _ANGLE
-    return colloc.Corners([[c + size, c, c], [-c, -c, -c - size]])
+    return colloc.Corners(np.array([[c + size, c, c], [-c, -c, -c - size]]))
 
 
 def size_and_delta(ax: Axes) -> Axes:
