@@ -50,7 +50,11 @@ def machine() -> str:
 
 def document(sections: dict[str, dict]) -> str:
     """The report of all sections measured so far, in the order of PARTS."""
-    text = ["# Benchmarks", "", "Written by `python -m benchmarks`; see docs/benchmarks.md for what follows from it."]
+    text = [
+        "# Benchmarks",
+        "",
+        "Written by `python -m benchmarks`; see docs/developers/benchmarks.md for what follows from it.",
+    ]
     text += [f"Versions: {', '.join(f'{k} {v}' for k, v in versions().items())}.", ""]
     for name, title in PARTS.items():
         if name in sections:

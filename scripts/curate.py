@@ -26,6 +26,7 @@ KEPT = {
     "gallery.png": "python -m scripts.gallery",
     "side_by_side.gif": "python -m scripts.side_by_side",
     "screens": "python -m scripts.screens",
+    "concepts": "python -m scripts.concepts",
     "mesh_tolerance.md": "python -m benchmarks.work_precision",
     "gait_classes.md": "python -m scripts.class_table",
     "gait_classes_4.md": "python -m scripts.class_table --links 4",

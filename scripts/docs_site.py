@@ -1,6 +1,7 @@
 """Hooks of the documentation (mkdocs.yml): the order of pages, generated pages, formulas, links out of docs/.
 
-- Pages that `ORDER` does not name are appended under "Measurements and notes", so a new file in docs/ needs no other change.
+- Four parts, and before them where to start. Pages that `ORDER` does not name, such as those of docs/developers, are appended
+  under "For developers", so a new file in docs/ needs no other change.
 - Generated: the notebook with what it showed, the gallery (problems/ with results/curated/gallery.json), the commands (what
   --help says), the API.
 - Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built: readers load no script.
@@ -30,34 +31,22 @@ from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (
-    ("Start", ("index.md", "tutorial.md", "notebook.md", "gallery.md", "known.md", "limits.md", "troubleshooting.md")),
+    ("Start", ("index.md", "concepts.md")),
+    ("Tutorial", ("tutorial.md", "notebook.md", "gallery.md")),
     (
         "How to",
         (
-            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "pace", "slopes", "check", "starts")),
-            "laws.md",
-            "objectives.md",
-            "studies.md",
-            "cluster.md",
+            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "pace", "slopes", "laws", "objectives")),
+            *(f"howto/{name}.md" for name in ("check", "starts", "studies", "cluster", "own_body", "own_gait_class")),
             "howto/paper.md",
+            "troubleshooting.md",
         ),
     ),
+    ("Reference", ("reference.md", "known.md", "limits.md", "commands.md", "api.md", "modules.md", "changelog.md", "cite.md")),
     (
-        "Theory",
-        (
-            "theory.md",
-            "convergence.md",
-            "reliability.md",
-            "gait_classes.md",
-            "relaxed.md",
-            "bound.md",
-            "bodies.md",
-            "smooth_bodies.md",
-            "own_body.md",
-            "own_gait_class.md",
-        ),
+        "Explanation",
+        ("theory.md", "search.md", "gait_classes.md", "relaxed.md", "bound.md", "bodies.md", "smooth_bodies.md"),
     ),
-    ("Reference", ("commands.md", "api.md", "modules.md", "architecture.md", "changelog.md", "cite.md")),
 )
 PICTURES = (".png", ".gif")
 KEPT = (*PICTURES, ".md")
@@ -77,7 +66,7 @@ def on_config(config: Any) -> Any:
     nav: list[Any] = [{title: [page for page in pages if page in present]} for title, pages in ORDER]
     rest = sorted(present - named)
     if rest:
-        nav.append({"Measurements and notes": rest})
+        nav.append({"For developers": rest})
     config["nav"] = nav
     return config
 
@@ -114,11 +103,13 @@ def site_link(match: re.Match[str], page: str) -> str:
     """A link on a page as the site has it: pictures and tables of results/curated stay, other files outside docs/ become the
     page that shows them, or else their name."""
     picture, text, target = match.groups()
-    file, back = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), target)), "../" * page.count("/")
+    folder, back = posixpath.dirname(page), "../" * page.count("/")
+    copied = page.startswith("curated/")
+    file = posixpath.normpath(posixpath.join("results" if copied else "docs", folder, target))
     if SHOWN.get(file, page) != page:
         return f"[{text}]({back}{SHOWN[file]})"
     if file.startswith("docs/"):
-        return match[0]
+        return f"[{text}]({back}{file.removeprefix('docs/')})" if copied else match[0]
     if file.startswith("results/curated/") and file.endswith(KEPT):
         return f"{picture}[{text}]({back}curated/{file.removeprefix('results/curated/')})"
     return f"`{file}`" if text.strip("`") in (file, Path(file).name) else f"{text} (`{file}`)"

@@ -32,6 +32,8 @@ def shown(markdown, page="tutorial.md"):
         ("[`kernel.c`](../colloc/mechanics/native/kernel.c)", "known.md", "`colloc/mechanics/native/kernel.c`"),
         ("[a](https://example.org/x)", "known.md", "[a](https://example.org/x)"),
         ("[a](#files)", "limits.md", "[a](#files)"),
+        ("[a](../../docs/bound.md)", "curated/frontier.md", "[a](../bound.md)"),
+        ("![a](gallery.png)", "curated/frontier.md", "![a](../curated/gallery.png)"),
     ],
 )
 def test_a_link_of_the_repository_leads_to_the_page_that_shows_it(link, page, becomes):

@@ -20,7 +20,7 @@ from colloc.mechanics.friction import Friction
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+DOCS = Path(__file__).resolve().parents[1] / "docs/howto"
 
 
 def run(page, monkeypatch):

@@ -50,7 +50,7 @@ class Problem:
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction
-        Or any other `colloc.mechanics.law.Law` (docs/laws.md).
+        Or any other `colloc.mechanics.law.Law` (docs/howto/laws.md).
     gait : Harmonic, FreePath, Polygon or Relaxed
         The class of gaits; which paths in shape space are allowed decides the answer (docs/gait_classes.md). By default one
         harmonic or, for a body whose motion is prescribed, that motion (`colloc.gaits.prescribed`).

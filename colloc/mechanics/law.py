@@ -1,6 +1,6 @@
 """What a law of friction has to answer for: the force on a point, and on a straight link, at a velocity; and its traits.
 
-`colloc.mechanics.friction.Friction` is Coulomb's law, the usual one; the package `colloc.laws` has others (docs/laws.md).
+`colloc.mechanics.friction.Friction` is Coulomb's law, the usual one; the package `colloc.laws` has others (docs/howto/laws.md).
 Everything else, from the balance to the report, asks only these questions. Velocities are those along and across the body at a
 point; of a link (vs, vn, w), its midpoint's and its rotation rate. All arrays are two-dimensional, ``(n_part, n_time)``, NumPy
 or CasADi; forces are per length.

@@ -2,7 +2,7 @@
 
 The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled when first needed, in about
 half a second, and kept (`colloc.numerics.c_compiler`). Without a compiler, or a folder to keep the library in, everything is
-done by NumPy, the reference (docs/notes/kernel.md says why C, and why then).
+done by NumPy, the reference (docs/developers/kernel.md says why C, and why then).
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on
 nothing but its own data, so it is the same in any batch and on any number of threads.
 """

@@ -69,7 +69,8 @@ def _searched(problem: Problem) -> Searched:
     if found is None:
         raise ProblemError(
             f"no search is known for the class {type(problem.gait).__name__}: derive it from Harmonic if its gaits are Fourier "
-            "series, or give its program and its space a line in SEARCHED of colloc.reduced.spaces (docs/own_gait_class.md)."
+            "series, or give its program and its space a line in SEARCHED of colloc.reduced.spaces "
+            "(docs/howto/own_gait_class.md)."
         )
     return found
 

@@ -61,12 +61,12 @@ def heading_map(
 ) -> HeadingMap:
     """How a period turns a body on a slope, by its heading, and which headings last.
 
+    Other parameters and errors are those of `colloc.verification.slope.slope_motion`.
+
     Parameters
     ----------
     count : int
         Headings that are tried; lasting ones are found between two of them that turn opposite ways.
-
-    Other parameters and errors are those of `colloc.verification.slope.slope_motion`.
 
     Examples
     --------

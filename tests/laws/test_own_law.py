@@ -76,7 +76,7 @@ def test_what_is_no_law_of_friction_is_refused_with_its_reason(tangential, norma
 
 
 def test_the_page_on_laws_runs(capsys):
-    page = (Path(__file__).resolve().parents[2] / "docs/laws.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs/howto/laws.md").read_text(encoding="utf-8")
     for block in re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
         exec(compile(block, "laws.md", "exec"), {})
     said = capsys.readouterr().out

@@ -140,7 +140,7 @@ kill -- -$(cat "$(dirname "$0")/sbatch.pid")
 
 def test_the_recipe_for_slurm_runs_with_a_stand_in_for_its_commands(tmp_path):
     pytest.importorskip("dask_jobqueue")
-    page = (Path(__file__).resolve().parents[2] / "docs" / "cluster.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs/howto/cluster.md").read_text(encoding="utf-8")
     (recipe,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     for stated, here in (
         ('"64GB"', '"4GB"'),

@@ -87,7 +87,7 @@ def test_a_long_text_does_not_make_an_array_of_texts_unreadable(tmp_path):
 
 
 def test_limits_of_size_are_to_the_byte_and_those_of_the_documentation(tmp_path):
-    assert (LARGEST_FILE, LONGEST_TEXT, LONGEST_IN_ARRAY) == (256 * 2**20, 2**20, 2000)  # docs/studies.md
+    assert (LARGEST_FILE, LONGEST_TEXT, LONGEST_IN_ARRAY) == (256 * 2**20, 2**20, 2000)  # docs/howto/studies.md
     assert LARGEST_ARRAY == LARGEST_FILE / 2
     path = tmp_path / "x.h5"
     with new_file(path) as file:
