@@ -6,6 +6,7 @@ together. Newton's method starts from those of the slow motion.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ _ACCURACY = 0.02
 """Relative, of a loss, and of what a finer mesh may change in the Froude number for it."""
 _VISCOUS, _WETTER = 3.0, 10**0.5
 """Delta [body lengths per period] at which friction is as good as viscous, and the factor from each tried to the next."""
+_LOSS_ACCURACY = 1e-3
 _POWER = 1.5
 """Of the Froude number, to which the change of the efficiency is in proportion; between 1 and 2 where it is small."""
 _FIRST, _FASTEST, _FARTHEST = 0.3, 10.0, np.log(5.0)
@@ -169,14 +171,59 @@ def slow_enough(
     check_finite(positive=True, loss=loss, delta=delta)
     if loss > 0.5:
         raise ProblemError(f"loss must be at most 0.5, not {loss!r}.")
-    chain, known = checked_inertia(body, gait), np.nan
-    friction = chain.law(friction)
+    chain, accurate = checked_inertia(body, gait), _ACCURACY
+    law = chain.law(friction)
+    return _refined(
+        chain, law, gait, breaks, lambda on_mesh: _froude(on_mesh, law, delta, loss), lambda froude: accurate * froude
+    )
+
+
+def inertial_loss(
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    froude: float,
+    *,
+    breaks: np.ndarray | tuple[float, ...] = (),
+) -> float:
+    """The part of a gait's efficiency that inertia takes at a Froude number L/(g T^2), to 1e-3; negative where it helps.
+
+    Arguments, and what is raised, are as of `slow_enough`.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    >>> round(inertial_loss(colloc.Chain(), colloc.Friction(), gait, delta=1e-4, froude=0.05), 2)
+    0.39
+    """
+    check_finite(positive=True, froude=froude, delta=delta)
+    chain = checked_inertia(body, gait)
+
+    def lost(on_mesh: GaitOnMesh) -> float:
+        slow = on_mesh.slow(delta)
+        return 1.0 - on_mesh.played(delta, froude, slow).efficiency / slow.efficiency
+
+    return _refined(chain, chain.law(friction), gait, breaks, lost, lambda _: _LOSS_ACCURACY)
+
+
+def _refined(
+    body: Chain,
+    friction: Law,
+    gait: Path,
+    breaks: np.ndarray | tuple[float, ...],
+    number: Callable[[GaitOnMesh], float],
+    allowed: Callable[[float], float],
+) -> float:
+    """A number on the first mesh on which it changes by less than is allowed."""
+    known = np.nan
     for intervals in _INTERVALS * 2 ** np.arange(_DOUBLED):
         edges = np.union1d(np.linspace(0.0, 1.0, intervals + 1), np.asarray(breaks, dtype=float))
-        before, known = known, _froude(GaitOnMesh(chain, friction, gait, Mesh(scheme(SCHEME), edges)), friction, delta, loss)
-        if abs(known - before) < _ACCURACY * known:
+        before, known = known, number(GaitOnMesh(body, friction, gait, Mesh(scheme(SCHEME), edges)))
+        if abs(known - before) < allowed(known):
             return known
-    raise NotConvergedError("finer and finer meshes do not agree on how slow is slow enough; try a larger delta.")
+    raise NotConvergedError("finer and finer meshes do not agree on what inertia does to this gait; try a larger delta.")
 
 
 def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float:

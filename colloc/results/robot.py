@@ -1,13 +1,13 @@
 """A gait on a robot of so many metres and kilograms: the one module that knows units.
 
 Everything else counts lengths in body lengths L, forces in weights m g and time in periods T. So a torque is one in m g L,
-work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. Motion is taken to be slow:
-inertia is in none of the numbers, and the *Froude number* Fr = L / (g T^2), the inertia of a body that covers its length in a
-period over its weight, has to be far below the coefficients of friction.
+work too, a power in m g L / T, and a speed in L / T; the cost of transport W / (m g d) has no unit. Motion is taken to be slow.
+What inertia takes at the robot's pace stands beside it: that depends on the *Froude number* Fr = L / (g T^2) alone.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,10 +18,11 @@ import numpy as np
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.law import rate_independent
+from colloc.motion.with_inertia import inertial_loss
 from colloc.results.motion import Column, motion_dataset
 from colloc.results.solution import Solution
 from colloc.system.arguments import check_finite
-from colloc.system.errors import ProblemError
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.late_binding import bound
 from colloc.verification.trajectory import one_each, shortest_period
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     import xarray
 
 GRAVITY = 9.81
+SLOW_ENOUGH = 0.01
+"""Part of the efficiency that inertia may take from a gait that is called slow."""
 _INSTANTS, _A_SIDE = 2000, 8
 """Of a period at least, and of every side of a polygon."""
 
@@ -174,7 +177,19 @@ class Robot:
             "rms_speed_rad_per_s": np.sqrt(_mean(speeds**2)).tolist(),
             "peak_joint_power_W": powers.max(axis=1).tolist(),
         }
-        return facts | self._motors(np.abs(torques).max(axis=1))
+        return facts | self._inertia() | self._motors(np.abs(torques).max(axis=1))
+
+    def _inertia(self) -> dict[str, Any]:
+        """What inertia takes at this pace, and at which it takes little."""
+        solution, problem = self.solution, self.solution.problem
+        at = problem.body, problem.law, solution.gait, solution.answer.delta_per_period
+        try:
+            found = {"inertia_takes": inertial_loss(*at, self.froude, breaks=solution.gait.corner_phases)}
+            if rate_independent(problem.law):
+                found["slow_enough_period_s"] = math.sqrt(self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH)))
+        except NotConvergedError:
+            return {}
+        return found
 
     def _motors(self, peak: np.ndarray) -> dict[str, Any]:
         """What the motors' data say; nothing of what is not given."""
@@ -233,11 +248,14 @@ class Robot:
                 f"Torques depend on the pace under {problem.law.label}: its coefficients are taken to be those in units "
                 "of this period."
             )
-        said.append(
-            f"Inertia is not computed. Froude number L/(g T^2) = {f['froude_number']:.2g}, over the least friction coefficient "
-            f"{f['froude_number_over_friction']:.2g}: the smaller, the better the numbers hold; 0.01 is not "
-            "small for every gait."
-        )
+        pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
+        if "inertia_takes" in f:
+            lost, slow = f["inertia_takes"], f.get("slow_enough_period_s")
+            word = "takes" if lost >= 0 else "adds"
+            more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
+            said.append(f"All this is slow motion. Inertia {word} {100 * abs(lost):.2g} % of the efficiency {pace}{more}.")
+        else:
+            said.append(f"All this is slow motion. What inertia does {pace} could not be computed.")
         return said
 
     def __str__(self) -> str:

@@ -158,3 +158,16 @@ def test_the_motion_has_units(robot):
     assert [dataset[f"joint_{name}"].units for name in ("torques", "speeds", "powers")] == ["N m", "rad/s", "W"]
     assert dataset.sel(joint=2).joint_torques.shape == dataset.t.shape
     assert float(dataset.t[-1]) == SIZE["period"]
+
+
+def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, robot):
+    slow = three_link.robot(1.2, 3, robot.facts["slow_enough_period_s"]).facts
+    assert slow["inertia_takes"] == pytest.approx(0.01, abs=2e-3)
+    assert robot.facts["inertia_takes"] > 0.02
+    assert "Inertia takes 2.5 % of the efficiency at this pace" in str(robot)
+
+
+def test_what_inertia_takes_is_that_of_the_motion_followed_through_time(three_link, robot):
+    at = three_link.problem.body, three_link.problem.law, three_link.gait, three_link.problem.delta
+    played = colloc.inertial_motion(*at, robot.froude, tolerance=1e-4)
+    assert robot.facts["inertia_takes"] == pytest.approx(1 - played.efficiency / three_link.efficiency, abs=1e-3)
