@@ -9,7 +9,7 @@ import colloc
 
 # fmt: off
 VALUES = {
-    "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FreePath", "Friction",
+    "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FeetLaw", "Foot", "FreePath", "Friction",
     "GaitClass", "Guarantee", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon", "PotentialSpace",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
     "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",

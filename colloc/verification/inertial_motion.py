@@ -185,7 +185,7 @@ def inertial_motion(
     --------
     >>> import colloc
     >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-3, froude=0.1)
+    >>> played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-2, froude=0.1, tolerance=1e-3)
     >>> round(played.efficiency, 3), played.stable
     (0.136, True)
     """
