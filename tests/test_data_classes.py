@@ -10,7 +10,7 @@ import colloc
 # fmt: off
 VALUES = {
     "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FreePath", "Friction",
-    "GaitClass", "Guarantee", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon", "PotentialSpace",
+    "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon", "PotentialSpace",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
     "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
 }
