@@ -30,10 +30,6 @@ TESTS = {
 _OF_ALL_CALLS = "colloc/mechanics/native_kernel.py::address"
 _OF_OWN_LAWS = "colloc/laws/link_quadrature.py::ByQuadrature.kernel_source"
 _OF_CALLS = {
-    "enclosure.h": "colloc/bounds/enclosure.py::by_convexity",
-    "growth.h": "colloc/bounds/enclosure.py::by_convexity",
-    "cell_link.h": "colloc/bounds/enclosure.py::by_convexity",
-    "loaded.h": "colloc/bounds/loaded_balance.py::loaded_balance",
     "motion.h": "colloc/mechanics/native_kernel.py::compiled_motion",
     "link_quadrature.h": _OF_OWN_LAWS,
     "dual.h": _OF_OWN_LAWS,

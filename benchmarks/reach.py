@@ -40,12 +40,12 @@ class Test(NamedTuple):
 
 
 def _named(code: CodeType) -> str:
-    """``colloc/bounds/guaranteed.py::certify`` of a function."""
+    """``colloc/bounds/sampled.py::efficiency_bound`` of a function."""
     return f"colloc/{code.co_filename.removeprefix(_LIBRARY)}::{code.co_qualname}"
 
 
 def named_line(file: str, text: str) -> str:
-    """``colloc/bounds/guaranteed.py: return 0`` of a line."""
+    """``colloc/bounds/sampled.py: return 0`` of a line."""
     return f"{file}: {text.strip()}"
 
 

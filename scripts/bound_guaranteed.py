@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from colloc.bounds.guaranteed import certify
 from colloc.bounds.sampled import efficiency_bound
+from research.guarantee.guaranteed import certify
 from scripts.check_potential import add_domain, domain_of, potentials
 
 

@@ -60,6 +60,13 @@ def test_imports_point_down_the_packages():
                 assert PACKAGES.index(package) <= level, f"{name} imports {other} from above"
 
 
+def test_the_library_imports_nothing_that_lies_outside_it():
+    outside = {path.name for path in ROOT.iterdir() if path.is_dir()} - {"colloc"}
+    assert {"research", "scripts", "benchmarks", "tests"} <= outside
+    for path in (ROOT / "colloc").rglob("*.py"):
+        assert not outside & {module.split(".")[0] for module in imported(path)}, path
+
+
 def test_no_circles_between_modules():
     known = modules()
     graph = {

@@ -2,12 +2,16 @@
 
 import re
 import tomllib
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 STATED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PACKED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]["find"][
+    "include"
+]
 NEEDED = dict(requirement.split(">=") for requirement in STATED["dependencies"])
 RECIPE = (ROOT / "recipe/recipe.yaml").read_text(encoding="utf-8")
 CONDA_NAMES = {"matplotlib-base": "matplotlib"}
@@ -35,6 +39,12 @@ def test_the_recipe_builds_and_starts_what_the_wheel_does():
     assert f"colloc = {STATED['scripts']['colloc']}" in RECIPE
     assert (ROOT / "problems/three_link.py").exists()
     assert (ROOT / "LICENSE").exists()
+
+
+def test_of_all_packages_in_the_source_tree_the_wheel_holds_the_library():
+    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")}
+    assert {"colloc", "research", "scripts"} <= packages
+    assert {name for name in packages if any(fnmatch(name, pattern) for pattern in PACKED)} == {"colloc"}
 
 
 def test_the_recipe_is_read_by_who_builds_it():

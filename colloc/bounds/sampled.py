@@ -2,7 +2,7 @@
 
 The bound is the value of a convex problem: choose a potential over shape and heading (`colloc.bounds.potential`) so that the
 largest (gain / power) over all shapes, headings and rate directions is smallest. It is solved by exchange of samples
-(`bounds.cutting_plane`). What comes out is a *sampled* bound; `bounds.guaranteed` guarantees one for associated friction.
+(`bounds.cutting_plane`). What comes out is a *sampled* bound; `research/guarantee` guarantees one for associated friction.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class Bound:
         Whether the last climbs between the samples stayed within the budget's tolerance of `floor`, and those of a check that
         the program knows nothing of (`colloc.bounds.recheck`) within twice of it.
     guaranteed : float or None
-        Value certified between samples too (`colloc.bounds.guaranteed`), if asked for and possible.
+        Value certified between samples too (`research/guarantee`), if asked for and possible.
     missing : str
         What keeps the sampled value from being a theorem; empty if `guaranteed` is set.
     angles, rates : tuple of float

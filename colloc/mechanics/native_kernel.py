@@ -30,19 +30,17 @@ from colloc.numerics.c_compiler import kept_library, lack
 from colloc.system.errors import SlowWarning, StoreError
 from colloc.system.processors import available_threads
 
-_FLAGS: tuple[str, ...] = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
+FLAGS: tuple[str, ...] = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing that reorders arithmetic. -O3 takes three times as long to compile and gains 5 to 10 %."""
 _MAIN = "kernel.c"
 _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
 
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
-_BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
+BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
-    "colloc_balance": (*_BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
-    "colloc_loaded": (*_BODY, *[_ARRAY] * 4, _REAL, ctypes.c_int, *[_ARRAY] * 6),
-    "colloc_enclosure": (_ARRAY, _ARRAY, _COUNT, _COUNT, *[_ARRAY] * 6, _REAL, _ARRAY),
-    "colloc_motion": (*_BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
+    "colloc_balance": (*BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
+    "colloc_motion": (*BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
 }
 
 
@@ -71,7 +69,7 @@ def numpy_instead() -> Iterator[None]:
 def library(defines: tuple[str, ...] = (), own_law: str = "") -> ctypes.CDLL | None:
     """The kernel, loaded, and compiled before if need be, by itself, for feet or with a law's own C; None if that
     cannot be, with a `SlowWarning` unless nobody wants it."""
-    flags = (*_FLAGS, *(f"-D{name}" for name in defines))
+    flags = (*FLAGS, *(f"-D{name}" for name in defines))
     headers = {"own_law.h": own_law} if own_law else {}
     try:
         with resources.as_file(resources.files("colloc.mechanics").joinpath("native")) as sources:
@@ -98,7 +96,7 @@ def address(array: np.ndarray | None) -> int | None:
     return None if array is None else array.ctypes.data
 
 
-def _call(function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object) -> None:
+def call_for_all(function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object) -> None:
     """Call a function of the kernel for all instants: with the chain, the law and the instants of a piece, then arguments."""
     law = np.array(body.contact.kernel_law(friction).numbers, dtype=float)
     numbers = np.array(body.lengths), body.pressure_column().ravel(), law
@@ -134,7 +132,7 @@ def compiled_balance(
     before, after = map(address, (angles, rates)), map(address, (load, start))
     how = tolerance, max_iterations, METHODS.index(method)
     function, delta = library.colloc_balance, moving.delta
-    _call(function, moving.body, moving.friction, n_time, *before, delta, *after, *how, *map(address, found))
+    call_for_all(function, moving.body, moving.friction, n_time, *before, delta, *after, *how, *map(address, found))
     return found
 
 
@@ -151,26 +149,5 @@ def compiled_motion(
     columns = 2 * body.n_joint + (0 if load is None else 2)
     values, slopes = np.empty((7, n_time)), np.empty((6 if with_slopes else 0, columns, n_time))
     after = map(address, (load, anchor, anchor_velocity, values, slopes if with_slopes else None))
-    _call(library.colloc_motion, body, friction, n_time, *map(address, (angles, rates)), delta, *after)
+    call_for_all(library.colloc_motion, body, friction, n_time, *map(address, (angles, rates)), delta, *after)
     return values, slopes
-
-
-def compiled_loaded(
-    library: ctypes.CDLL,
-    body: Links,
-    friction: Law,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    load: np.ndarray,
-    start: np.ndarray,
-    delta: float,
-    steps: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The fields of `colloc.bounds.loaded_balance.Loaded`."""
-    n_time = angles.shape[1]
-    given = [np.ascontiguousarray(a, dtype=float) for a in (angles, rates, load, start)]
-    velocity, potential, power = np.empty((3, n_time)), np.empty(n_time), np.empty(n_time)
-    forces, residual, leftover_power = np.empty((body.n_link, 3, n_time)), np.empty((2, n_time)), np.empty(n_time)
-    found = velocity, potential, power, forces, residual, leftover_power
-    _call(library.colloc_loaded, body, friction, n_time, *map(address, given), delta, steps, *map(address, found))
-    return found

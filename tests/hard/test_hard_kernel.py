@@ -5,9 +5,9 @@ import pytest
 from cases import COEFFICIENTS, DELTAS, HARD
 
 from colloc import Chain, Friction, solve_balance
-from colloc.bounds.loaded_balance import loaded_balance
 from colloc.mechanics.balance import dissipation_potential, instant, net_force, total_power
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from research.guarantee.loaded_balance import loaded_balance
 
 ANGLES = np.array([angles for angles, _ in HARD.values()]).T
 RATES = np.array([rates for _, rates in HARD.values()]).T

@@ -8,6 +8,7 @@ import warnings
 
 import numpy as np
 import pytest
+from shared.address_sanitizer import stays_within_its_arrays
 from shared.instants import random_instants
 
 from colloc import Chain, Friction, solve_balance
@@ -123,12 +124,10 @@ def test_solving_a_balance_loads_neither_casadi_nor_matplotlib():
 WITHIN_ITS_ARRAYS = """
 import numpy as np
 from colloc import Chain, Friction, OwnLaw, solve_balance
-from colloc.bounds.enclosure import CORNERS, Cells, ReferencePoint, by_convexity, corner_motions
-from colloc.bounds.loaded_balance import loaded_balance
 from colloc.mechanics import native_kernel
 from colloc.mechanics.chain_motion import chain_slopes
 
-native_kernel._FLAGS += ("-O1", "-fsanitize=address")
+native_kernel.FLAGS += ("-O1", "-fsanitize=address")
 assert native_kernel.library() is not None
 rng = np.random.default_rng(0)
 for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
@@ -139,22 +138,9 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
         chain_slopes(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
         for method in ("newton", "fixed_point"):
             solve_balance(body, law, *at, 1e-2, method=method, max_iterations=20, start=np.zeros((3, 20)))
-    loaded_balance(body, Friction(), *at, 0.1 * rng.normal(size=(3, 20)), np.zeros((3, 20)), 1e-4)
-size = np.full((3, 20), 0.01)
-low = rng.uniform(-1, 1, (3, 20))
-points = (low[:, :, None] + size[:, :, None] * CORNERS.T[:, None]).reshape(3, -1)
-cells = Cells(low, size, points, np.arange(160).reshape(20, 8))
-point = ReferencePoint(np.zeros(160), *np.zeros((4, 20)))
-by_convexity(Chain(), Friction(), cells, corner_motions(Chain(), Friction(), cells), point)
 """
 
 
 @needs_kernel
 def test_it_reads_and_writes_nothing_beyond_its_arrays(tmp_path):
-    """Compiled with the address sanitizer, which ends the process at the first word beside an array."""
-    found = subprocess.run([c_compiler(), "-print-file-name=libasan.so"], capture_output=True, text=True).stdout.strip()
-    if not os.path.isabs(found):
-        pytest.skip("the compiler has no address sanitizer")
-    own = {"LD_PRELOAD": found, "ASAN_OPTIONS": "detect_leaks=0", FOLDER: str(tmp_path / "code")}
-    done = subprocess.run([sys.executable, "-c", WITHIN_ITS_ARRAYS], env={**os.environ, **own}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[-2000:]
+    stays_within_its_arrays(WITHIN_ITS_ARRAYS, tmp_path)

@@ -7,7 +7,6 @@ from shared.kernels import by_both
 
 from benchmarks.independent_replay import Crawler, played
 from colloc import Chain, Elliptic, Friction, OwnLaw, PowerLaw, Problem, ProblemError, load, replay, save, solve_balance
-from colloc.bounds.guaranteed import certify
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
@@ -15,6 +14,7 @@ from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.search.solve import solve
+from research.guarantee.guaranteed import certify
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5)]

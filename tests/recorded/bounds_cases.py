@@ -5,20 +5,20 @@ import numpy as np
 from colloc import Chain, Friction
 from colloc.bounds.coulomb_motion import admissible, all_motions, balanced_motion, drawn_in, fundamental, unit_directions
 from colloc.bounds.cutting_plane import exchanged_optimum
-from colloc.bounds.enclosure import by_convexity, by_loads
-from colloc.bounds.guaranteed import certify
 from colloc.bounds.infinitesimal import best_small_gait, small_gait
 from colloc.bounds.knots import with_more_knots, worth
-from colloc.bounds.loaded_balance import loaded_balance
 from colloc.bounds.measure import Measure
 from colloc.bounds.potential import PotentialSpace, Samples
-from colloc.bounds.potential_range import PotentialRange, gain_bound
 from colloc.bounds.recheck import near_the_top
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.numerics.spline import TensorSpline
-from tests.bounds.random_cells import random_cells
+from research.guarantee.enclosure import by_convexity, by_loads
+from research.guarantee.guaranteed import certify
+from research.guarantee.loaded_balance import loaded_balance
+from research.guarantee.potential_range import PotentialRange, gain_bound
 from tests.recorded.bodies import shapes
+from tests.research.random_cells import random_cells
 
 PRECISION, FLOOR = 1e-6, 1e-10
 

@@ -1,8 +1,8 @@
 """The balance of a body under associated friction and a small outside load: the dual certificate of the bound.
 
 The body minimises its dissipation potential less the load's power. The friction forces found are admissible (those of some
-velocity) and what they leave unbalanced is stated, which is all that `bounds.guaranteed` needs: a solve that stops early gives
-a weaker certificate, not a wrong one.
+velocity) and what they leave unbalanced is stated, which is all that `guarantee.guaranteed` needs: a solve that stops early
+gives a weaker certificate, not a wrong one.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.native_kernel import compiled_loaded, native_kernel
 from colloc.system.errors import ProblemError
+from research.guarantee.kernel import compiled_loaded, guarantee_kernel
 
 
 class Loaded(NamedTuple):
@@ -52,7 +52,7 @@ def loaded_balance(
     ProblemError
         Without a C compiler.
     """
-    library = native_kernel(body)
+    library = guarantee_kernel(body)
     if library is None:
         raise ProblemError("a guaranteed bound needs a C compiler (cc, gcc or clang): none was found.")
     return Loaded(*compiled_loaded(library, body, friction, angles, rates, load, start, delta, steps))

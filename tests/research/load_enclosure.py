@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from colloc.bounds.enclosure import DELTA
-from colloc.bounds.loaded_balance import loaded_balance
+from research.guarantee.enclosure import DELTA
+from research.guarantee.loaded_balance import loaded_balance
 
 KAPPA, TORQUE, ROUNDING = np.sqrt(2) - 1, 0.15, 1e-9
 

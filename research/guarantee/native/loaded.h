@@ -1,4 +1,4 @@
-/* The balance under unit isotropic friction and an outside load, for one instant: colloc/bounds/loaded_balance.py. */
+/* The balance under unit isotropic friction and an outside load, for one instant: research/guarantee/loaded_balance.py. */
 
 #pragma once
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from colloc.bounds.enclosure import CORNERS, Cells
-from colloc.bounds.loaded_balance import Loaded
 from colloc.bounds.potential import PotentialSpace
-from colloc.bounds.potential_range import _HEADINGS, PotentialRange, gain_bound
 from colloc.numerics.spline import TensorSpline
+from research.guarantee.enclosure import CORNERS, Cells
+from research.guarantee.loaded_balance import Loaded
+from research.guarantee.potential_range import _HEADINGS, PotentialRange, gain_bound
 
 N = 6
 

@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.bounds.loaded_balance import Loaded, loaded_balance
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.native_kernel import address, native_kernel
+from colloc.mechanics.native_kernel import address
+from research.guarantee.kernel import guarantee_kernel
+from research.guarantee.loaded_balance import Loaded, loaded_balance
 
 DELTA = 1e-9
 """Regularisation of the certificates' forces: any value is valid, smaller ones are tighter."""
@@ -87,7 +88,7 @@ def spread(values: np.ndarray, axis: int) -> np.ndarray:
 
 def by_convexity(body: Chain, friction: Friction, cells: Cells, free: Loaded, reference: ReferencePoint) -> Allowance:
     """From strong convexity; compiled, as the motions at the corners are that it is given."""
-    library = native_kernel(body)
+    library = guarantee_kernel(body)
     assert library is not None
     n = cells.low.shape[1]
     point = np.stack([reference.centre.real, reference.centre.imag, reference.beside], axis=1)

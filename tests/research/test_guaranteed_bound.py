@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from colloc.bounds import enclosure, guaranteed
 from colloc.bounds.coulomb_motion import CoulombMotion, balanced_motion
-from colloc.bounds.enclosure import _KAPPA, CORNERS, DELTA, by_convexity, by_loads, corner_motions
-from colloc.bounds.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
-from colloc.bounds.loaded_balance import loaded_balance
 from colloc.bounds.potential import PotentialSpace, Samples
-from colloc.bounds.potential_range import PotentialRange, gain_bound
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.laws.elliptic import Elliptic
@@ -19,9 +14,14 @@ from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.numerics.spline import DEGREE, TensorSpline
 from colloc.system.errors import ProblemError
-from tests.bounds.interval_enclosure import allowance
-from tests.bounds.load_enclosure import allowance_by_loads
-from tests.bounds.random_cells import all_cells, random_cells
+from research.guarantee import enclosure, guaranteed
+from research.guarantee.enclosure import _KAPPA, CORNERS, DELTA, by_convexity, by_loads, corner_motions
+from research.guarantee.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
+from research.guarantee.loaded_balance import loaded_balance
+from research.guarantee.potential_range import PotentialRange, gain_bound
+from tests.research.interval_enclosure import allowance
+from tests.research.load_enclosure import allowance_by_loads
+from tests.research.random_cells import all_cells, random_cells
 
 BODY, UNIT = Chain(), Friction()
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")

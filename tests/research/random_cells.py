@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from colloc.bounds.enclosure import CORNERS, Cells, ReferencePoint, corner_motions
+from research.guarantee.enclosure import CORNERS, Cells, ReferencePoint, corner_motions
 
 
 def all_cells(low, sizes):

@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from colloc.bounds.coulomb_motion import CoulombMotion
-from colloc.bounds.enclosure import Cells, ReferencePoint, spread
-from colloc.bounds.loaded_balance import Loaded
 from colloc.bounds.potential import PotentialSpace, Samples
 from colloc.numerics.spline import DEGREE
+from research.guarantee.enclosure import Cells, ReferencePoint, spread
+from research.guarantee.loaded_balance import Loaded
 
 _HEADINGS = 192
 _ORDERS = ((1, 0), (0, 1), (2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))

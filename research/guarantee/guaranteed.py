@@ -2,8 +2,8 @@ r"""A guaranteed upper bound for a three-link body under associated friction: ce
 
 Cells are boxes of (angle 1, angle 2, s) with rates (1, s), |s| <= 1; the symmetries give the rest, or the same cells of the
 body turned end for end. Over a cell, gain and power
-of the balanced motion differ from what interpolates their values at the corners by at most what `bounds.enclosure` and
-`bounds.potential_range` say, so their ratio is largest at a corner. Cells that fail are split in eight.
+of the balanced motion differ from what interpolates their values at the corners by at most what `guarantee.enclosure` and
+`guarantee.potential_range` say, so their ratio is largest at a corner. Cells that fail are split in eight.
 """
 
 from __future__ import annotations
@@ -16,9 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.bounds.enclosure import CORNERS, DELTA, Allowance, Cells, by_convexity, by_loads, corner_motions
 from colloc.bounds.potential import PotentialSpace
-from colloc.bounds.potential_range import PotentialRange
 from colloc.bounds.sampled import Bound
 from colloc.bounds.sampling import Domain
 from colloc.mechanics.chain import Chain
@@ -26,6 +24,8 @@ from colloc.mechanics.contact import crossing_sums
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
 from colloc.system.processors import available_threads
+from research.guarantee.enclosure import CORNERS, DELTA, Allowance, Cells, by_convexity, by_loads, corner_motions
+from research.guarantee.potential_range import PotentialRange
 
 _CHUNK = 8000
 _FIRST = 0.07
