@@ -1,8 +1,9 @@
 """Gaits crawling one above the other at the same work: python -m scripts.side_by_side [FILE.py ...]
 
-Every body spends work at the same constant rate, so after the same time the better gait has come farther: how much farther is
-the ratio of the efficiencies. Writes results/curated/side_by_side.gif; by default three links with one harmonic (the paper's
-best gait), with two, on a free path, and the best relaxed gait.
+Every body spends work at the same rate, counted by the least friction that it meets: with so much work what is dragged
+where it slides best comes `WORK` body lengths far, which is the most that any gait can. Writes
+results/curated/side_by_side.gif; by default three links that lie on the floor (the paper's best gait), the same on feet, a
+snake on wheels and an inchworm. Feet that hold are filled.
 """
 
 from __future__ import annotations
@@ -17,20 +18,20 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.pictures.motion_frames import lab_outline
+from colloc.pictures.motion_frames import holding, lab_feet, lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = {
-    "three_link": "one harmonic (the paper's best)",
-    "three_link_two_harmonics": "two harmonics",
-    "three_link_free_path": "any path that bends no more than 8 per rad",
-    "three_link_relaxed": "directions mixed, joints within 2.5 rad",
+    "three_link": "three links on their bellies",
+    "three_link_feet": "three links on a foot each",
+    "wheeled_snake": "three links on a wheel each",
+    "inchworm": "an inchworm on four feet",
 }
 WORK, PICTURES, FPS, REST = 5.0, 160, 12.5, 12
-"""Work spent in all [weight x body length], pictures of it, pictures a second, and pictures that the end stays."""
+"""Work spent [weight x body length x least friction], pictures of it, pictures a second, and pictures that the end stays."""
 _WIDTH, _LANE, _BEHIND = 640, 0.68, 0.42
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _GRAIN = 4001
@@ -42,8 +43,12 @@ class Crawl:
 
     label: str
     efficiency: float
+    """Over the most that the least friction allows."""
     ends: np.ndarray
     centre: np.ndarray
+    feet: np.ndarray
+    """Places ``(2, n_foot, n_picture)``, and which of them hold ``(n_foot, n_picture)``."""
+    holds: np.ndarray
 
 
 def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
@@ -57,10 +62,11 @@ def phases(solution: Solution, work: np.ndarray) -> np.ndarray:
 
 def crawl(solution: Solution) -> Crawl:
     """What a gait does with the work."""
-    problem = solution.problem
-    motion = solution.sample(phases(solution, np.linspace(0.0, WORK, PICTURES)))
-    ends = lab_outline(problem.body, motion.angles, motion.theta, motion.tail)
-    return Crawl(FILES.get(problem.name, problem.gait.describe()), solution.measured.efficiency, ends, motion.centre)
+    problem, body, least = solution.problem, solution.problem.body, solution.problem.law.smallest
+    motion = solution.sample(phases(solution, np.linspace(0.0, least * WORK, PICTURES)))
+    pose = motion.angles, motion.theta, motion.tail
+    label, share = FILES.get(problem.name, problem.gait.describe()), least * solution.efficiency
+    return Crawl(label, share, lab_outline(body, *pose), motion.centre, lab_feet(body, *pose), holding(solution, motion))
 
 
 def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
@@ -79,26 +85,30 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
         for x in np.arange(1, np.floor(farthest) + 1):
             axes.plot([x, x], [-_LANE * len(crawls), 0], color="#dfe4e8", lw=1)
             axes.text(x, -_LANE * len(crawls) - 0.03, f"{x:.0f}", ha="center", va="top", color=GREY)
-        axes.text(0, -_LANE * len(crawls) - 0.03, "0 body lengths", ha="center", va="top", color=GREY)
+        axes.text(0, -_LANE * len(crawls) - 0.03, "0 body lengths", ha="left", va="top", color=GREY)
         drawn = []
         for row, (one, colour) in enumerate(zip(crawls, _COLOURS, strict=False)):
             y = -_LANE * (row + 0.58)
-            label = f"{one.label}: efficiency {one.efficiency:.3f}"
+            label = f"{one.label}: {100 * one.efficiency:.0f} % of what friction allows"
             axes.text(0.03 - _BEHIND, -_LANE * row - 0.02, label, va="top", color=colour, weight="bold")
             (trail,) = axes.plot([], [], color=colour, lw=1.2, alpha=0.5)
             (body,) = axes.plot([], [], color=INK, lw=4, solid_capstyle="round", solid_joinstyle="round")
             (joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
             (head,) = axes.plot([], [], "o", color=INK, ms=9)
             (centre,) = axes.plot([], [], "o", color=colour, ms=7)
-            drawn.append((one, np.array([[0.0], [y]]), trail, body, joints, head, centre))
+            (feet,) = axes.plot([], [], "o", color="white", mec=colour, ms=6, zorder=3)
+            (held,) = axes.plot([], [], "o", color=colour, ms=6, zorder=3)
+            drawn.append((one, np.array([[0.0], [y]]), (trail, body, joints, head, centre, feet, held)))
         for k in [*range(PICTURES), *[PICTURES - 1] * REST]:
-            for one, lift, trail, body, joints, head, centre in drawn:
-                ends = one.ends[:, :, k] + lift
+            for one, lift, (trail, body, joints, head, centre, feet, held) in drawn:
+                ends, places = one.ends[:, :, k] + lift, one.feet[:, :, k] + lift
                 trail.set_data(*(one.centre[:, : k + 1] + lift))
                 body.set_data(*ends)
                 joints.set_data(*ends[:, 1:-1])
                 head.set_data(*ends[:, -1:])
                 centre.set_data(*(one.centre[:, [k]] + lift))
+                feet.set_data(*places)
+                held.set_data(*places[:, one.holds[:, k]])
             canvas.draw()
             yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
