@@ -1,6 +1,6 @@
 """The compiled kernel of chains: C sources of this package as a shared library, or none, and its calls. No CasADi.
 
-The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled when first needed, in about
+The sources (folder `native`, plain C11) mirror the NumPy solvers step by step. They are compiled when first needed, in under
 half a second, and kept (`colloc.numerics.c_compiler`). Without a compiler, or a folder to keep the library in, everything is
 done by NumPy, the reference (docs/developers/kernel.md says why C, and why then).
 Calls release the interpreter's lock, so that large batches are shared by threads; an instant's answer depends on

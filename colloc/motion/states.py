@@ -19,7 +19,7 @@ import numpy as np
 
 from colloc.numerics.mesh import Mesh
 
-_CLOSED, _STEPS = 1e-12, 60
+_CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
 """Newton's step that counts as none: where rates are steep, rounding leaves more of the equations than `_CLOSED`."""
 _SHARES = 0.5 ** np.arange(7)

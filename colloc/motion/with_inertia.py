@@ -65,8 +65,8 @@ class GaitOnMesh:
     """
 
     def __init__(self, body: Chain, friction: Law, gait: Path, mesh: Mesh) -> None:
-        self._body, self._friction, self._mesh = body, friction, mesh
-        self._angles, self._rates = gait(mesh.times)
+        self._body, self._friction, self._mesh, self.times = body, friction, mesh, mesh.times
+        self._angles, self._rates = gait(self.times)
         posture = self._posture = body.posture(self._angles)
         (x,), (y,) = body.centre_of_mass(posture)
         one, zero, inertia = np.ones_like(x), np.zeros_like(x), moment_of_inertia(body, posture)
@@ -80,6 +80,10 @@ class GaitOnMesh:
         link = self._body.velocity(self._posture, self._rates, z)
         power = self._body.sliding(self._friction, self._angles, self._rates, z, delta).power[0]
         return self._summed(momenta(self._body, self._posture, link), z[2], power)
+
+    def carried(self, times: np.ndarray, other: Played) -> Played:
+        """A motion known at other times, at these points."""
+        return other._replace(states=np.stack([np.interp(self.times, times, row, period=1.0) for row in other.states]))
 
     def played(self, delta: float, froude: float, near: Played) -> Played:
         """The motion in which all periods are alike, by Newton's method from another: a slow one, or one at a pace like it.
@@ -201,9 +205,14 @@ def inertial_loss(
     check_finite(positive=True, froude=froude, delta=delta)
     chain = checked_inertia(body, gait)
 
+    coarser: tuple[np.ndarray, Played] | None = None
+
     def lost(on_mesh: GaitOnMesh) -> float:
+        nonlocal coarser
         slow = on_mesh.slow(delta)
-        return 1.0 - on_mesh.played(delta, froude, slow).efficiency / slow.efficiency
+        near = slow if coarser is None else on_mesh.carried(*coarser)
+        coarser = on_mesh.times, on_mesh.played(delta, froude, near)
+        return 1.0 - coarser[1].efficiency / slow.efficiency
 
     return _refined(chain, chain.law(friction), gait, breaks, lost, lambda _: _LOSS_ACCURACY)
 

@@ -8,7 +8,6 @@ from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.system.errors import ProblemError
 from scripts.models.chain_study import chain_period
 from scripts.models.period import measured_period, period
-from scripts.models.wave_optimum import odd_wave, optimise_wave
 
 ALONG = Friction(100.0, 1.0, 1.0)
 
@@ -76,18 +75,3 @@ def test_unusable_studies_are_refused():
         period(sine_wave(), Friction(), 1e-3, intervals=0)
     with pytest.raises(ProblemError, match="antipodal"):
         chain_period(Motion(lambda s, t: s, lambda s, t: s), Friction(), 1e-3, 5)
-
-
-def test_an_optimised_wave_beats_the_sine_wave_but_not_the_bound():
-    friction = Friction(10.0, 1.0, 1.0)
-    found = optimise_wave(friction, np.array([1.0]), 1.0, most_waves=2.0, evaluations=24)
-    sine = period(sine_wave(), friction, 1e-4, intervals=1)
-    assert sine.efficiency + 0.01 < found.period.efficiency < 1.0
-    assert 0 < found.waves <= 2.0
-
-
-def test_odd_wave_with_one_harmonic_is_the_sine_wave():
-    s, t = np.linspace(0, 1, 9)[:, None] * np.ones((1, 2)), np.array([0.1, 0.3])
-    for field in ("angle", "rate"):
-        ours, theirs = (getattr(w, field)(s, t) for w in (odd_wave(np.array([0.7]), 1.5), sine_wave(0.7, 1.5)))
-        np.testing.assert_allclose(ours, theirs, atol=1e-14)
