@@ -19,7 +19,7 @@ def test_every_problem_file_is_solved_by_its_command(name, tmp_path):
     command = ["-m", "colloc", "solve", str(file), "--output", f"{tmp_path}/"]
     saved = re.escape(f"saved {tmp_path}/{name}.h5, {tmp_path}/{name}.png")
     heading = rf"{name}: solved in [\d.]+ s( \([^\n]*\))?\n"
-    value = r"  (efficiency d/W|speed d/L|turning θ/W|towing d²/W) +\d\.\d+ "
+    value = r"  (efficiency d/W|speed d/L|turning θ/W|towing d²/W) +\d+\.\d+ "
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}  # scripts are no part of what is installed
     done = subprocess.run(
         [sys.executable, *command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
