@@ -6,6 +6,7 @@ Exit codes: 0 all checks hold, 2 bad problem, file or option, 3 not replayed, 4 
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -48,13 +49,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run(_parser(), _evaluate, arguments)
 
 
+def _name(path: str) -> str:
+    """That of a file, of letters that a problem's name may have."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", Path(path).stem)
+
+
 def _evaluate(options: argparse.Namespace) -> int:
     from colloc.search.evaluate import evaluate
 
     stated = read_problem_file(options.problem)
     best = None if options.best is None else load(options.best)
     given = {"period": options.period, "harmonics": options.harmonics, "degrees": options.degrees}
-    default = Path("results") / f"{Path(options.gait).stem}.h5"
+    default = Path("results") / f"{_name(options.gait)}.h5"
     solution = evaluate(stated.problem.with_(name=default.stem), options.gait, **given)
     difference = None if best is None else gait_difference(solution, best)
     path = output_path(options.output, default)

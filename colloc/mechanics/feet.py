@@ -84,6 +84,11 @@ class Foot:
         """The foot on the body's mirror image."""
         return replace(self, offset=-self.offset, angle=-self.angle)
 
+    @property
+    def point(self) -> tuple[float, float]:
+        """Where along the body, counted in links, and beside it: the head end of a link is the tail end of the next."""
+        return self.link + self.place, self.offset
+
     def is_like(self, other: Foot) -> bool:
         """Whether two feet are one, up to rounding."""
         own, its = ((f.link, f.place, f.weight or 0.0, f.offset) for f in (self, other))
@@ -147,7 +152,7 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
         carried = sorted(set(range(weights.size)) - {foot.link for foot in stated})
         hint = f"; no foot is on link {', '.join(map(str, carried))}, so say who bears its weight" if carried else ""
         raise ProblemError(f"the weights of the feet must add up to 1, not {total:.6g}{hint}.")
-    if len({(foot.link, foot.place, foot.offset) for foot in shared}) < 2:
+    if len({foot.point for foot in shared}) < 2:
         raise ProblemError("a body needs feet at two points at least: on one it would spin freely.")
     if not _same_set(shared, [foot.mirrored for foot in shared]):
         raise ProblemError(
@@ -236,7 +241,7 @@ class FeetLaw:
 
     def describe(self) -> str:
         counted = {law: self.laws.count(law) for law in self.laws}
-        return "; ".join(f"{count} feet: {law.describe()}" for law, count in counted.items())
+        return "; ".join(f"{count} {'foot' if count == 1 else 'feet'}: {law.describe()}" for law, count in counted.items())
 
     def in_units_of(self, unit: float) -> FeetLaw:
         return FeetLaw(tuple(law.in_units_of(unit) for law in self.laws))

@@ -142,35 +142,36 @@ def slow_enough(
     """The Froude number L/(g T^2) up to which inertia changes the efficiency of a gait by no more than the part `loss`.
 
     A body of length L [m] that takes T [s] a period has the Froude number L / (9.81 T^2); so T must be sqrt(L / (9.81 Fr)) or
-    more. Played faster a gait may be better or worse: either is a change.
+    more. Played faster a gait may be better or worse: either is a change. Paces are tried from slow to fast, each at most five
+    times the one before in Fr, so a change that comes and goes between two of them is not seen.
 
     Parameters
-    ----------
-    body : Chain
-        Its links are as heavy as they press on the floor, evenly along their lengths.
-    friction : Law
-    gait : callable
-        Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones.
-    delta : float
-        Regularisation speed, per period.
-    loss : float
-        In (0, 0.5]; the answer is right to 2 % of it.
-    breaks : (n,), optional
-        Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
+        ----------
+        body : Chain
+            Its links are as heavy as they press on the floor, evenly along their lengths.
+        friction : Law
+        gait : callable
+            Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones.
+        delta : float
+            Regularisation speed, per period.
+        loss : float
+            In (0, 0.5]; the answer is right to 2 % of it.
+        breaks : (n,), optional
+            Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
 
-    Raises
-    ------
-    ProblemError
-        If the body is no chain, or numbers are out of range.
-    NotConvergedError
-        If the motion is not found, or the gait can be played as fast as one likes.
+        Raises
+        ------
+        ProblemError
+            If the body is no chain, or numbers are out of range.
+        NotConvergedError
+            If the motion is not found, or the gait can be played as fast as one likes.
 
-    Examples
-    --------
-    >>> import colloc
-    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> round(colloc.slow_enough(colloc.Chain(), colloc.Friction(), gait, delta=1e-4), 4)
-    0.0031
+        Examples
+        --------
+        >>> import colloc
+        >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+        >>> round(colloc.slow_enough(colloc.Chain(), colloc.Friction(), gait, delta=1e-4), 4)
+        0.0031
     """
     check_finite(positive=True, loss=loss, delta=delta)
     if loss > 0.5:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -183,12 +184,12 @@ class Robot:
         """What inertia takes at this pace, and at which it takes little."""
         solution, problem = self.solution, self.solution.problem
         at = problem.body, problem.law, solution.gait, solution.answer.delta_per_period
-        try:
-            found = {"inertia_takes": inertial_loss(*at, self.froude, breaks=solution.gait.corner_phases)}
+        found: dict[str, Any] = {}
+        with suppress(NotConvergedError):
+            found["inertia_takes"] = inertial_loss(*at, self.froude, breaks=solution.gait.corner_phases)
+        with suppress(NotConvergedError):
             if rate_independent(problem.law):
                 found["slow_enough_period_s"] = math.sqrt(self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH)))
-        except NotConvergedError:
-            return {}
         return found
 
     def _motors(self, peak: np.ndarray) -> dict[str, Any]:
@@ -249,13 +250,13 @@ class Robot:
                 "of this period."
             )
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
-        if "inertia_takes" in f:
-            lost, slow = f["inertia_takes"], f.get("slow_enough_period_s")
-            word = "takes" if lost >= 0 else "adds"
-            more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
-            said.append(f"All this is slow motion. Inertia {word} {100 * abs(lost):.2g} % of the efficiency {pace}{more}.")
+        lost, slow = f.get("inertia_takes"), f.get("slow_enough_period_s")
+        if lost is None:
+            does = f"What inertia does {pace} could not be computed"
         else:
-            said.append(f"All this is slow motion. What inertia does {pace} could not be computed.")
+            does = f"Inertia {'takes' if lost >= 0 else 'adds'} {100 * abs(lost):.2g} % of the efficiency {pace}"
+        more = "" if slow is None else f"; it changes 1 % or less from {slow:.3g} s a period"
+        said.append(f"All this is slow motion. {does}{more}.")
         return said
 
     def __str__(self) -> str:

@@ -191,6 +191,7 @@ def test_a_body_on_feet_at_both_ends_of_one_stiff_link_keeps_that_link_where_it_
     [
         ((Foot(0), Foot(3)), "numbered 0 to 2"),
         ((Foot(0, weight=0.5), Foot(2, weight=0.4)), "add up to 1, not 0.9"),
+        ((Foot(0, 1.0, 0.5), Foot(1, 0.0, 0.5)), "at two points at least"),
         ((Foot(0), Foot(2)), "no foot is on link 1"),
         ((Foot(0, weight=1.0),), "two points"),
         ((Foot(0), Foot(1, offset=0.1), Foot(2)), "left and right"),

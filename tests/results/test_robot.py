@@ -171,3 +171,13 @@ def test_what_inertia_takes_is_that_of_the_motion_followed_through_time(three_li
     at = three_link.problem.body, three_link.problem.law, three_link.gait, three_link.problem.delta
     played = colloc.inertial_motion(*at, robot.froude, tolerance=1e-4)
     assert robot.facts["inertia_takes"] == pytest.approx(1 - played.efficiency / three_link.efficiency, abs=1e-3)
+
+
+def test_what_inertia_takes_is_told_although_no_pace_is_slow_enough(three_link, robot, monkeypatch):
+    def never(loss):
+        raise colloc.NotConvergedError("at no pace")
+
+    monkeypatch.setattr(colloc.Solution, "slow_enough", lambda solution, loss: never(loss))
+    facts = three_link.robot(**SIZE).facts
+    assert facts["inertia_takes"] == robot.facts["inertia_takes"]
+    assert "slow_enough_period_s" not in facts

@@ -180,3 +180,12 @@ def test_what_is_no_gait_is_refused_in_a_sentence(given, settings, complaint):
 def test_where_a_gait_cannot_be_evaluated_alone_another_way_is_named():
     with pytest.raises(colloc.ProblemError, match=r"colloc\.slope_motion"):
         colloc.evaluate(colloc.Problem("up", gait=colloc.Harmonic(1), grade=0.1), GAIT)
+
+
+def test_a_file_may_be_called_as_it_likes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('mine', delta=1e-3)\n")
+    written(tmp_path / "my gait (3).csv", T, GAIT.angles(T))
+    assert main(["evaluate", "p.py", "my gait (3).csv", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["name"] == "my_gait__3_"
+    assert (tmp_path / "results/my_gait__3_.h5").exists()
