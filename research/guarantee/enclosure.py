@@ -1,4 +1,4 @@
-r"""How far balanced motions may be from interpolated ones, over whole cells of shapes and rates (docs/bound.md, section 3).
+r"""How far balanced motions may be from interpolated ones, over whole cells of shapes and rates (research/guarantee/README.md).
 
 A cell is a box of (angle 1, angle 2, s) with rates (1, s), of three links under associated friction with mu_t = 1: dissipation
 is the integral of sqrt((sigma vs)^2 + vn^2), sigma = mu_f or mu_b. At its eight corners the balance is solved; the trial motion

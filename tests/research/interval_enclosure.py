@@ -1,4 +1,4 @@
-"""The allowance of strong convexity for one cell, written out in interval arithmetic (mpmath): docs/bound.md, section 3.
+"""The allowance of strong convexity for one cell, written out in interval arithmetic (mpmath): research/guarantee/README.md.
 
 A second implementation of research/guarantee/native/enclosure.h, for a dissipation sqrt((sigma vs)^2 + vn^2). Choices that are
 free (nodes, the kind of a piece, tau) are made by midpoints; whatever is claimed is an interval that holds the exact value.

@@ -1,4 +1,4 @@
-"""The allowance of small loads for one cell, written out corner by corner: docs/bound.md, section 3."""
+"""The allowance of small loads for one cell, written out corner by corner: research/guarantee/README.md."""
 
 import numpy as np
 

@@ -187,7 +187,8 @@ def test_balanced_motions_stay_within_what_is_allowed(potential, body, friction,
     ],
 )
 def test_allowances_are_those_of_interval_arithmetic_on_random_cells(body, friction, size, thin, seed):
-    """Motions do not come near the margins: what is allowed is held against the inequalities of docs/bound.md, written out
+    """Motions do not come near the margins: what is allowed is held against the inequalities of
+    research/guarantee/README.md, written out
     again in interval arithmetic; with what is added for rounding it is never less."""
     cells, corners, reference = random_cells(body, friction, size, seed, thin)
     found = by_convexity(body, friction, cells, corners, reference)
@@ -453,7 +454,7 @@ def test_without_a_compiler_it_says_what_is_wanting(potential):
 def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
     """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their power at most delta below.
 
-    These are all that the allowance for finite delta uses (docs/bound.md, section 3).
+    These are all that the allowance for finite delta uses (research/guarantee/README.md).
     """
     q, r = np.random.default_rng(35).uniform(-3, 3, (2, 2, 300))
     rest = np.zeros((3, 300))

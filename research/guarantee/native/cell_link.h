@@ -1,5 +1,5 @@
 /* A link of three over a cell of (angle 1, angle 2, rate of angle 2), rate 1 of angle 1: what its velocity field does there.
-   docs/bound.md, section 3, has the derivation and the names: V the trial velocity, f its direction, a a change of V. Tangential
+   research/guarantee/README.md, has the derivation and the names: V the trial velocity, f its direction, a a change of V. Tangential
    velocities are stretched by sigma, so that the dissipation of a point is |V|. */
 
 #pragma once

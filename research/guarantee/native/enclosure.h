@@ -1,4 +1,4 @@
-/* How far the balanced motion of three links may be from the interpolated one, cell by cell: docs/bound.md, section 3. */
+/* How far the balanced motion of three links may be from the interpolated one, cell by cell: research/guarantee/README.md. */
 
 #pragma once
 

@@ -1,4 +1,4 @@
-/* How convex the dissipation of a link is over a cell, from below: docs/bound.md, section 3, "Strong convexity". */
+/* How convex the dissipation of a link is over a cell, from below: research/guarantee/README.md, "Strong convexity". */
 
 #pragma once
 
