@@ -109,6 +109,7 @@ def test_a_class_of_your_own_is_searched_certified_kept_and_read(monkeypatch, tm
     assert read.problem.hash == own.problem.hash
 
 
+@pytest.mark.slow
 def test_a_class_of_your_own_can_be_put_on_a_slope_and_taken_off_it(monkeypatch, capsys):
     own = run("own_gait_class.md", monkeypatch)
     level, uphill = own.problem, own.problem.with_(grade=0.02, friction=Friction(10, 1, 1.5), delta=1e-2)

@@ -500,8 +500,8 @@ def test_a_pipe_that_is_closed_early_is_one_sentence_and_a_code_of_its_own(resul
     ("environment", "why"),
     [
         ({"CC": "", "PATH": ""}, "there is no C compiler (cc, gcc or clang, or $CC)"),
-        ({"CC": "", "PATH": "", "COLLOC_CODE": "off"}, ""),
-        ({"CC": "/bin/false"}, "the C compiler /bin/false failed (no message)"),
+        pytest.param({"CC": "", "PATH": "", "COLLOC_CODE": "off"}, "", marks=pytest.mark.slow),
+        pytest.param({"CC": "/bin/false"}, "the C compiler /bin/false failed (no message)", marks=pytest.mark.slow),
     ],
 )
 def test_without_compiled_code_it_is_said_once_that_all_is_slower(environment, why, quick, tmp_path):

@@ -34,6 +34,7 @@ by_convexity(Chain(), Friction(), cells, corner_motions(Chain(), Friction(), cel
 """
 
 
+@pytest.mark.slow
 def test_it_reads_and_writes_nothing_beyond_its_arrays(tmp_path):
     stays_within_its_arrays(WITHIN_ITS_ARRAYS, tmp_path)
 

@@ -167,6 +167,7 @@ def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, r
     assert "Inertia takes 2.5 % of the efficiency at this pace" in str(robot)
 
 
+@pytest.mark.slow
 def test_what_inertia_takes_is_that_of_the_motion_followed_through_time(three_link, robot):
     at = three_link.problem.body, three_link.problem.law, three_link.gait, three_link.problem.delta
     played = colloc.inertial_motion(*at, robot.froude, tolerance=1e-4)

@@ -496,6 +496,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     assert kept >= reported
 
 
+@pytest.mark.slow
 def test_dask_runs_a_study_on_a_local_cluster(tmp_path):
     distributed = pytest.importorskip("distributed")
     path = tmp_path / "tiny.py"
