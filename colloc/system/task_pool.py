@@ -17,7 +17,10 @@ from signal import SIG_IGN, SIGINT, signal
 from typing import Any
 
 from colloc.system.errors import CollocError
+from colloc.system.interruption import interruptible
 
+_MOMENT = 0.1
+"""Longest time for which Ctrl-C is held back [s]."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
@@ -99,6 +102,19 @@ def _failure(future: Future) -> BaseException | None:
         return cancelled
 
 
+def _first_done(pending: dict[Future, Task]) -> set[Future]:
+    """Those that are done, as soon as one is.
+
+    Ctrl-C is held back while an executor's locks are taken, here and where tasks are handed over: it could fall between a lock
+    and the block that would open it again, and the executor's own thread, which Python joins at its end, would wait for ever.
+    """
+    done: set[Future] = set()
+    while not done:
+        with interruptible():
+            done = wait(pending, timeout=_MOMENT, return_when=FIRST_COMPLETED).done
+    return done
+
+
 def completed(
     function: Callable[..., Any],
     ready: Callable[[], Task | None],
@@ -149,7 +165,8 @@ def completed(
                         if task is None:
                             break
                         try:
-                            pending[pool.submit(function, *task.arguments)] = task
+                            with interruptible():
+                                pending[pool.submit(function, *task.arguments)] = task
                         except BrokenExecutor:
                             if not alone:
                                 suspects.append(task)
@@ -160,7 +177,7 @@ def completed(
                     if not pending:
                         more = alone or bool(suspects)
                         break
-                    for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                    for future in _first_done(pending):
                         error = _failure(future)
                         if isinstance(error, (BrokenExecutor, EngineGone)):
                             raise error
