@@ -19,12 +19,19 @@ from colloc.numerics.sqp import NonlinearProgram, Stationarity, binding
 _LOWER = 0.1
 """A kink that bends down has the same gradients. There, points are lower by more than this part of what they would be higher by
 where it bends up."""
-_STEPS_DOWN, _NOTHING = 2, 1e-10
-"""Points down the nearest mean, per unknown, and the part of the largest gradient that is none."""
+_STEPS_DOWN = 4
+"""Points down the nearest mean, per unknown, at most."""
 
 
 def stationarity_around(
-    program: NonlinearProgram, v: np.ndarray, at: Stationarity, radius: float, points: int = 4, seed: int = 0
+    program: NonlinearProgram,
+    v: np.ndarray,
+    at: Stationarity,
+    radius: float,
+    *,
+    enough: float,
+    points: int = 4,
+    seed: int = 0,
 ) -> Stationarity:
     """The conditions at v, with the mean of the gradients around it that comes closest to them in place of the one at v.
 
@@ -36,6 +43,8 @@ def stationarity_around(
         At v alone.
     radius : float
         In every unknown, within which the gradients are taken.
+    enough : float
+        No further gradients are taken once some mean is that close to 0.
     points : int
         How many are drawn, per unknown: on both sides of a kink, and in all corners of a few that meet.
     seed : int
@@ -55,7 +64,7 @@ def stationarity_around(
     ...     objective, gradient = staticmethod(lambda v: abs(v[0])), staticmethod(lambda v: np.sign(v) + (v == 0))
     ...     rows, row_slopes = staticmethod(lambda v: np.empty(0)), staticmethod(lambda v: np.empty((0, 1)))
     >>> at = stationarity(Vee, np.zeros(1))
-    >>> at.kkt_error, round(stationarity_around(Vee, np.zeros(1), at, 1e-6).kkt_error, 12)
+    >>> at.kkt_error, round(stationarity_around(Vee, np.zeros(1), at, 1e-6, enough=1e-9).kkt_error, 12)
     (1.0, 0.0)
     """
     rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
@@ -67,33 +76,45 @@ def stationarity_around(
         bent = program.rows(u) - rows - slopes @ (u - v)
         return program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes), program.objective(u) + at.on_rows @ bent
 
-    def nearest() -> tuple[np.ndarray, np.ndarray]:
-        """The mean of the gradients so far, with those of what binds, that is nearest to 0; and their multipliers."""
-        gradients = np.array([gradient for gradient, _ in found]).T
-        # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
-        matrix = np.vstack([np.hstack([gradients, columns]), np.repeat([size, 0.0], [len(found), columns.shape[1]])])
-        parts, _ = nnls(matrix, np.append(np.zeros(v.size), size), maxiter=30 * matrix.shape[1])
-        shares, multipliers = np.split(parts, [len(found)])
-        return matrix[:-1] @ parts / shares.sum(), multipliers / shares.sum()
-
     drawn = v + radius * rng.uniform(-1.0, 1.0, (points * v.size, v.size))
     places = [*np.clip(np.vstack([v, drawn]), program.lower, program.upper)]
     found = [on_sides(u) for u in places]
     if not all(np.isfinite(gradient).all() and np.isfinite(height) for gradient, height in found):
         return at
-    size = max(float(np.abs(gradient).max()) for gradient, _ in found)
-    mean, multipliers = nearest()
+    hull = _Hull(np.array([gradient for gradient, _ in found]), columns)
     for step in rng.uniform(0.0, 1.0, _STEPS_DOWN * v.size) ** 2:
-        if not np.abs(mean).max() > _NOTHING * size:
+        if np.abs(hull.nearest).max() < enough:
             break
-        u = np.clip(v - radius * step * mean / np.abs(mean).max(), program.lower, program.upper)
+        u = np.clip(v - radius * step * hull.nearest / np.abs(hull.nearest).max(), program.lower, program.upper)
         side = on_sides(u)
         if not (np.isfinite(side[0]).all() and np.isfinite(side[1])):
             break
         places.append(u)
         found.append(side)
-        mean, multipliers = nearest()
-    error, heights = float(np.abs(mean).max()), np.array([height for _, height in found])
-    higher = heights - heights[0] + (np.array(places) - v) @ columns @ multipliers
+        hull.add(side[0])
+    error, heights = float(np.abs(hull.nearest).max()), np.array([height for _, height in found])
+    higher = heights - heights[0] + (np.array(places) - v) @ columns @ hull.multipliers
     bends_down = -higher.min() > _LOWER * higher.max()
     return at if bends_down or error >= at.kkt_error else replace(at, kkt_error=error)
+
+
+class _Hull:
+    """The mean of gradients ``(m, n)``, with the `columns` ``(n, k)`` of what binds, that is nearest to 0."""
+
+    def __init__(self, gradients: np.ndarray, columns: np.ndarray) -> None:
+        self._gradients, self._columns, self._size = gradients, columns, float(np.abs(gradients).max())
+        self._solve()
+
+    def add(self, gradient: np.ndarray) -> None:
+        """Take one more: those without a share in the nearest mean so far are not needed for a nearer one."""
+        self._gradients = np.vstack([self._gradients[self._shares > 0], gradient])
+        self._solve()
+
+    def _solve(self) -> None:
+        m, k = len(self._gradients), self._columns.shape[1]
+        # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
+        matrix = np.vstack([np.hstack([self._gradients.T, self._columns]), np.repeat([self._size, 0.0], [m, k])])
+        parts, _ = nnls(matrix, np.append(np.zeros(len(matrix) - 1), self._size), maxiter=30 * (m + k))
+        self._shares = parts[:m] / parts[:m].sum()
+        self.multipliers = parts[m:] / parts[:m].sum()
+        self.nearest = self._gradients.T @ self._shares + self._columns @ self.multipliers

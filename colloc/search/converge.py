@@ -40,8 +40,6 @@ _SWINGS = 0.1
 KINK_RADIUS, _WIDEST, _MISSED = 1e-6, 1e-5, 1e-8
 """Radius [rad] of the ball in which gradients are sampled at a suspected kink: an optimum without a kink may be missed by as
 much. It is larger, up to the second, where the slopes are so small that the objective is missed by no more than the third."""
-_AROUND = (2, 16)
-"""How many gradients are sampled per parameter; the second where several kinks meet."""
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs of links are checked; the certificate checks 20000 a period."""
 TOUCHING = 1e-8
@@ -221,11 +219,9 @@ def conditions_on_kink(program: NonlinearProgram, v: np.ndarray, effort: Effort)
     """First-order conditions that hold by the gradients around v, where they do not hold by that at v: it lies on a kink."""
     conditions = stationarity(program, v)
     radius = min(max(KINK_RADIUS, _MISSED / conditions.kkt_error), _WIDEST)
-    for points in _AROUND:
-        around = stationarity_around(program, v, conditions, radius, points)
-        if max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < VIOLATION:
-            return around
-    return None
+    around = stationarity_around(program, v, conditions, radius, enough=effort.kkt_error)
+    holds = max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < VIOLATION
+    return around if holds else None
 
 
 def with_kink(optimum: Optimum) -> Optimum:
