@@ -213,3 +213,20 @@ def test_a_dask_scheduler_that_dies_ends_the_run_and_blames_no_task():
         dask.scheduler.kill()
         with pytest.raises(EngineGone, match="is gone; what is done is kept"):
             list(run)
+
+
+def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
+    """It falls where a lock is taken already and no block would open it again, as in `with lock` of CPython 3.13."""
+
+    class Locked(ThreadPoolExecutor):
+        lock = threading.Lock()
+
+        def submit(self, *arguments):
+            self.lock.acquire()
+            signal.raise_signal(signal.SIGINT)
+            self.lock.release()
+            return super().submit(*arguments)
+
+    with pytest.raises(KeyboardInterrupt):
+        list(completed(doubled, listed([Task(1, (1,))]), workers=1, executor=Locked))
+    assert not Locked.lock.locked()
