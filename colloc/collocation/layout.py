@@ -9,6 +9,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL
+from colloc.mechanics.inertia import STATES
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
 
@@ -27,6 +28,7 @@ class Layout:
     angles: np.ndarray
     rates: np.ndarray
     z: np.ndarray
+    momenta: np.ndarray
     forces: np.ndarray
     length: np.ndarray
     driven_work: np.ndarray
@@ -58,6 +60,7 @@ def problem_layout(problem: Problem, mesh: Mesh, knots: np.ndarray | None = None
         "angles": (n_joint, n_point),
         "rates": (n_joint, n_point),
         "z": (3, n_point),
+        "momenta": (len(STATES) if problem.froude else 0, mesh.n_site),
         "forces": (problem.body.n_force if full else 0, n_point),
         "length": (int(problem.uses("length")), 1),
         "driven_work": (int(problem.uses("driven_work")), 1),

@@ -29,6 +29,8 @@ from colloc.gaits.sloped import Slope, checked_chain
 from colloc.mechanics.actuators import driven_power
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.inertia import STATES, about_centre, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
 from colloc.numerics.blocks import Block, LocalFunction, implicit_function, local_function
 from colloc.numerics.constraint_rows import Group, block_group, total_group
@@ -43,11 +45,17 @@ _AT_REST = 1e-12
 
 
 @lru_cache(maxsize=32)
-def point_function(formulation: str, body: Body, friction: Law, slope: Slope | None = None) -> LocalFunction:
+def point_function(
+    formulation: str, body: Body, friction: Law, slope: Slope | None = None, froude: float = 0.0
+) -> LocalFunction:
     """Outputs at a mesh point: equations that must vanish, then rate of distance and power; on a slope that of the joints.
 
-    Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links.
+    Locals: theta, joint angles, joint rates, z, and for "full" tangential forces, normal forces, couples of the links. With
+    inertia the momenta, too: they, not the balance, have to be those that the body has, and before the last outputs are their
+    rates.
     """
+    if froude:
+        return _point_with_inertia(checked_mass(body), friction, froude)
     return _full_point(body, friction, slope) if formulation == FULL else _map_point(body, friction)
 
 
@@ -73,6 +81,16 @@ def _full_point(body: Body, friction: Law, slope: Slope | None) -> LocalFunction
         ahead, power = forward(theta - slope.ahead, centre), power + slope.grade * ahead
     out = ca.vertcat(laws, balance, ahead, power)
     return local_function("point", ca.vertcat(theta, angles, rates, z, forces), ca.SX(0, 1), delta, out)
+
+
+def _point_with_inertia(body: Chain, friction: Law, froude: float) -> LocalFunction:
+    theta, angles, rates, z, delta = _symbols(body)
+    forces, states, posture = ca.SX.sym("forces", body.n_force), ca.SX.sym("momenta", len(STATES)), body.posture(angles)
+    laws, force, centre, power = body.with_forces(friction, angles, rates, z, forces, delta)
+    own = momenta(body, posture, body.velocity(posture, rates, z))
+    changes = about_centre(body, angles, force) / froude + turning(z, states)
+    out = ca.vertcat(laws, own - states, changes, forward(theta, centre), power)
+    return local_function("point", ca.vertcat(theta, angles, rates, z, forces, states), ca.SX(0, 1), delta, out)
 
 
 def across_point(body: Body, friction: Law, slope: Slope) -> LocalFunction:

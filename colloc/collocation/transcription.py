@@ -16,6 +16,7 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
+from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
@@ -37,7 +38,8 @@ from colloc.collocation.shape_checks import shape_checks
 from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
-from colloc.motion.heading import closing_sign
+from colloc.mechanics.inertia import STATES
+from colloc.motion.heading import closing_sign, momenta_image
 from colloc.numerics.constraint_rows import (
     Group,
     block_group,
@@ -75,13 +77,13 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     layout = problem_layout(problem, mesh)
     checks = shape_checks(problem.body, far)
     friction = problem.law.in_speeds_of(RADIANS)
-    point = point_function(problem.formulation, problem.body, friction, problem.slope)
+    point = point_function(problem.formulation, problem.body, friction, problem.slope, problem.froude * RADIANS**2)
     n_joint = problem.body.n_joint
     n_parameter = layout.parameters.shape[0]
 
     sites = np.empty(mesh.n_point, dtype=int)
     sites[mesh.points] = mesh.sites
-    point_gather = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces])
+    point_gather = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces, layout.momenta[:, sites]])
     blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
     for check in checks:
         function = gait_check(check, n_joint, n_parameter)
@@ -109,7 +111,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     groups = [
         gait_group("angles", layout.angles, layout.parameters, problem.gait.angle_matrix(mesh.times, n_joint), layout.n),
         gait_group("rates", layout.rates, layout.parameters, rates, layout.n),
-        *_point_groups(problem, point.n_out, mesh.n_point, layout.n),
+        *_point_groups(problem, point.n_out, mesh, layout),
         *_orientation_groups(problem, mesh, layout),
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
         quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
@@ -143,12 +145,23 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
     return lower, upper
 
 
-def _point_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
-    """The equations of every point: lifted force laws, then the balance (or the velocity map in its place)."""
-    n_law = n_out - N_RATE - 3
+def _point_groups(problem: Problem, n_out: int, mesh: Mesh, layout: Layout) -> list[Group]:
+    """The equations of every point: lifted force laws, then the balance (or the velocity map in its place), or with inertia what
+    the momenta are; and how these grow, and close a period."""
+    n, n_point, momenta = layout.n, mesh.n_point, layout.momenta
+    n_law = n_out - N_RATE - 3 - len(momenta)
     groups = [output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
     if problem.formulation == FULL:
         groups.insert(0, output_group("force law", range(n_law), n_out, n_point, n))
+    state, rate = mesh.integration()
+    for row, sites in enumerate(momenta):
+        pick = selector(np.arange(n_point) * n_out + n_law + 3 + row, n_out * n_point)
+        grown = state @ selector(sites, n)
+        groups.append(equalities(f"momentum {STATES[row]}", grown, {"point": (-RADIANS * rate @ pick).tocsr()}))
+    if len(momenta):
+        image = momenta_image(problem.gait.motion_symmetry)
+        begin, end = selector(momenta[:, 0], n), selector(momenta[:, -1], n)
+        groups.append(equalities("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin)))
     return groups
 
 

@@ -35,7 +35,7 @@ def balanced_variables(
     kind = kind_of_motion(problem, friction)
     begin = begin_of(kind, gait)
     along = kind.along(mesh, Shapes(angles, rates, slow, unit), begin)
-    now, z = along.now, along.now.z
+    now, z = along.now, along.z
 
     centre, weight, points = np.array(now.centre), unit * stage_weights(mesh), mesh.points
     pose = CollocatedPose.on_mesh(mesh, unit * z[OMEGA], unit * centre, first_theta(kind, begin))
@@ -44,7 +44,7 @@ def balanced_variables(
     sides = np.array([shares[name].side for name in ("distance", "work")]) / kind.periods
     ahead, climbed = (pose.place * np.conj(sides)[:, None]).real
     # where the orientation is no state the plane is turned so that the gait goes along +x
-    theta_0 = 0.0 if kind.states else -float(np.angle(sides[0]))
+    theta_0 = 0.0 if kind.told else -float(np.angle(sides[0]))
     x[layout.distance[0, 1:]] = ahead[1:]
     x[layout.work[0, 1:]] = sums(power)[1:] + climbed[1:]
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
@@ -55,6 +55,9 @@ def balanced_variables(
     x[layout.length] = (weight * np.linalg.norm(rates, axis=0)[points]).sum()
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
+    if layout.momenta.size:
+        x[layout.momenta[:, mesh.sites]] = along.states[:, points]
+        x[layout.momenta[:, mesh.edge_sites]] = along.edges
     if layout.forces.size:
         x[layout.forces] = body.forces(friction, angles, rates, z, slow)
     return x

@@ -11,6 +11,7 @@ from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.guesses import check_guess, travelling_wave
 from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.inertia import check_paced
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.objective import EFFICIENCY, Objective, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
@@ -94,6 +95,9 @@ class Problem:
         "work" that of the joints, and where the body points is sought with the gait.
     towards : float, optional
         Direction on a slope whose way counts instead of the climb, with none across it, from straight uphill to the left [rad].
+    froude : float
+        Froude number L/(g T^2) at which gaits are played: length over gravity and the period squared; 0 is so slow that inertia
+        does not matter (docs/howto/pace.md). What counts is its ratio to the coefficient of friction.
     shrinking : bool
         Whether a gait may be the answer that shrank to ``smallest_shape_speed``. By default the best gait of finite size is,
         if there is one.
@@ -133,6 +137,7 @@ class Problem:
     power_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
     grade: float = field(default=0.0, metadata=STATED_IF_SET)
     towards: float | None = field(default=None, metadata=STATED_IF_SET)
+    froude: float = field(default=0.0, metadata=STATED_IF_SET)
     shrinking: bool = field(default=False, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
@@ -156,6 +161,8 @@ class Problem:
         self._check_actuators()
         if self.slope is not None:
             check_asked(self)
+        if self.froude != 0:
+            check_paced(self)
         if self.guess is None:
             free = self.gait.free
             self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
@@ -249,6 +256,8 @@ class Problem:
         """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
         if self.power_limit is not None:
             return "the joints' power is limited"
+        if self.froude:
+            return "what is heavy takes time to move"
         return "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"
 
     @property
@@ -287,7 +296,7 @@ class Problem:
     def __repr__(self) -> str:
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
-        grade = f", grade {self.grade:g}" if self.grade else ""
+        grade = f", grade {self.grade:g}" if self.grade else f", Froude number {self.froude:g}" if self.froude else ""
         scene = f"{coordinates}, {self.law.label}{grade}, {self.gait.describe()}"
         return f"<Problem {self.name}: {best}{scene}, delta {self.delta:.0e}>"
 

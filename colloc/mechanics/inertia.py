@@ -20,7 +20,10 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import LinkVelocity, Posture
+from colloc.numerics.arrays import Array, namespace
 from colloc.system.errors import ProblemError
+
+STATES = ("Vx", "Vy", "H")
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
@@ -28,57 +31,90 @@ Path = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 class MomentumRates(NamedTuple):
     """A chain with given momenta: how they change, and what it does meanwhile."""
 
-    rates: np.ndarray
+    rates: Array
     """Of the momenta, ``(3, n_time)``."""
-    z: np.ndarray
+    z: Array
     """Tail velocity, ``(3, n_time)``."""
-    power: np.ndarray
-    """Dissipated by friction, ``(n_time,)``."""
+    power: Array
+    """Dissipated by friction, ``(1, n_time)``."""
 
 
-def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> np.ndarray:
+def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> Array:
     """Velocity of the centre of mass and angular momentum about it, of links that move so, ``(3, n_time)``."""
-    mass, length = body.weight_column(), body.length_column()
+    xp, mass, length = namespace(link.vs), body.weight_column(), body.length_column()
     (x, y), (vx, vy) = body.centre_of_mass(posture), body.centre_velocity(posture, link)
     own_x = link.vs * posture.cos - link.vn * posture.sin
     own_y = link.vs * posture.sin + link.vn * posture.cos
-    spin = (posture.x - x) * (own_y - vy) - (posture.y - y) * (own_x - vx) + length**2 / 12 * link.w
-    return np.concatenate([vx, vy, (mass * spin).sum(axis=0, keepdims=True)])
+    spin = (posture.x - _each(body, x)) * own_y - (posture.y - _each(body, y)) * own_x + length**2 / 12 * link.w
+    return xp.stack([vx, vy, xp.sum_rows(mass * spin)])
 
 
-def moment_of_inertia(body: Chain, posture: Posture) -> np.ndarray:
-    """Of the body about its centre of mass, ``(n_time,)``."""
-    x, y = body.centre_of_mass(posture)
-    square = (posture.x - x) ** 2 + (posture.y - y) ** 2 + body.length_column() ** 2 / 12
-    return np.asarray((body.weight_column() * square).sum(axis=0))
+def moment_of_inertia(body: Chain, posture: Posture) -> Array:
+    """Of the body about its centre of mass, ``(1, n_time)``."""
+    xp, (x, y) = namespace(posture.x), body.centre_of_mass(posture)
+    square = (posture.x - _each(body, x)) ** 2 + (posture.y - _each(body, y)) ** 2 + body.length_column() ** 2 / 12
+    return xp.sum_rows(body.weight_column() * square)
 
 
-def tail_velocity(body: Chain, angles: np.ndarray, rates: np.ndarray, states: np.ndarray) -> np.ndarray:
+def _each(body: Chain, row: Array) -> Array:
+    """A row ``(1, n_time)`` for every link."""
+    return namespace(row).matmul(np.ones((body.n_link, 1)), row)
+
+
+def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
+    """Of a body of mass 1 whose tail moves with z, ``(1, n_time)``."""
+    link = body.velocity(body.posture(angles), rates, z)
+    square = link.vs**2 + link.vn**2 + body.length_column() ** 2 / 12 * link.w**2
+    return 0.5 * namespace(link.vs).sum_rows(body.weight_column() * square)
+
+
+def tail_velocity(body: Chain, angles: Array, rates: Array, states: Array) -> Array:
     """Tail velocity ``(3, n_time)`` of a chain with momenta `states`, ``(3, n_time)``."""
     posture = body.posture(angles)
-    vx, vy, h = states - momenta(body, posture, body.velocity(posture, rates, np.zeros_like(states)))
-    omega = h / moment_of_inertia(body, posture)
-    (x,), (y,) = body.centre_of_mass(posture)
-    return np.stack([vx + omega * y, vy - omega * x, omega])
+    left = states - momenta(body, posture, body.velocity(posture, rates, 0 * states))
+    omega, (x, y) = left[2:3, :] / moment_of_inertia(body, posture), body.centre_of_mass(posture)
+    return namespace(angles, states).stack([left[0:1, :] + omega * y, left[1:2, :] - omega * x, omega])
 
 
 def momentum_rates(
-    body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarray, states: np.ndarray, *, delta: float, froude: float
+    body: Chain, friction: Law, angles: Array, rates: Array, states: Array, *, delta: Array, froude: Array
 ) -> MomentumRates:
-    """How friction changes the momenta `states` ``(3, n_time)`` of a chain with such joint angles and rates."""
+    """How friction changes the momenta `states` ``(3, n_time)`` of a chain with such joint angles and rates; NumPy, CasADi."""
     z = tail_velocity(body, angles, rates, states)
     slides = body.sliding(friction, angles, rates, z, delta)
-    (x,), (y,) = body.centre_of_mass(body.posture(angles))
-    fx, fy, about_tail = slides.force
-    force = np.stack([fx, fy, about_tail - (x * fy - y * fx)])
-    turning = np.stack([z[2] * states[1], -z[2] * states[0], np.zeros_like(z[2])])
-    return MomentumRates(force / froude + turning, z, slides.power[0])
+    return MomentumRates(about_centre(body, angles, slides.force) / froude + turning(z, states), z, slides.power)
+
+
+def about_centre(body: Chain, angles: Array, force: Array) -> Array:
+    """Force and moment about the centre of mass, from force and torque about the tail, ``(3, n_time)`` both."""
+    x, y = body.centre_of_mass(body.posture(angles))
+    fx, fy, about_tail = force[0:1, :], force[1:2, :], force[2:3, :]
+    return namespace(angles, force).stack([fx, fy, about_tail - (x * fy - y * fx)])
+
+
+def about_tail(body: Chain, angles: Array, force: Array) -> Array:
+    """Force and torque about the tail, from force and moment about the centre of mass, ``(3, n_time)`` both."""
+    x, y = body.centre_of_mass(body.posture(angles))
+    fx, fy, moment = force[0:1, :], force[1:2, :], force[2:3, :]
+    return namespace(angles, force).stack([fx, fy, moment + (x * fy - y * fx)])
+
+
+def turning(z: Array, states: Array) -> Array:
+    """What the momenta ``(3, n_time)`` change by because their axes turn with the tail link."""
+    omega = z[2:3, :]
+    return namespace(z, states).stack([omega * states[1:2, :], -omega * states[0:1, :], 0 * omega])
+
+
+def checked_mass(body: Body) -> Chain:
+    """The body, if its parts have masses; else a `ProblemError` that says so."""
+    if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
+        raise ProblemError(f"inertia is known of a Chain, whose links have masses, not of a {type(body).__name__}.")
+    return body
 
 
 def checked_inertia(body: Body, gait: Path) -> Chain:
     """The body, if it can play the gait with inertia; else a `ProblemError` that says why not."""
-    if not isinstance(body, Chain):
-        raise ProblemError(f"inertia is known of a Chain, whose links have masses, not of a {type(body).__name__}.")
+    chain = checked_mass(body)
     if len(gait(np.zeros(1))) != 2:
         raise ProblemError("a relaxed gait changes direction in no time at all, so it cannot be played with inertia.")
-    return body
+    return chain

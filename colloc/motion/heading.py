@@ -39,3 +39,9 @@ def whole_turns(first: float, last: float) -> float:
     """The whole turns [rad] that the orientations at the ends of an antipodal gait's first half add up to: 0, or, where it
     travels the other way along its axis, one."""
     return float(2 * np.pi * np.round((first + last) / (2 * np.pi)))
+
+
+def momenta_image(symmetry: str) -> np.ndarray | None:
+    """What a symmetry makes of the momenta (Vx, Vy, H) in the axes of the tail at the begin of the solved part, to be those at its
+    end, ``(3, 3)``; None: they are the same. Gaits that are bilateral run backwards in time, as no motion with inertia does."""
+    return {NONE: None, ANTIPODAL: np.diag([1.0, -1.0, -1.0])}[symmetry]

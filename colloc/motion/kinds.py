@@ -4,6 +4,7 @@ r"""Kinds of motion: which states a period has besides the shape, their rates at
 |---|---|---|
 | slow, on the level | none: the balance holds instant by instant | orientation, place, work |
 | slow, on a slope | the orientation theta, on which the weight's pull depends | place, work |
+| with inertia, on the level | the momenta Vx, Vy, H, which repeat every period | orientation, place, work |
 
 A kind answers for a balance with its derivatives, for the motion along a mesh, and for the numbers of a period. Whoever
 collocates a motion asks it, and not whether there is a slope.
@@ -21,18 +22,23 @@ from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.inertia import STATES, checked_mass, momenta
 from colloc.mechanics.law import Law
-from colloc.motion.collocated import CollocatedPose
-from colloc.motion.heading import heading, heading_shares
+from colloc.motion.collocated import CollocatedPose, stage_weights, sums
+from colloc.motion.heading import heading, heading_shares, momenta_image
 from colloc.motion.on_slope import balance_on_slope
 from colloc.motion.states import CollocatedStates, Rates
 from colloc.numerics.mesh import Mesh
 
+_MORE = slice(-len(STATES), None)
+_VISCOUS, _WETTER = 3.0, 10**0.5
+"""Delta [body lengths per period] at which friction is as good as viscous, and the factor from each tried to the next."""
 TOLERANCE = 1e-12
 _ACCEPTED = 1e3
 """Where rounding stops the solver short of the tolerance, a residual of so many times the tolerance will do."""
-OMEGA, OUTPUTS = 2, slice(2, 6)
-"""Among the rows of `colloc.mechanics.bodies.Body.slopes`: rotation rate; the same, velocity of the centre, power."""
+OMEGA, OUTPUTS = 2, slice(2, None)
+"""Among the rows of `Kind.slopes`: rotation rate; the same, velocity of the centre, power, and what there is more."""
 
 
 class Shapes(NamedTuple):
@@ -48,16 +54,21 @@ class Along(NamedTuple):
     """A motion at the points of a mesh."""
 
     begin: np.ndarray
-    """Of the states, ``(n_state,)``."""
+    """Of the states that are told it, ``(n_told,)``."""
     states: np.ndarray
     """``(n_state, n_point)``."""
-    solved: BalanceSolution
+    z: np.ndarray
+    """Tail velocity, ``(3, n_point)``."""
     now: BalancedMotion
     """Per time divided by the shapes' unit."""
     held: np.ndarray
     """Where the equations hold, ``(n_point,)``."""
     slopes: tuple[np.ndarray, np.ndarray] | None = None
     """What `Kind.slopes` gives, if it is known."""
+    solved: BalanceSolution | None = None
+    """The balance, where it holds instant by instant."""
+    edges: np.ndarray = np.empty((0, 0))
+    """States that are variables of a full program, at the edges of the mesh, ``(n_state, n + 1)``."""
 
 
 class Passed(NamedTuple):
@@ -85,7 +96,9 @@ class Kind(Protocol):
     body: Body
     friction: Law
     states: tuple[str, ...]
-    """States of a period; a gait's last parameters are where they begin."""
+    """States of a period that are solved for."""
+    told: tuple[str, ...]
+    """Those of them whose begin a gait says, in its last parameters; a period closes the others."""
     periods: float
     """A whole period over the part that is solved."""
     bends: bool
@@ -103,14 +116,15 @@ class Kind(Protocol):
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of (tail velocity, velocity of the centre, power) with respect to (angles, rates), ``(6, 2 n_joint,
-        n_point)``, and to the states, ``(6, n_state, n_point)``."""
+        n_point)``, and to the states, ``(6, n_state, n_point)``; then of the rates of states, where they are none of these."""
 
     def through_pose(
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
     ) -> np.ndarray:
         """Add what m numbers owe to the orientation to their derivatives `on_out` with respect to (rotation rate, velocity of
-        the centre, power) at the stages, ``(m, 4, n, s)``, from those with respect to the orientation, ``(m, n, s)``, and those
-        of the outputs with respect to the states; and give those with respect to the begin of the states, ``(m, n_state)``."""
+        the centre, power, and rates of states) at the stages, ``(m, 4 + more, n, s)``, from those with respect to the orientation,
+        ``(m, n, s)``, and those of the outputs with respect to the states; and give those with respect to the begins that are
+        told, ``(m, n_told)``."""
 
     def counted(self, passed: Passed) -> dict[str, float]:
         """What a whole period comes to."""
@@ -123,6 +137,7 @@ class SlowOnLevel:
     """No state: the balance holds instant by instant, wherever the body points. Distance is along the direction of travel."""
 
     states: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
 
     def __init__(self, body: Body, friction: Law, symmetry: str) -> None:
         self.body, self.friction, self._symmetry = body, friction, symmetry
@@ -140,9 +155,10 @@ class SlowOnLevel:
         at = self.friction, shapes.angles, shapes.rates, shapes.delta
         solved = self.body.solve(*at, start=near[1], tolerance=tolerance)
         held = solved.residual < _ACCEPTED * tolerance
-        return Along(begin, np.empty((0, held.size)), solved, self.body.motion(*at, solved), held)
+        return Along(begin, np.empty((0, held.size)), solved.z, self.body.motion(*at, solved), held, solved=solved)
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+        assert along.solved is not None
         found = self.body.slopes(self.friction, shapes.angles, shapes.rates, shapes.delta, along.solved)
         return found, found[:, :0]
 
@@ -172,6 +188,7 @@ class SlowOnSlope:
     """One state, the orientation, from straight uphill. Distance is along the direction that counts; joints lift the body."""
 
     states: tuple[str, ...] = ("theta",)
+    told: tuple[str, ...] = ("theta",)
     periods: float = 1.0
     bends: bool = False
 
@@ -201,7 +218,7 @@ class SlowOnSlope:
 
         states, _, held = CollocatedStates(mesh, unit=shapes.unit).solved(rates, begin, states)
         slopes = now.on_shape, now.on_theta[:, None]
-        return Along(begin, states, now.solved, now.now, np.full(mesh.n_point, held), slopes)
+        return Along(begin, states, now.solved.z, now.now, np.full(mesh.n_point, held), slopes)
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
         assert along.slopes is not None
@@ -229,17 +246,96 @@ class SlowOnSlope:
         return {"distance": Share(ahead), "work": Share(self._slope.grade, work=1.0), "rotation": turned, "across": across}
 
 
+class WithInertia(SlowOnLevel):
+    """Three states, the momenta: what friction changes them by over a period is nothing. They are those of
+    `colloc.mechanics.inertia`, in the axes of the tail link, so that it does not matter where the body points."""
+
+    states: tuple[str, ...] = STATES
+
+    def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float) -> None:
+        super().__init__(body, friction, symmetry)
+        self._chain, self._froude, self._image = body, froude, momenta_image(symmetry)
+
+    def along(
+        self,
+        mesh: Mesh,
+        shapes: Shapes,
+        begin: np.ndarray,
+        near: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
+        tolerance: float = TOLERANCE,
+    ) -> Along:
+        """Where Newton's method does not lead from the slow motion to the one with inertia, as on feet that hold, it is reached
+        through more viscous friction."""
+        states, held = near[0], False
+        if states is not None:
+            states, held = self._closed(mesh, shapes, states)
+        if not held:
+            states, held = self._closed(mesh, shapes, self._slow_momenta(shapes))
+        if not held and shapes.delta * shapes.unit < _VISCOUS:
+            wetter = self.along(mesh, shapes._replace(delta=_WETTER * shapes.delta), begin)
+            states, held = self._closed(mesh, shapes, wetter.states)
+        out, _ = self._slopes(shapes, states, along_shapes=False)
+        z, centre, power, rates = np.split(out, [3, 5, 6])
+        now = BalancedMotion(z, centre, power[0], power[0])
+        gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
+        first = states[:, 0] - CollocatedStates(mesh, unit=shapes.unit).integrals(rates)[0][:, 0]
+        edges = np.stack([sums(row, start) for row, start in zip(gained, first, strict=True)])
+        return Along(begin, states, z, now, np.full(mesh.n_point, held), edges=edges)
+
+    def _slow_momenta(self, shapes: Shapes) -> np.ndarray:
+        body, angles, rates = self._chain, shapes.angles, shapes.rates
+        z = body.solve(self.friction, angles, rates, shapes.delta).z
+        posture = body.posture(angles)
+        return momenta(body, posture, body.velocity(posture, rates, z))
+
+    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray) -> tuple[np.ndarray, bool]:
+        """The momenta that repeat every period, by Newton's method from others ``(3, n_point)``, and whether there are any."""
+
+        def rates(states: np.ndarray) -> Rates:
+            out, slopes = self._slopes(shapes, states, along_shapes=False)
+            return Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
+
+        states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
+        return states, held
+
+    def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
+        return CollocatedStates(mesh, np.ones(len(STATES), dtype=bool), self._image, unit)
+
+    def _slopes(self, shapes: Shapes, states: np.ndarray, *, along_shapes: bool) -> tuple[np.ndarray, np.ndarray]:
+        from colloc.motion.momentum_slopes import momentum_slopes  # loads CasADi, which nothing slow needs here
+
+        # momentum grows by what friction gives it in a unit of time, and has as much to grow
+        froude = self._froude * shapes.unit**2
+        at = shapes.angles, shapes.rates, shapes.delta
+        return momentum_slopes(self._chain, self.friction, at, states, froude, along_shapes=along_shapes)
+
+    def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
+        slopes = self._slopes(shapes, along.states, along_shapes=True)[1]
+        return slopes[:, : -len(STATES)], slopes[:, -len(STATES) :]
+
+    def through_pose(
+        self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
+    ) -> np.ndarray:
+        on_out[:, 0] += pose.on_rates(on_theta)
+        given, more = np.split(on_out.reshape(*on_out.shape[:2], -1), [-len(STATES)], axis=1)
+        of_states = np.einsum("mrt,rkt->mkt", given, on_states[OUTPUTS][: -len(STATES)])
+        more[:] = self._equations(mesh).pulled_back(on_states[_MORE], of_states)[1]
+        return np.empty((len(on_out), 0))
+
+
 def kind_of_motion(problem: Problem, friction: Law | None = None) -> Kind:
     """How the body of a problem moves, or would under another law of friction."""
-    body, law, slope = problem.body, problem.law if friction is None else friction, problem.slope
-    return SlowOnLevel(body, law, problem.gait.motion_symmetry) if slope is None else SlowOnSlope(body, law, slope)
+    body, law, symmetry = problem.body, problem.law if friction is None else friction, problem.gait.motion_symmetry
+    if problem.froude:
+        return WithInertia(checked_mass(body), law, symmetry, problem.froude)
+    return SlowOnLevel(body, law, symmetry) if problem.slope is None else SlowOnSlope(body, law, problem.slope)
 
 
 def begin_of(kind: Kind, gait: AnyGait) -> np.ndarray:
-    """Where a gait says that the states begin, ``(n_state,)``."""
-    return np.array([getattr(gait, name) for name in kind.states])
+    """Where a gait says that states begin, ``(n_told,)``."""
+    return np.array([getattr(gait, name) for name in kind.told])
 
 
 def first_theta(kind: Kind, begin: np.ndarray) -> float:
     """The orientation at the begin: 0 where it is no state."""
-    return float(begin[kind.states.index("theta")]) if "theta" in kind.states else 0.0
+    return float(begin[kind.told.index("theta")]) if "theta" in kind.told else 0.0

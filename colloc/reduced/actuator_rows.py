@@ -126,7 +126,7 @@ class ActuatorRows:
 
     def _all(self, v: np.ndarray, delta: float) -> np.ndarray:
         s, motion = self._motion.at(v, delta), self._motion
-        return self._limits.shares_in_balance(motion.body, motion.friction, s.angles, s.rates, s.solved.z, delta)
+        return self._limits.shares_in_balance(motion.body, motion.friction, s.angles, s.rates, s.z, delta)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the rows, ``(n_row,)`` each."""
@@ -142,7 +142,7 @@ class ActuatorRows:
         (share, point), each = self.placed, np.arange(self.placed.shape[1])
         if not each.size:
             return np.empty((0, v.size))
-        at = s.angles[:, point], s.rates[:, point], s.solved.z[:, point]
+        at = s.angles[:, point], s.rates[:, point], s.z[:, point]
         slopes = share_slopes(motion.body, motion.friction, self._limits, *at, delta)
         on_shape = np.zeros((each.size, motion.mesh.n_point, slopes.shape[1]))
         on_shape[each, point] = slopes[share, :, each]

@@ -14,7 +14,6 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.mechanics.balance_results import BalanceSolution
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
 from colloc.motion.kinds import OMEGA, OUTPUTS, Along, Kind, Passed, first_theta
 from colloc.motion.kinds import Shapes as Moving
@@ -54,8 +53,8 @@ class _State:
     passed: Passed
 
     @property
-    def solved(self) -> BalanceSolution:
-        return self.along.solved
+    def z(self) -> np.ndarray:
+        return self.along.z
 
 
 class ReducedMotion:
@@ -75,7 +74,7 @@ class ReducedMotion:
         if last is not None and last.delta == delta and np.array_equal(last.v, v):
             return last
         angles, rates, pace = self.shapes.at(v)
-        begin = v[v.size - len(self._kind.states) :]
+        begin = v[v.size - len(self._kind.told) :]
         along = self._kind.along(self.mesh, Moving(angles, rates, delta), begin, self._start(angles, rates, begin))
         self.solves += 1
         now, mesh = along.now, self.mesh
@@ -97,10 +96,14 @@ class ReducedMotion:
         their slopes."""
         if self._near is None or self._kind.states:
             last = self._last
-            return (None, None) if last is None else (last.along.states + (begin - last.along.begin)[:, None], last.solved.z)
+            if last is None:
+                return None, None
+            states = last.along.states.copy()
+            states[: begin.size] += (begin - last.along.begin)[:, None]
+            return states, last.z
         near, slopes = self._near
         moved = np.concatenate([angles - near.angles, rates - near.rates])
-        return None, near.solved.z + np.einsum("ijt,jt->it", slopes[:3], moved)
+        return None, near.z + np.einsum("ijt,jt->it", slopes[:3], moved)
 
     def _bend(self, rates: np.ndarray, pace: np.ndarray) -> float:
         """Change of the sum of all joint angles over the solved part [rad]."""
@@ -122,7 +125,7 @@ class ReducedMotion:
         if name == "driven_work":
             from colloc.reduced.actuator_slopes import driven_slopes  # loads CasADi, which a certificate can do without
 
-            return driven_slopes(self.body, self.friction, s.angles, s.rates, s.solved.z, s.delta)
+            return driven_slopes(self.body, self.friction, s.angles, s.rates, s.z, s.delta)
         size = np.linalg.norm(s.rates, axis=0)
         return size, np.concatenate([np.zeros_like(s.angles), s.rates / np.maximum(size, 1e-300)])
 
@@ -139,7 +142,7 @@ class ReducedMotion:
         shares = kind.shares(s.passed)
         side, rotation, bend, work = (np.array(column) for column in zip(*shares.values(), strict=True))
         on_theta, on_centre = s.pose.on_pose(side)
-        rows = np.empty((side.size, 4, *self._weight.shape))
+        rows = np.zeros((side.size, len(slopes[OUTPUTS]), *self._weight.shape))
         rows[:, 0], rows[:, 3] = (part[:, None, None] * self._weight for part in (rotation, work))
         rows[:, 1:3] = on_centre
         on_begin = kind.through_pose(mesh, s.pose, on_theta, rows, on_states)
@@ -147,7 +150,7 @@ class ReducedMotion:
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]
         on_out = np.tile(on_out, s.pace.size // mesh.n_point)
-        on_pace = np.einsum("krt,rt->kt", on_out, s.out)
+        on_pace = np.einsum("krt,rt->kt", on_out[:, : len(s.out)], s.out)
         on_shape = np.einsum("krt,rjt->ktj", on_out * s.pace, slopes[OUTPUTS])
         if bend.any():
             weight = bend[:, None] * self._on_columns(s)
@@ -158,6 +161,6 @@ class ReducedMotion:
             on_shape = np.concatenate([on_shape, (weight * s.pace * slope).T[None]])
             on_pace = np.concatenate([on_pace, (weight * density)[None]])
         found = self.shapes.pulled_back(v, on_shape, on_pace)
-        if kind.states:
-            found[: len(shares), -len(kind.states) :] += on_begin
+        if kind.told:
+            found[: len(shares), -len(kind.told) :] += on_begin
         return dict(zip((*shares, *self._besides), found, strict=True))

@@ -14,6 +14,7 @@ from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.balance_results import Sliding
+from colloc.mechanics.inertia import about_tail, checked_mass, turning
 from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import whole_turns
 from colloc.numerics.mesh import Mesh
@@ -51,13 +52,29 @@ class CollocatedMotion:
 
     @cached_property
     def at_points(self) -> Sliding:
-        """The body at the collocation points, with the weight's pull if it is on a slope."""
+        """The body at the collocation points; its force is what is left over: with the weight's pull if it is on a slope, and
+        less what its momenta grow by if it has inertia."""
         now, slope = self.sliding(*self._points), self.problem.slope
+        if self.problem.froude:
+            return now._replace(force=now.force - self._growth)
         if slope is None:
             return now
         chain = checked_chain(self.problem.body, self.problem.law, slope.grade)
         pull = load_wrench(chain, chain.posture(self._points[0]), slope.pull(self._theta[None]))
         return now._replace(force=now.force + pull)
+
+    @property
+    def _growth(self) -> np.ndarray:
+        """Force, and torque about the tail, that change the momenta as the scheme's polynomials say, ``(3, n_point)``."""
+        mesh, unit = self.mesh, self.gait.speed_unit
+        momenta = unit * self.x[self.layout.momenta]
+        grown = momenta[:, mesh.sites] - momenta[:, mesh.edge_sites[:-1], None]
+        growth = np.empty((3, mesh.n_point))
+        growth[:, mesh.points] = np.einsum("ij,ckj->cki", np.linalg.inv(mesh.scheme.A), grown) / mesh.h[:, None]
+        at_points = np.empty_like(growth)
+        at_points[:, mesh.points] = momenta[:, mesh.sites]
+        chain, (angles, _, z) = checked_mass(self.problem.body), self._points
+        return self.problem.froude * about_tail(chain, angles, growth - turning(z, at_points))
 
     @property
     def _theta(self) -> np.ndarray:

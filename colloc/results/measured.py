@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.gaits.sloped import Slope
 from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.verification.replay import MixedPath, Path, Replay, replay
-from colloc.verification.slope_replay import slope_replay
 
 PARTS_OF_DELTA = (1.0, 0.1, 0.01)
 """At which a gait's value is to be known."""
@@ -77,15 +74,14 @@ def measured(
     rotation: float | None = 0.0,
     driven: bool = False,
     limits: ActuatorLimits = UNLIMITED,
-    slope: Slope | None = None,
+    run: Callable[..., Replay] = replay,
 ) -> Measured:
     """An objective, efficiency, distance and work of a path at delta, and the first two for delta -> 0, with their errors.
 
     Arguments are those of `colloc.verification.replay.replay`, and the net rotation that is asked for: the distance of a body
-    that turns by more depends on the point that is followed. On a slope the path is a gait that says where it points.
+    that turns by more depends on the point that is followed. `run` is what replays (`colloc.verification.replayer`).
     """
     replays: list[Replay] = []
-    run: Callable[..., Replay] = replay if slope is None else partial(slope_replay, slope=slope)
     smoothed = friction.regularised or "driven_work" in objective.uses
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
         near = replays[-1] if replays else None

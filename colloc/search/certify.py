@@ -17,6 +17,7 @@ from colloc.results.checks import UNCERTIFIED, Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import MixedPath, Path, Replay
+from colloc.verification.replayer import replayer
 
 KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK = 1e-6, 1e-8, 1e-6, 1e-9, 1e-4, 1e-6, 1e-4, 1e-7
 """Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
@@ -153,7 +154,7 @@ def gait_certificate(
     """
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
-    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "slope": problem.slope}
+    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "run": replayer(problem)}
     known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
@@ -231,6 +232,9 @@ def _motion(
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
         beside = "way from the centre of mass to where the feet's weights press [body lengths]; reported, not judged"
         checks.append(Check("statics", lean, _ANY_LEAN, beside))
+    if fine.multipliers.size:
+        meaning = "largest Floquet multiplier: what a period leaves of a small change of the momenta"
+        checks.append(Check("stability", float(np.abs(fine.multipliers).max()), 1.0, meaning))
     if claimed is not None:
         gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))

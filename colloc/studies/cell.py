@@ -20,7 +20,7 @@ from colloc.results.outcome import ERROR, Outcome
 from colloc.results.solution import SOLVED
 from colloc.studies.campaign import run_guess
 from colloc.system.errors import CollocError
-from colloc.verification.slope_replay import replayer
+from colloc.verification.replayer import replayer
 
 Index = tuple[int, ...]
 _INSTANTS = 200
@@ -117,7 +117,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
     200 instants are within 3e-4 of 1,600 for the ellipse of efficiency 0.26 and delta from 1e-2 to 1e-4.
     """
     try:
-        found = replayer(problem.slope)(
+        found = replayer(problem)(
             problem.body,
             problem.law,
             gait,

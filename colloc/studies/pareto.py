@@ -20,7 +20,7 @@ from colloc.search.explore import STARTS
 from colloc.search.solve import solve
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
-from colloc.verification.slope_replay import replayer
+from colloc.verification.replayer import replayer
 
 POINTS = 9
 _SAME = 1e-6
@@ -160,4 +160,4 @@ def _value(solution: Solution, aim: Objective) -> float:
         return value
     problem, gait = solution.problem, solution.gait
     at = (problem.body, problem.law, gait, solution.delta_per_period)
-    return replayer(problem.slope)(*at, breaks=gait.corner_phases, objective=aim).value
+    return replayer(problem)(*at, breaks=gait.corner_phases, objective=aim).value

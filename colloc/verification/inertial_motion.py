@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -36,6 +36,7 @@ _CLOSED = 10.0
 """Gap between the momenta at start and end that is left open, over the error of a run."""
 _MOST_PERIODS = 30
 _ONE_SIDED = 1e-12
+_NO_OTHERS = dict.fromkeys(QUANTITIES, np.nan)
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 
@@ -75,10 +76,15 @@ class InertialMotion:
         """Distance over work."""
         return self.distance / self.work
 
+    def error_of(self, objective: Objective) -> float:
+        """Relative error of an objective of distance, work and rotation."""
+        errors = {"distance": self.distance_error, "work": self.work_error, "rotation": self.rotation_error}
+        return float(objective.relative_error(_NO_OTHERS | vars(self), errors))
+
     @property
     def error(self) -> float:
         """Relative error of the efficiency."""
-        return float(EFFICIENCY.relative_error(vars(self), {"distance": self.distance_error, "work": self.work_error}))
+        return self.error_of(EFFICIENCY)
 
     @property
     def stable(self) -> bool:
@@ -109,7 +115,7 @@ class GaitWithInertia(NamedTuple):
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
             now = self._rates(t, state[_MOMENTA, None])
             moved = np.exp(1j * state[_THETA]) * complex(state[0], state[1])
-            return np.array([*now.rates[:, 0], now.z[2, 0], moved.real, moved.imag, now.power[0]]), None
+            return np.array([*now.rates[:, 0], now.z[2, 0], moved.real, moved.imag, now.power[0, 0]]), None
 
         return followed(slope, np.concatenate([start, np.zeros(4)]), aim, self.breaks)
 
@@ -123,12 +129,13 @@ class GaitWithInertia(NamedTuple):
         end = followed(slope, begin.T.ravel(), _ROUGH, self.breaks).states[:, -1].reshape(4, 3).T
         return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
 
-    def closed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Momenta ``(3,)`` that a period leaves as they are, but for the error of rough runs, and the derivatives there."""
-        start = self.slow_momenta()
+    def closed(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Momenta ``(3,)`` near others that a period leaves as they are, but for the error of rough runs, and the derivatives
+        there."""
+        start = near
         for _ in range(_MOST_PERIODS):
             end, slopes = self.mapped(start)
-            step = self._step(end - start, slopes)
+            step = _newton_step(end - start, slopes)
             start = start + step
             if np.abs(step).max() < _CLOSED * _ROUGH:
                 return start, slopes
@@ -136,14 +143,28 @@ class GaitWithInertia(NamedTuple):
             f"at a Froude number of {self.froude:g} no motion was found in which all periods are alike; try a smaller one."
         )
 
-    @staticmethod
-    def _step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """Newton's step to where a period changes nothing."""
-        return np.linalg.solve(np.eye(3) - slopes, gap)
+    def settled(self, near: np.ndarray, aim: float, slopes: np.ndarray | None = None) -> Course:
+        """`InertialMotion.states` through a period that leaves the momenta as they are, to an error, sought near some momenta; with
+        the derivatives of `closed`, if they are known."""
+        start = near
+        if slopes is None:
+            start, slopes = self.closed(near)
+        for _ in range(_MOST_PERIODS):
+            ran = self.run(start, aim)
+            gap = ran.states[_MOMENTA, -1] - start
+            if np.abs(gap).max() < _CLOSED * aim:
+                return ran
+            start = start + _newton_step(gap, slopes)
+        raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
 
     def _rates(self, t: float, states: np.ndarray) -> MomentumRates:
         angles, rates = (np.repeat(part, states.shape[1], axis=1) for part in self.path(np.array([t])))
         return momentum_rates(self.body, self.friction, angles, rates, states, delta=self.delta, froude=self.froude)
+
+
+def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """To where a period changes nothing."""
+    return np.linalg.solve(np.eye(3) - slopes, gap)
 
 
 def inertial_motion(
@@ -155,6 +176,7 @@ def inertial_motion(
     *,
     tolerance: float = 1e-5,
     breaks: np.ndarray | tuple[float, ...] = (),
+    objective: Objective = EFFICIENCY,
 ) -> InertialMotion:
     """Play a gait with inertia, once the body has settled to a motion in which all periods are alike.
 
@@ -170,9 +192,11 @@ def inertial_motion(
     froude : float
         Froude number L/(g T^2), above 0: 0.0255 for a body of 1 m in 2 s. What counts is its ratio to the friction coefficient.
     tolerance : float
-        Relative error of the efficiency.
+        Relative error of the objective.
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
+    objective : Objective
+        Of distance, work and rotation.
 
     Raises
     ------
@@ -189,34 +213,20 @@ def inertial_motion(
     >>> round(played.efficiency, 3), played.stable
     (0.136, True)
     """
-    played = gait_with_inertia(body, friction, gait, delta, froude, breaks=breaks)
-    start, slopes = played.closed()
+    check_finite(positive=True, froude=froude, delta=delta)
+    chain, at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
+    played = GaitWithInertia(chain, friction, gait, delta, float(froude), at)
+    start, slopes = played.closed(played.slow_momenta())
     aim, before = _FIRST * tolerance, None
     while aim >= _LEAST:
-        for _ in range(_MOST_PERIODS):
-            phases, states, _ = played.run(start, aim)
-            gap = states[_MOMENTA, -1] - start
-            if np.abs(gap).max() < _CLOSED * aim:
-                break
-            start = start + GaitWithInertia._step(gap, slopes)
-        else:
-            raise NotConvergedError(f"at a Froude number of {froude:g} the periods do not become alike; try a smaller one.")
+        phases, states, _ = played.settled(start, aim, slopes)
+        start = states[_MOMENTA, 0]
         rotation, work = float(states[_THETA, -1]), float(states[_WORK, -1])
         now = {"distance": float(np.hypot(*states[_PLACE, -1])), "work": work, "rotation": rotation}
         if before is not None:
             errors = {f"{name}_error": abs(now[name] - before[name]) for name in now}
             found = InertialMotion(froude, **now, **errors, multipliers=np.linalg.eigvals(slopes), phases=phases, states=states)
-            if found.error <= tolerance:
+            if found.error_of(objective) <= tolerance:
                 return found
         aim, before = _TENTH * aim, now
     raise NotConvergedError(f"the motion with inertia cannot be replayed to a relative error of {tolerance:.0e}.")
-
-
-def gait_with_inertia(
-    body: Body, friction: Law, gait: Path, delta: float, froude: float, *, breaks: np.ndarray | tuple[float, ...] = ()
-) -> GaitWithInertia:
-    """A gait of a body that has a mass, or a `ProblemError` that says why there is none."""
-    check_finite(positive=True, froude=froude, delta=delta)
-    return GaitWithInertia(
-        checked_inertia(body, gait), friction, gait, delta, float(froude), tuple(sorted(float(t) for t in breaks))
-    )

@@ -20,15 +20,16 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import heading
+from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, path_lengths, rates_at
-from colloc.verification.collocated_slope import slope_course, slope_defects
+from colloc.verification.collocated_course import course, course_defects
 
 FINER = 0.05
 """The panels are refined until what they may still miss is this fraction of the error they measure or of the tolerance."""
 _OF_WAY = 0.1
-"""A way on a slope is usually no less: its error over a relative one."""
+"""The way of a motion with states is usually no less: its error over a relative one."""
 _SAMPLES = 32
 _LENGTH_PIECES = 200
 
@@ -74,17 +75,17 @@ class Known(NamedTuple):
     fine: Any
 
 
-def gait_motion(problem: Problem, gait: AnyGait, delta: float, edges: np.ndarray, tolerance: float) -> Any:
-    """The gait's motion on adaptive panels, a `FineMotion`; on a slope a `SlopeCourse`."""
-    if problem.slope is not None:
-        return slope_course(problem, gait, delta, _OF_WAY * tolerance)
+def gait_motion(problem: Problem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float) -> Any:
+    """The gait's motion on adaptive panels, a `FineMotion`; where it has states, a `CourseOfGait`."""
+    if kind_of_motion(problem).states:
+        return course(problem, gait, delta, mesh, _OF_WAY * tolerance)
     length = _whole_length(problem, gait)
 
     def shares(part: Mapping[str, float]) -> dict[str, float]:
         return _shares(problem, part, length)
 
     of = (problem.body, problem.law, gait)
-    return fine_motion(*of, delta, edges, tolerance, shares, problem.uses("driven_work"))
+    return fine_motion(*of, delta, mesh.edges, tolerance, shares, problem.uses("driven_work"))
 
 
 def _period(problem: Problem, part: Mapping[str, float], length: float) -> dict[str, float]:
@@ -112,9 +113,9 @@ def mesh_error(
     """Errors of collocating a gait on a mesh, with delta per period; relative ones below the tolerance need not be exact.
     `fine` is the gait's motion, if it is known. `NotConvergedError` if the balance cannot be solved at some instant."""
     if fine is None:
-        fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
-    if problem.slope is not None:
-        off, violation = slope_defects(problem, mesh, gait, delta, fine), constraint_violation(problem, mesh, gait)
+        fine = gait_motion(problem, gait, delta, mesh, FINER * tolerance)
+    if kind_of_motion(problem).states:
+        off, violation = course_defects(problem, mesh, gait, delta, fine), constraint_violation(problem, mesh, gait)
         return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
     known = Known(problem, gait, delta, fine)
     own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])

@@ -21,6 +21,7 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
+from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.verification.adaptive_motion import FineMotion
@@ -134,7 +135,7 @@ def planned_mesh(
     NotConvergedError
         If the balance cannot be solved at some instant.
     """
-    fine = gait_motion(problem, gait, delta, mesh.edges, FINER * tolerance)
+    fine = gait_motion(problem, gait, delta, mesh, FINER * tolerance)
     known, error = Known(problem, gait, delta, fine), mesh_error(problem, mesh, gait, delta, tolerance, fine)
     accurate = error.estimate <= _GOOD * tolerance and error.turning <= TURNING
     if accurate and error.violation.max() <= VIOLATION:
@@ -142,8 +143,8 @@ def planned_mesh(
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
-    if problem.slope is not None:
-        return _split_on_slope(known, mesh.scheme, knots, tolerance, aim, most_points)
+    if kind_of_motion(problem).states:
+        return _halved(known, mesh.scheme, knots, tolerance, aim, most_points)
     given = scheme(problem.scheme)
     kinks = kink_knots(problem, gait, delta, fine)
     switches = not problem.law.reversible
@@ -226,10 +227,10 @@ def _split(
     return MeshPlan(rule.name, np.sort(np.append(left, right.max())), estimate, estimate <= tolerance, kept)
 
 
-def _split_on_slope(known: Known, rule: Scheme, kept: np.ndarray, tolerance: float, aim: float, most_points: int) -> MeshPlan:
+def _halved(known: Known, rule: Scheme, kept: np.ndarray, tolerance: float, aim: float, most_points: int) -> MeshPlan:
     """A uniform mesh whose intervals with the largest errors are halved until all together are small enough."""
     problem, gait, delta, fine = known
-    edges = np.union1d(np.linspace(0.0, 1.0, problem.intervals + 1), kept)
+    edges = np.union1d(np.linspace(0.0, problem.gait.fraction, problem.intervals + 1), kept)
     while True:
         error = mesh_error(problem, Mesh(rule, edges), gait, delta, tolerance, fine)
         shares = np.abs(error.value)

@@ -7,8 +7,6 @@ taken from work against friction and the climb, and beside it from the moments i
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.gait_on_slope import SlopeMotion
-from colloc.verification.replay import Replay, replay
+from colloc.verification.replay import Replay
 from colloc.verification.slope import gait_on_slope
 
 _FIRST, _TENTH, _LEAST = 0.1, 0.1, 1e-12
@@ -29,11 +27,6 @@ _FIRST, _TENTH, _LEAST = 0.1, 0.1, 1e-12
 _LONGEST = 4.0
 """Longest step, in instants of a uniform grid."""
 _PIECES = 400, 200
-
-
-def replayer(slope: Slope | None) -> Callable[..., Replay]:
-    """What replays a gait: `colloc.verification.replay.replay`, or on a slope `slope_replay`."""
-    return replay if slope is None else partial(slope_replay, slope=slope)
 
 
 def slope_replay(

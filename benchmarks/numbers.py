@@ -1,0 +1,124 @@
+"""What every number of the search trades: each divided by three and multiplied, and the zoo solved with it.
+
+    python -m benchmarks.numbers
+    python -m benchmarks.numbers --stages explore refine --problems 4 6 7 12 14 21 22 24
+
+A number is what a module of `colloc/search` states by name in capitals, each entry of a tuple or of an `Effort` for itself.
+Printed for both: how many problems are still solved, the worst loss of value and of time over what the stated number gives. One
+that changes nothing either way, on problems that use its stage, is no number that anyone needs to set.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import importlib
+import pkgutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+import colloc.search
+from benchmarks.zoo import zoo_problem
+from colloc.results.solution import SOLVED
+from colloc.search.solve import solve
+from colloc.system.errors import CollocError
+
+FACTORS = (1 / 3, 3.0)
+PROBLEMS = (4, 6, 7, 12, 14, 21, 22, 24)
+"""Quick ones of all classes."""
+
+
+def modules(stages: list[str]) -> list[ModuleType]:
+    """Those of `colloc.search` by name; all without names."""
+    names = stages or [found.name for found in pkgutil.iter_modules(colloc.search.__path__)]
+    return [importlib.import_module(f"colloc.search.{name}") for name in names]
+
+
+def numbers(module: ModuleType) -> Iterator[tuple[str, Any, Callable[[float], Any]]]:
+    """Every number of a module: what it is called, the object it stands in, and that object with the number so many times."""
+    for name, value in sorted(vars(module).items()):
+        if not name.isupper() or _home(name, value) is not module:
+            continue
+        if dataclasses.is_dataclass(value):
+            for field, entry in dataclasses.asdict(value).items():
+                yield f"{name}.{field}", name, lambda f, n=field, e=entry, v=value: dataclasses.replace(v, **{n: _scaled(e, f)})
+        elif isinstance(value, tuple):
+            for k, entry in enumerate(value):
+                if _is_number(entry):
+                    yield f"{name}[{k}]", name, lambda f, k=k, e=entry, v=value: (*v[:k], _scaled(e, f), *v[k + 1 :])
+        elif isinstance(value, dict):
+            for key, entry in value.items():
+                if _is_number(entry):
+                    yield f"{name}[{key}]", name, lambda f, k=key, e=entry, v=value: {**v, k: _scaled(e, f)}
+        elif _is_number(value):
+            yield name, name, lambda f, v=value: _scaled(v, f)
+
+
+def _is_number(entry: Any) -> bool:
+    return isinstance(entry, (int, float)) and not isinstance(entry, bool) and entry != 0
+
+
+def _scaled(entry: float, factor: float) -> float:
+    return max(1, round(factor * entry)) if isinstance(entry, int) else factor * entry
+
+
+def _holders(name: str, value: Any) -> list[ModuleType]:
+    return [m for key, m in sys.modules.items() if key.startswith("colloc.") and vars(m).get(name) is value]
+
+
+def _home(name: str, value: Any) -> ModuleType:
+    """The module that states it, and does not import it: the one whose source has an assignment."""
+    held = _holders(name, value)
+    return next((m for m in held if f"\n{name}" in _source(m) or f", {name}" in _source(m)), held[0])
+
+
+def _source(module: ModuleType) -> str:
+    lines = open(module.__file__ or "", encoding="utf-8").read().splitlines()
+    return "\n" + "\n".join(line.split("=")[0] for line in lines if line[:1].isupper() or line[:1] == "_")
+
+
+def results(problems: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Values, nan where unsolved, and seconds of processor time."""
+    values, seconds = np.full(len(problems), np.nan), np.empty(len(problems))
+    for k, number in enumerate(problems):
+        begin = time.process_time()
+        try:
+            solution = solve(zoo_problem(number))
+            values[k] = solution.value if solution.status == SOLVED else np.nan
+        except CollocError:
+            pass
+        seconds[k] = time.process_time() - begin
+    return values, seconds
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.numbers", description="What every number of the search trades.")
+    parser.add_argument("--stages", nargs="*", default=[])
+    parser.add_argument("--problems", nargs="*", type=int, default=list(PROBLEMS))
+    asked = parser.parse_args()
+    results(asked.problems[:1])  # what is loaded once
+    stated, usual = results(asked.problems)
+    print(f"{len(asked.problems)} problems, {np.isfinite(stated).sum()} solved, {usual.sum():.1f} s of processor time\n")
+    print(f"{'number':44} {'a third: solved, loss, time':>30} {'three times: solved, loss, time':>30}")
+    for module in modules(asked.stages):
+        for label, name, scaled in numbers(module):
+            line = f"{module.__name__.removeprefix('colloc.search.') + '.' + label:44}"
+            value = vars(module)[name]
+            for factor in FACTORS:
+                for holder in (held := _holders(name, value)):
+                    setattr(holder, name, scaled(factor))
+                found, seconds = results(asked.problems)
+                for holder in held:
+                    setattr(holder, name, value)
+                loss = np.nanmax(1 - found / stated, initial=-np.inf)
+                line += f"{np.isfinite(found).sum():12d} {loss:9.1e} {seconds.sum() / usual.sum():7.2f}"
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

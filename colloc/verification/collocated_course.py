@@ -1,0 +1,98 @@
+r"""How wrong a collocated motion with states is, interval by interval.
+
+What the scheme says of every interval (`colloc.motion.kinds`) is held against the differential equation, solved with steps of its
+own: on a slope that of the heading (`colloc.verification.gait_on_slope`), with inertia that of the momenta
+(`colloc.verification.inertial_motion`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colloc.gaits.problem import Problem
+from colloc.gaits.sloped import checked_chain
+from colloc.gaits.symmetry import NONE
+from colloc.mechanics.inertia import checked_mass
+from colloc.motion.collocated import CollocatedPose, stage_weights
+from colloc.motion.kinds import OMEGA, Along, Passed, Shapes, begin_of, first_theta, kind_of_motion
+from colloc.numerics.mesh import Mesh
+from colloc.verification.adaptive_motion import path_lengths
+from colloc.verification.gait_on_slope import GaitOnSlope
+from colloc.verification.inertial_motion import GaitWithInertia
+
+
+class Defects(NamedTuple):
+    """What collocation adds to a motion, ``(n_interval,)`` each: to the rotation, to the way in the plane (complex), to the work
+    against friction, to velocities of the tail between the points, to the objective relative to it. Then the last as a whole,
+    what the differential equation may miss of it, and the rotation that is missed, times the body's reach over the distance."""
+
+    rotation: np.ndarray
+    displacement: np.ndarray
+    work: np.ndarray
+    velocity: np.ndarray
+    value: np.ndarray
+    total: float
+    unresolved: float
+    turning: float
+
+
+class CourseOfGait(NamedTuple):
+    """A gait's motion by the differential equation: theta, place, work against friction, ``(4, n)``, at phases in order; and about
+    the error of these."""
+
+    at: Callable[[np.ndarray], np.ndarray]
+    error: float
+
+
+def course(problem: Problem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+    """The motion of a gait without breaks, delta per period; with inertia it is sought near the one on a mesh."""
+    body, friction = problem.body, problem.law
+    if problem.slope is not None:
+        grade = problem.slope.grade
+        on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
+        ran = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
+        return CourseOfGait(lambda t: ran.at(t)[:4], error)
+    played = GaitWithInertia(checked_mass(body), friction, gait, delta, problem.froude, ())
+    ran = played.settled(_along(problem, mesh, gait, delta).edges[:, 0], error)
+    return CourseOfGait(lambda t: ran.at(t)[3:], error)
+
+
+def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float) -> Along:
+    kind, (angles, rates) = kind_of_motion(problem), gait(mesh.times)
+    return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait))
+
+
+def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> Defects:
+    """Errors of collocating a gait whose motion has states, delta per period."""
+    kind, own = kind_of_motion(problem), _along(problem, mesh, gait, delta)
+    pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA], own.now.centre, first_theta(kind, own.begin))
+    passed = np.linalg.norm(gait(mesh.times)[1], axis=0)
+    spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))
+    if not own.held.all():
+        spent = np.nan * spent
+    theta, x, y, work = np.diff(exact.at(mesh.edges), axis=1)
+    length, periods = path_lengths(gait, mesh.edges[:-1], mesh.edges[1:], 4), 1.0 / problem.gait.fraction
+    rotation, displacement, energy = pose.rotations - theta, np.diff(pose.place) - (x + 1j * y), spent - work
+    true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()))
+    found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()))
+    period = kind.counted(true) | {"length": periods * float(length.sum()), "driven_work": np.nan}
+    other = kind.counted(found) | {"length": periods * float(run.sum()), "driven_work": np.nan}
+    aims, value = problem.objective.shares(period), np.zeros(mesh.n)
+    for name, share in kind.shares(true).items():
+        grown = (np.conj(share.side) * displacement).real + share.rotation * rotation + share.work * energy
+        value = value + aims.get(name, 0.0) * grown
+    value = value + aims["length"] * periods * (run - length)
+    turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
+    return Defects(
+        rotation,
+        displacement,
+        energy,
+        np.full(mesh.n, np.nan),
+        value,
+        float(problem.objective(other) / problem.objective(period) - 1),
+        float(exact.error * sum(map(abs, aims.values()))),
+        turned if problem.gait.symmetry == NONE else 0.0,
+    )

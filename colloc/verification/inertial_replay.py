@@ -1,0 +1,66 @@
+"""A replay with inertia: what a certificate asks of a gait that is played at some pace (`colloc.verification.inertial_motion`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_velocity
+from colloc.mechanics.law import Law
+from colloc.verification.adaptive_motion import path_lengths
+from colloc.verification.inertial_motion import inertial_motion
+from colloc.verification.replay import Path, Replay
+
+_PIECES = 400, 200
+
+
+def inertial_replay(
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    *,
+    froude: float,
+    tolerance: float = 1e-6,
+    breaks: np.ndarray | tuple[float, ...] = (),
+    objective: Objective = EFFICIENCY,
+    **_: object,
+) -> Replay:
+    """A period of a gait with inertia: arguments as of `colloc.verification.replay.replay`.
+
+    Of the result the residual is what a period leaves of the momenta; the work of the joints is that against friction and what the
+    body gains in kinetic energy. Other motions that repeat themselves are not looked for.
+    """
+    ran = inertial_motion(body, friction, gait, delta, froude, tolerance=tolerance, breaks=breaks, objective=objective)
+    phases = ran.phases % 1.0
+    (angles, rates), chain = gait(phases), checked_inertia(body, gait)
+    z = tail_velocity(chain, angles, rates, ran.states[:3])
+    energy = froude * kinetic_energy(chain, angles, rates, z)[0]
+    length, rougher = (float(path_lengths(gait, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
+    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
+    return Replay(
+        distance=ran.distance,
+        work=ran.work,
+        rotation=ran.rotation,
+        length=length,
+        driven_work=np.nan,
+        lever=float(np.hypot(x - gx, y - gy).max()),
+        actuator_work=ran.work + float(energy[-1] - energy[0]),
+        residual=float(np.abs(ran.states[:3, -1] - ran.states[:3, 0]).max()),
+        error=ran.error_of(objective),
+        distance_error=ran.distance_error,
+        work_error=ran.work_error,
+        rotation_error=ran.rotation_error,
+        length_error=abs(length - rougher),
+        driven_work_error=0.0,
+        several=0.0,
+        other_distance=0.0,
+        other_work=0.0,
+        other_rotation=0.0,
+        shares=np.empty(0),
+        instants=ran.phases.size,
+        tail=(phases, z),
+        objective=objective,
+        multipliers=ran.multipliers,
+    )
