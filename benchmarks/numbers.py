@@ -17,6 +17,8 @@ import pkgutil
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -39,32 +41,34 @@ def modules(stages: list[str]) -> list[ModuleType]:
     return [importlib.import_module(f"colloc.search.{name}") for name in names]
 
 
-def numbers(module: ModuleType) -> Iterator[tuple[str, Any, Callable[[float], Any]]]:
-    """Every number of a module: what it is called, the object it stands in, and that object with the number so many times."""
+def numbers(module: ModuleType) -> Iterator[tuple[str, str, Callable[[float], Any]]]:
+    """Every number of a module: what it is called, the name it stands in, and what that holds with the number so many times."""
     for name, value in sorted(vars(module).items()):
         if not name.isupper() or _home(name, value) is not module:
             continue
-        if dataclasses.is_dataclass(value):
-            for field, entry in dataclasses.asdict(value).items():
-                yield f"{name}.{field}", name, lambda f, n=field, e=entry, v=value: dataclasses.replace(v, **{n: _scaled(e, f)})
-        elif isinstance(value, tuple):
-            for k, entry in enumerate(value):
-                if _is_number(entry):
-                    yield f"{name}[{k}]", name, lambda f, k=k, e=entry, v=value: (*v[:k], _scaled(e, f), *v[k + 1 :])
+        if isinstance(value, tuple):
+            parts: Any = enumerate(value)
         elif isinstance(value, dict):
-            for key, entry in value.items():
-                if _is_number(entry):
-                    yield f"{name}[{key}]", name, lambda f, k=key, e=entry, v=value: {**v, k: _scaled(e, f)}
-        elif _is_number(value):
-            yield name, name, lambda f, v=value: _scaled(v, f)
+            parts = value.items()
+        else:
+            parts = vars(value).items() if dataclasses.is_dataclass(value) else [("", value)]
+        for key, entry in parts:
+            if _is_number(entry):
+                yield f"{name}[{key}]" if key != "" else name, name, partial(_with_part, value, key, entry)
+
+
+def _with_part(value: Any, key: Any, entry: float, factor: float) -> Any:
+    """A number, tuple, dictionary or `Effort` with one entry so many times what it is."""
+    scaled = max(1, round(factor * entry)) if isinstance(entry, int) else factor * entry
+    if isinstance(value, tuple):
+        return (*value[:key], scaled, *value[key + 1 :])
+    if isinstance(value, dict):
+        return {**value, key: scaled}
+    return dataclasses.replace(value, **{key: scaled}) if dataclasses.is_dataclass(value) else scaled  # type: ignore[type-var]
 
 
 def _is_number(entry: Any) -> bool:
     return isinstance(entry, (int, float)) and not isinstance(entry, bool) and entry != 0
-
-
-def _scaled(entry: float, factor: float) -> float:
-    return max(1, round(factor * entry)) if isinstance(entry, int) else factor * entry
 
 
 def _holders(name: str, value: Any) -> list[ModuleType]:
@@ -78,7 +82,7 @@ def _home(name: str, value: Any) -> ModuleType:
 
 
 def _source(module: ModuleType) -> str:
-    lines = open(module.__file__ or "", encoding="utf-8").read().splitlines()
+    lines = Path(module.__file__ or "").read_text(encoding="utf-8").splitlines()
     return "\n" + "\n".join(line.split("=")[0] for line in lines if line[:1].isupper() or line[:1] == "_")
 
 

@@ -18,7 +18,7 @@ ONLY = {
     "matplotlib": {"pictures"},
     "jinja2": {"pictures"},
     "h5py": {"system", "results", "studies"},
-    "casadi": {"numerics", "collocation", "reduced", "search"},
+    "casadi": {"numerics", "motion", "collocation", "reduced", "search"},
 }
 
 

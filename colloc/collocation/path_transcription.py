@@ -197,7 +197,7 @@ def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None
     near, mesh = path_through(problem, gait, edges)
     size = problem_layout(problem, mesh, _knots(near)).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
-    layout = Layout(own, none, none, none, none, none, none, none, none, none, size)
+    layout = Layout(own, *10 * (none,), size)
     geometry = _geometry(problem, mesh, own[:, 0], size, near, far)
     shapes = problem.gait.split(own[:, 0], problem.body.n_joint)
     shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")

@@ -83,7 +83,9 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
 
     sites = np.empty(mesh.n_point, dtype=int)
     sites[mesh.points] = mesh.sites
-    point_gather = np.concatenate([layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces, layout.momenta[:, sites]])
+    point_gather = np.concatenate(
+        [layout.theta[:, sites], layout.angles, layout.rates, layout.z, layout.forces, layout.momenta[:, sites]]
+    )
     blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
     for check in checks:
         function = gait_check(check, n_joint, n_parameter)
@@ -146,8 +148,8 @@ def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.n
 
 
 def _point_groups(problem: Problem, n_out: int, mesh: Mesh, layout: Layout) -> list[Group]:
-    """The equations of every point: lifted force laws, then the balance (or the velocity map in its place), or with inertia what
-    the momenta are; and how these grow, and close a period."""
+    """The equations of every point: lifted force laws, then the balance (or the velocity map in its place), or with inertia
+    what the momenta are; and how these grow, and close a period."""
     n, n_point, momenta = layout.n, mesh.n_point, layout.momenta
     n_law = n_out - N_RATE - 3 - len(momenta)
     groups = [output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]

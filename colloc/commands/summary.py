@@ -59,7 +59,7 @@ def _background(solution: Solution) -> list[str]:
     gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
     return [
         *(f"  search          {text}" for text in _search_lines(solution)),
-        *([] if problem.slope is None else [f"  ground          {problem.slope.describe()}"]),
+        *([f"  scene           {problem.scene}"] if problem.scene else []),
         *(f"  gait            {text}" for text in gait),
     ]
 
@@ -86,6 +86,10 @@ def _besides(solution: Solution) -> list[str]:
         lines.append(f"  path length L   {found.length:.6f} rad")
     if problem.uses("driven_work"):
         lines.append(f"  driven work W+  {found.driven_work:.6f}")
+    if problem.froude:
+        lines.append(
+            f"  played slowly   {solution.played_slowly:.6f} ({problem.objective.short} of the same gait without inertia)"
+        )
     if problem.rotation != 0:
         lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines

@@ -16,7 +16,9 @@ def check_paced(problem: Any) -> None:
     """A `ProblemError` for a Froude number that is none, and for what cannot be asked beside it."""
     froude = problem.froude
     if not is_number(froude) or froude < 0:
-        raise ProblemError(f"froude must be a number that is not negative, length over (gravity times period^2), not {froude!r}.")
+        raise ProblemError(
+            f"froude must be a number that is not negative, length over (gravity times period^2), not {froude!r}."
+        )
     checked_mass(problem.body)
     if problem.slope is not None:
         raise ProblemError("on a slope inertia is not known yet: leave froude or grade out.")

@@ -21,6 +21,7 @@ from colloc.mechanics.actuators import ActuatorLimits
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import STATED_IF_SET, check_finite, is_number, is_whole, named_arguments
@@ -252,6 +253,23 @@ class Problem:
         return slope_from(self.body, self.friction, self.grade, self.towards)
 
     @property
+    def scene(self) -> str:
+        """Where the body is and how fast, in words; "" on the level and slow."""
+        if self.froude:
+            period = 1 / np.sqrt(GRAVITY * self.froude)
+            return f"played at the Froude number {self.froude:.4g}: a body of 1 m takes {period:.3g} s a period"
+        return "" if self.slope is None else self.slope.describe()
+
+    @property
+    def gone_wrong(self) -> str:
+        """What may be wrong where a gait has no motion, in words, and what to try."""
+        if self.froude:
+            return "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
+        if self.slope is None:
+            return "no velocity balances the body; give another guess"
+        return "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
+
+    @property
     def paced_by(self) -> str:
         """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
         if self.power_limit is not None:
@@ -287,10 +305,10 @@ class Problem:
         if self.gait.unit_speed and self.paced_by:
             what = f"the class {type(self.gait).__name__} leaves the pace open"
             raise ProblemError(f"{what}, but {self.paced_by}; use Harmonic (period 1).")
-        if self.body.n_joint == 1 and self.law.reversible:
+        if self.body.n_joint == 1 and self.law.reversible and not self.froude:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
-                "reverse the motion (the scallop theorem). Give the body three links, or the friction mu_b different from mu_f."
+                "reverse the motion (the scallop theorem). Give the body three links, the friction mu_b different from mu_f, or a froude."
             )
 
     def __repr__(self) -> str:

@@ -23,7 +23,10 @@ from colloc.mechanics.links import LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.errors import ProblemError
 
+GRAVITY = 9.81
+"""[m/s^2]"""
 STATES = ("Vx", "Vy", "H")
+"""Names of the momenta."""
 
 Path = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 

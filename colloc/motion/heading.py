@@ -42,6 +42,6 @@ def whole_turns(first: float, last: float) -> float:
 
 
 def momenta_image(symmetry: str) -> np.ndarray | None:
-    """What a symmetry makes of the momenta (Vx, Vy, H) in the axes of the tail at the begin of the solved part, to be those at its
-    end, ``(3, 3)``; None: they are the same. Gaits that are bilateral run backwards in time, as no motion with inertia does."""
+    """What a symmetry makes of the momenta (Vx, Vy, H) in the axes of the tail at the begin of the solved part, to be those at
+    its end, ``(3, 3)``; None: they are the same. Bilateral gaits run backwards in time, as no motion with inertia does."""
     return {NONE: None, ANTIPODAL: np.diag([1.0, -1.0, -1.0])}[symmetry]

@@ -122,9 +122,9 @@ class Kind(Protocol):
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
     ) -> np.ndarray:
         """Add what m numbers owe to the orientation to their derivatives `on_out` with respect to (rotation rate, velocity of
-        the centre, power, and rates of states) at the stages, ``(m, 4 + more, n, s)``, from those with respect to the orientation,
-        ``(m, n, s)``, and those of the outputs with respect to the states; and give those with respect to the begins that are
-        told, ``(m, n_told)``."""
+        the centre, power, and rates of states) at the stages, ``(m, 4 + more, n, s)``, from those with respect to the
+        orientation, ``(m, n, s)``, and those of the outputs with respect to the states; and give those with respect to the
+        begins that are told, ``(m, n_told)``."""
 
     def counted(self, passed: Passed) -> dict[str, float]:
         """What a whole period comes to."""
@@ -266,15 +266,15 @@ class WithInertia(SlowOnLevel):
     ) -> Along:
         """Where Newton's method does not lead from the slow motion to the one with inertia, as on feet that hold, it is reached
         through more viscous friction."""
-        states, held = near[0], False
-        if states is not None:
-            states, held = self._closed(mesh, shapes, states)
+        held = False
+        if near[0] is not None:
+            states, held = self._closed(mesh, shapes, near[0])
         if not held:
             states, held = self._closed(mesh, shapes, self._slow_momenta(shapes))
         if not held and shapes.delta * shapes.unit < _VISCOUS:
             wetter = self.along(mesh, shapes._replace(delta=_WETTER * shapes.delta), begin)
             states, held = self._closed(mesh, shapes, wetter.states)
-        out, _ = self._slopes(shapes, states, along_shapes=False)
+        out, _ = self._slopes(shapes, states)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
@@ -292,7 +292,7 @@ class WithInertia(SlowOnLevel):
         """The momenta that repeat every period, by Newton's method from others ``(3, n_point)``, and whether there are any."""
 
         def rates(states: np.ndarray) -> Rates:
-            out, slopes = self._slopes(shapes, states, along_shapes=False)
+            out, slopes = self._slopes(shapes, states)
             return Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
@@ -301,16 +301,16 @@ class WithInertia(SlowOnLevel):
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         return CollocatedStates(mesh, np.ones(len(STATES), dtype=bool), self._image, unit)
 
-    def _slopes(self, shapes: Shapes, states: np.ndarray, *, along_shapes: bool) -> tuple[np.ndarray, np.ndarray]:
-        from colloc.motion.momentum_slopes import momentum_slopes  # loads CasADi, which nothing slow needs here
+    def _slopes(self, shapes: Shapes, states: np.ndarray, along: str = "momenta") -> tuple[np.ndarray, np.ndarray]:
+        from colloc.motion.compiled_momenta import momentum_slopes
 
         # momentum grows by what friction gives it in a unit of time, and has as much to grow
         froude = self._froude * shapes.unit**2
         at = shapes.angles, shapes.rates, shapes.delta
-        return momentum_slopes(self._chain, self.friction, at, states, froude, along_shapes=along_shapes)
+        return momentum_slopes(self._chain, self.friction, at, states, froude, along)
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        slopes = self._slopes(shapes, along.states, along_shapes=True)[1]
+        slopes = self._slopes(shapes, along.states, "angles rates momenta")[1]
         return slopes[:, : -len(STATES)], slopes[:, -len(STATES) :]
 
     def through_pose(

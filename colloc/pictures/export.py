@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.gait_fields import fields
-from colloc.results.robot import GRAVITY, Robot
+from colloc.mechanics.inertia import GRAVITY
+from colloc.results.robot import Robot
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.replaced_file import replaced_file

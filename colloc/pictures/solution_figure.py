@@ -48,7 +48,7 @@ def _headline(solution: Solution) -> str:
     return (
         f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}{near}   "
         f"{problem.law.label},  δ = {solution.answer.delta:.0e}{verdict}\n"
-        f"class: {problem.gait.describe()}{'' if problem.slope is None else f';  {problem.slope.describe()} (x: uphill)'}"
+        f"class: {problem.gait.describe()}{f';  {problem.scene}' if problem.scene else ''}"
         f"{f';  {solution.turning}' if solution.turning else ''}"
     )
 

@@ -18,8 +18,9 @@ import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.bodies import FULL
+from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import rate_independent
-from colloc.motion.with_inertia import inertial_loss
+from colloc.motion.slow_enough import inertial_loss
 from colloc.results.motion import Column, motion_dataset
 from colloc.results.solution import Solution
 from colloc.system.arguments import check_finite
@@ -30,7 +31,6 @@ from colloc.verification.trajectory import one_each, shortest_period
 if TYPE_CHECKING:
     import xarray
 
-GRAVITY = 9.81
 SLOW_ENOUGH = 0.01
 """Part of the efficiency that inertia may take from a gait that is called slow."""
 _INSTANTS, _A_SIDE = 2000, 8
@@ -43,11 +43,15 @@ def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
     Raises
     ------
     ProblemError
-        If the body has no joints that forces on its parts would turn, or it is on a slope.
+        If the body has no joints that forces on its parts would turn, it is on a slope, or played with inertia.
     """
     problem = solution.problem
     if FULL not in problem.body.formulations:
         raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
+    if problem.froude:
+        raise ProblemError(
+            f"{problem.name} is played with inertia: torques of joints that swing masses are not worked out yet."
+        )
     if problem.slope is not None:
         raise ProblemError(f"{problem.name} is on a slope: torques of joints that lift weight are not worked out.")
     (angles, rates), near = solution.gait(t), solution.sample(t).z
@@ -78,8 +82,8 @@ class Robot:
     Raises
     ------
     ProblemError
-        If a number is not positive, the body has no joints, it is on a slope, or `max_speed` or `max_torque` is given where
-        torques depend on the pace.
+        If a number is not positive, the body has no joints, it is on a slope or played with inertia, or `max_speed` or
+        `max_torque` is given where torques depend on the pace.
 
     Examples
     --------
@@ -171,7 +175,6 @@ class Robot:
             "peak_power_W": float(total.max()),
             "cost_of_transport": measured.work / measured.distance,
             "froude_number": self.froude,
-            "froude_number_over_friction": self.froude / problem.law.smallest,
             "peak_torque_N_m": np.abs(torques).max(axis=1).tolist(),
             "rms_torque_N_m": np.sqrt(_mean(torques**2)).tolist(),
             "peak_speed_rad_per_s": np.abs(speeds).max(axis=1).tolist(),

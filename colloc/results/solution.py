@@ -15,7 +15,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import Sliding
-from colloc.motion.with_inertia import slow_enough
+from colloc.motion.slow_enough import slow_enough
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
@@ -25,6 +25,7 @@ from colloc.results.relaxation import Relaxation
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.system.versions import versions
+from colloc.verification.replay import replay
 
 if TYPE_CHECKING:
     import pandas
@@ -173,6 +174,12 @@ class Solution:
         side = "counter-clockwise" if self.rotation > 0 else "clockwise"
         turned = f"turns {math.degrees(abs(self.rotation)):.4g}° {side}"
         return f"{turned}, on a circle of radius {self.turning_radius:.4g} body lengths"
+
+    @property
+    def played_slowly(self) -> float:
+        """The objective of the same gait played so slowly that inertia does not matter."""
+        at = self.problem.body, self.problem.law, self.gait, self.answer.delta_per_period
+        return replay(*at, breaks=self.gait.corner_phases, objective=self.problem.objective).value
 
     def slow_enough(self, loss: float = 0.01) -> float:
         """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than the part `loss`.

@@ -232,7 +232,7 @@ def _motion(
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
         beside = "way from the centre of mass to where the feet's weights press [body lengths]; reported, not judged"
         checks.append(Check("statics", lean, _ANY_LEAN, beside))
-    if fine.multipliers.size:
+    if fine.multipliers:
         meaning = "largest Floquet multiplier: what a period leaves of a small change of the momenta"
         checks.append(Check("stability", float(np.abs(fine.multipliers).max()), 1.0, meaning))
     if claimed is not None:

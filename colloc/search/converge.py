@@ -208,10 +208,8 @@ def _rested(
     space: SearchSpace, v: np.ndarray, delta: float, radius: float, effort: Effort, curvature: np.ndarray | None
 ) -> tuple[Rested, ReducedProgram]:
     program = ReducedProgram(space, delta)
-    if space.problem.slope is not None and np.isnan(program.objective(v)):
-        raise NotConvergedError(
-            "friction does not hold the body on the slope all the way, or its joints brake: take a gentler one."
-        )
+    if np.isnan(program.objective(v)):
+        raise NotConvergedError(f"there is no motion to begin with: {space.problem.gone_wrong}.")
     return at_rest(program, v, radius, effort, curvature), program
 
 

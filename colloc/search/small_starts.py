@@ -37,7 +37,7 @@ _ALIKE, _UNUSED = 1e-3, 1e-6
 
 
 def small_loops(problem: Problem) -> list[AnyGait]:
-    """Loops about the shapes where small ones travel farthest, each both ways round; none where friction is viscous.
+    """Loops about the shapes where small ones travel farthest, each both ways round; none where the pace matters.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def small_loops(problem: Problem) -> list[AnyGait]:
     list
         Gaits of the class that starts are drawn from, best first.
     """
-    if not rate_independent(problem.law):
+    if problem.froude or not rate_independent(problem.law):
         return []
     own, loops = seed_class(problem), []
     for small, shape in _best_small_gaits(problem)[:_SHAPES]:

@@ -1,7 +1,7 @@
 r"""How wrong a collocated motion with states is, interval by interval.
 
-What the scheme says of every interval (`colloc.motion.kinds`) is held against the differential equation, solved with steps of its
-own: on a slope that of the heading (`colloc.verification.gait_on_slope`), with inertia that of the momenta
+What the scheme says of every interval (`colloc.motion.kinds`) is held against the differential equation, solved with steps
+of its own: on a slope that of the heading (`colloc.verification.gait_on_slope`), with inertia that of the momenta
 (`colloc.verification.inertial_motion`).
 """
 
@@ -25,9 +25,10 @@ from colloc.verification.inertial_motion import GaitWithInertia
 
 
 class Defects(NamedTuple):
-    """What collocation adds to a motion, ``(n_interval,)`` each: to the rotation, to the way in the plane (complex), to the work
-    against friction, to velocities of the tail between the points, to the objective relative to it. Then the last as a whole,
-    what the differential equation may miss of it, and the rotation that is missed, times the body's reach over the distance."""
+    """What collocation adds to a motion, ``(n_interval,)`` each: to the rotation, to the way in the plane (complex), to the
+    work against friction, to velocities of the tail between the points, to the objective relative to it. Then the last as a
+    whole, what the differential equation may miss of it, and the rotation that is missed, times the body's reach over the
+    distance."""
 
     rotation: np.ndarray
     displacement: np.ndarray
@@ -40,8 +41,8 @@ class Defects(NamedTuple):
 
 
 class CourseOfGait(NamedTuple):
-    """A gait's motion by the differential equation: theta, place, work against friction, ``(4, n)``, at phases in order; and about
-    the error of these."""
+    """A gait's motion by the differential equation: theta, place, work against friction, ``(4, n)``, at phases in order; and
+    about the error of these."""
 
     at: Callable[[np.ndarray], np.ndarray]
     error: float
@@ -55,7 +56,7 @@ def course(problem: Problem, gait: Any, delta: float, mesh: Mesh, error: float) 
         on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
         ran = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
         return CourseOfGait(lambda t: ran.at(t)[:4], error)
-    played = GaitWithInertia(checked_mass(body), friction, gait, delta, problem.froude, ())
+    played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=problem.froude)
     ran = played.settled(_along(problem, mesh, gait, delta).edges[:, 0], error)
     return CourseOfGait(lambda t: ran.at(t)[3:], error)
 

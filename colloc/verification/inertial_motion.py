@@ -11,7 +11,6 @@ method on the map from one to the other, whose derivatives also say whether the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import MomentumRates, checked_inertia, momenta, momentum_rates
+from colloc.mechanics.inertia import checked_inertia, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite
@@ -92,15 +91,24 @@ class InertialMotion:
         return bool(np.abs(self.multipliers).max() < 1.0)
 
 
-class GaitWithInertia(NamedTuple):
-    """A gait of a chain, and how fast it is played."""
+class GaitWithInertia:
+    """A gait of a chain, and how fast it is played.
 
-    body: Chain
-    friction: Law
-    path: Path
-    delta: float
-    froude: float
-    breaks: tuple[float, ...]
+    Parameters
+    ----------
+    body, friction, path, delta
+    froude : float
+    breaks : tuple of float
+        Phases in (0, 1), ascending, at which the rates jump.
+    """
+
+    def __init__(
+        self, body: Chain, friction: Law, path: Path, delta: float, *, froude: float, breaks: tuple[float, ...] = ()
+    ) -> None:
+        from colloc.motion.compiled_momenta import MomentaAt
+
+        self.body, self.friction, self.path, self.delta, self.froude, self.breaks = body, friction, path, delta, froude, breaks
+        self._momenta = MomentaAt(body, friction, delta, froude)
 
     def slow_momenta(self) -> np.ndarray:
         """Those at the start of the period if the gait is played slowly, ``(3,)``: where to begin."""
@@ -113,9 +121,9 @@ class GaitWithInertia(NamedTuple):
         """`InertialMotion.states` from the momenta `start` through a period."""
 
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            now = self._rates(t, state[_MOMENTA, None])
-            moved = np.exp(1j * state[_THETA]) * complex(state[0], state[1])
-            return np.array([*now.rates[:, 0], now.z[2, 0], moved.real, moved.imag, now.power[0, 0]]), None
+            _, _, omega, vx, vy, power, *rates = self._at(t, state[_MOMENTA])
+            moved = np.exp(1j * state[_THETA]) * complex(vx, vy)
+            return np.array([*rates, omega, moved.real, moved.imag, power]), None
 
         return followed(slope, np.concatenate([start, np.zeros(4)]), aim, self.breaks)
 
@@ -124,7 +132,7 @@ class GaitWithInertia(NamedTuple):
         begin = start[:, None] + _APART * np.concatenate([np.zeros((3, 1)), np.eye(3)], axis=1)
 
         def slope(t: float, state: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            return self._rates(t, state.reshape(4, 3).T).rates.T.ravel(), None
+            return np.concatenate([self._at(t, momenta)[-3:] for momenta in state.reshape(4, 3)]), None
 
         end = followed(slope, begin.T.ravel(), _ROUGH, self.breaks).states[:, -1].reshape(4, 3).T
         return end[:, 0], (end[:, 1:] - end[:, :1]) / _APART
@@ -144,8 +152,8 @@ class GaitWithInertia(NamedTuple):
         )
 
     def settled(self, near: np.ndarray, aim: float, slopes: np.ndarray | None = None) -> Course:
-        """`InertialMotion.states` through a period that leaves the momenta as they are, to an error, sought near some momenta; with
-        the derivatives of `closed`, if they are known."""
+        """`InertialMotion.states` through a period that leaves the momenta as they are, to an error, sought near some momenta;
+        with the derivatives of `closed`, if they are known."""
         start = near
         if slopes is None:
             start, slopes = self.closed(near)
@@ -157,9 +165,10 @@ class GaitWithInertia(NamedTuple):
             start = start + _newton_step(gap, slopes)
         raise NotConvergedError(f"at a Froude number of {self.froude:g} the periods do not become alike; try a smaller one.")
 
-    def _rates(self, t: float, states: np.ndarray) -> MomentumRates:
-        angles, rates = (np.repeat(part, states.shape[1], axis=1) for part in self.path(np.array([t])))
-        return momentum_rates(self.body, self.friction, angles, rates, states, delta=self.delta, froude=self.froude)
+    def _at(self, t: float, momenta: np.ndarray) -> np.ndarray:
+        """What `colloc.motion.compiled_momenta` says of a phase and momenta ``(3,)``."""
+        angles, rates = self.path(np.array([t]))
+        return self._momenta(angles[:, 0], rates[:, 0], momenta)
 
 
 def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
@@ -215,7 +224,7 @@ def inertial_motion(
     """
     check_finite(positive=True, froude=froude, delta=delta)
     chain, at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
-    played = GaitWithInertia(chain, friction, gait, delta, float(froude), at)
+    played = GaitWithInertia(chain, friction, gait, delta, froude=float(froude), breaks=at)
     start, slopes = played.closed(played.slow_momenta())
     aim, before = _FIRST * tolerance, None
     while aim >= _LEAST:

@@ -1,4 +1,4 @@
-"""A replay with inertia: what a certificate asks of a gait that is played at some pace (`colloc.verification.inertial_motion`)."""
+"""A replay with inertia: what a certificate asks of a gait that is played at some pace."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def inertial_replay(
     objective: Objective = EFFICIENCY,
     **_: object,
 ) -> Replay:
-    """A period of a gait with inertia: arguments as of `colloc.verification.replay.replay`.
+    """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`.
 
-    Of the result the residual is what a period leaves of the momenta; the work of the joints is that against friction and what the
-    body gains in kinetic energy. Other motions that repeat themselves are not looked for.
+    Of the result the residual is the change of the momenta in a period; the work of the joints is that against friction and
+    what the body gains in kinetic energy. Other motions that repeat themselves are not looked for.
     """
     ran = inertial_motion(body, friction, gait, delta, froude, tolerance=tolerance, breaks=breaks, objective=objective)
     phases = ran.phases % 1.0
@@ -62,5 +62,5 @@ def inertial_replay(
         instants=ran.phases.size,
         tail=(phases, z),
         objective=objective,
-        multipliers=ran.multipliers,
+        multipliers=tuple(map(complex, ran.multipliers)),
     )

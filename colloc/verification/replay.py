@@ -72,7 +72,7 @@ class Replay:
         That the replay is to measure; the efficiency unless another was asked for.
     across : float
         On a slope the way across the direction that counts.
-    multipliers : (n,)
+    multipliers : tuple of complex
         With inertia, by what small changes of the momenta are multiplied in a period.
     """
 
@@ -99,7 +99,7 @@ class Replay:
     tail: tuple[np.ndarray, np.ndarray] = field(compare=False)
     objective: Objective = EFFICIENCY
     across: float = 0.0
-    multipliers: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
+    multipliers: tuple[complex, ...] = ()
 
     def __repr__(self) -> str:
         value = f"{self.objective.short} = {self.value:.6g} +- {self.error * abs(self.value):.0e}"

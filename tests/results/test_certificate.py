@@ -13,13 +13,13 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
-from colloc.results import measured
 from colloc.results.answer import SecondOrder
 from colloc.results.measured import extrapolated_limit
 from colloc.results.solution import Solution
 from colloc.results.store import save
 from colloc.search import certify as verify
 from colloc.search.certify import _one_motion, certify, gait_certificate
+from colloc.verification import replayer
 from colloc.verification.replay import replay
 from colloc.verification.slope import slope_motion
 
@@ -36,7 +36,7 @@ def replays(three_link):
         return found[arguments[3]]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measured, "replay", kept)
+        patch.setattr(replayer, "replay", kept)
         assert certify(three_link.answer).passed
     return found
 
@@ -47,7 +47,7 @@ def failures(three_link, replays, monkeypatch):
 
     def names(solution=three_link, change=lambda part, replayed: replayed):
         largest = max(replays)
-        monkeypatch.setattr(measured, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
+        monkeypatch.setattr(replayer, "replay", lambda *a, **k: change(a[3] / largest, replays[a[3]]))
         return {check.name for check in certify(solution.answer).failures}
 
     return names
@@ -259,7 +259,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
 
 def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to_delta(three_link, replays, monkeypatch):
     fine = replays[max(replays)]
-    monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(fine, distance=fine.distance * (1 + 3 * a[3])))
+    monkeypatch.setattr(replayer, "replay", lambda *a, **k: replace(fine, distance=fine.distance * (1 + 3 * a[3])))
     assert certify(three_link.answer).efficiency_at_zero_delta == pytest.approx(fine.efficiency, rel=1e-12)
 
 
@@ -274,7 +274,7 @@ def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(thre
 
 
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
-    monkeypatch.setattr(measured, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
+    monkeypatch.setattr(replayer, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
     known, fine = certify(three_link.answer), replays[max(replays)]
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
@@ -293,7 +293,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     gapped = with_answer(three_link, value=fine.efficiency * (1 + 3e-4))
     assert failures(gapped) == {"replay gap"}
     assert failures(gapped, open_by(2.5e-4)) == set()
-    monkeypatch.setattr(measured, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
+    monkeypatch.setattr(replayer, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
     known = certify(three_link.answer)
     assert min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency) >= 5e-3
     assert known.work_error >= 5e-3 * known.work

@@ -5,7 +5,7 @@ import pytest
 
 import colloc
 from colloc.mechanics.inertia import moment_of_inertia, momenta, momentum_rates, tail_velocity
-from colloc.motion.with_inertia import SCHEME, GaitOnMesh
+from colloc.motion.slow_enough import SCHEME, GaitOnMesh
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
@@ -104,25 +104,12 @@ def test_without_friction_momentum_is_conserved():
     np.testing.assert_allclose(now.rates[:, 0], [omega * states[1, 0], -omega * states[0, 0], 0.0], atol=1e-11)
 
 
-@pytest.mark.parametrize("froude", [0.1, 0.5, pytest.param(0.003, marks=pytest.mark.slow)])
-def test_shooting_and_collocation_find_the_same_motion(froude):
-    """One by steps of its own through time, one for all instants at once."""
-    shot = colloc.inertial_motion(UNEQUAL, ANISOTROPIC, LEANING, 1e-2, froude)
-    mesh = Mesh(scheme(SCHEME), np.linspace(0, 1, 201))
-    on_mesh = GaitOnMesh(UNEQUAL, ANISOTROPIC, LEANING, mesh)
-    found = on_mesh.played(1e-2, froude, on_mesh.slow(1e-2))
-    assert shot.stable
-    assert found.distance == pytest.approx(shot.distance, rel=2e-4)
-    assert found.work == pytest.approx(shot.work, rel=2e-4)
-    assert found.rotation == pytest.approx(shot.rotation, abs=2e-4)
-
-
 def test_slow_motion_is_the_limit():
     """The difference falls at least like the Froude number."""
     slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2, tolerance=1e-7).efficiency
     mesh = Mesh(scheme(SCHEME), np.linspace(0, 1, 401))
     on_mesh = GaitOnMesh(CHAIN, ISOTROPIC, GAIT, mesh)
-    near = on_mesh.slow(1e-2)
+    near = on_mesh.played(1e-2)
     assert near.efficiency == pytest.approx(slow, rel=1e-5)
     off = [1 - on_mesh.played(1e-2, froude, near).efficiency / near.efficiency for froude in (1.6e-3, 4e-4, 1e-4)]
     assert off[0] > 3.5 * off[1] > 3.5**2 * off[2] > 0
@@ -159,5 +146,7 @@ def test_what_has_no_inertia_is_refused_in_words():
         colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.0)
     with pytest.raises(colloc.ProblemError, match="of a ModalBody"):
         colloc.slow_enough(colloc.ModalBody(), ISOTROPIC, GAIT, 1e-2)
+    with pytest.raises(colloc.ProblemError, match="pace is part"):
+        colloc.slow_enough(CHAIN, colloc.Viscous(), GAIT, 1e-2)
     with pytest.raises(colloc.ProblemError, match="at most"):
         colloc.slow_enough(CHAIN, ISOTROPIC, GAIT, 1e-2, loss=0.9)

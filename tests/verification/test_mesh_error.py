@@ -15,7 +15,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.numerics.mesh import Mesh
+from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
 from colloc.search import refine
 from colloc.search.solve import solve
@@ -93,7 +93,7 @@ def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
     """Antipodal gaits turn back in the other half: what counts is the displacement half way between both headings."""
     gait = Fourier(np.zeros(2), np.array([[1.5], [-1.0]]), np.array([[0.3], [1.0]]))
     stated = problem("trapezoid", gait=Harmonic(1, "antipodal"), intervals=40)
-    fine = gait_motion(stated, gait, DELTA, problem_mesh(stated).edges, 1e-6)
+    fine = gait_motion(stated, gait, DELTA, problem_mesh(stated), 1e-6)
     assert abs(fine.theta[-1]) > 0.1
     error = mesh_error(stated, problem_mesh(stated), gait, DELTA, 1e-6)
     assert error.value.sum() == pytest.approx(error.total, rel=0.02)
@@ -111,7 +111,7 @@ def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
 def test_the_velocity_error_of_an_interval_is_that_of_the_polynomial_through_its_nodes():
     stated = problem()
     mesh = problem_mesh(stated)
-    fine = gait_motion(stated, GAIT, DELTA, mesh.edges, 1e-6)
+    fine = gait_motion(stated, GAIT, DELTA, mesh, 1e-6)
     found = mesh_error(stated, mesh, GAIT, DELTA, 1e-6, fine).velocity
     nodes = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
     z, known = rates_at(stated.body, stated.friction, path, DELTA, nodes).z, fine.rates.z.reshape(3, -1)
@@ -126,7 +126,7 @@ def test_velocity_error_is_largest_where_links_stick():
     stated = problem()
     mesh = problem_mesh(stated)
     error = mesh_error(stated, mesh, GAIT, DELTA)
-    fine = gait_motion(stated, GAIT, DELTA, mesh.edges, 1e-7)
+    fine = gait_motion(stated, GAIT, DELTA, mesh, 1e-7)
     kinks = kink_phases(stated.body, stated.friction, path, DELTA, fine)
     worst = int(error.velocity.argmax())
     assert np.any((kinks > mesh.edges[worst] - mesh.h[0]) & (kinks < mesh.edges[worst + 1] + mesh.h[0]))
@@ -135,7 +135,7 @@ def test_velocity_error_is_largest_where_links_stick():
 @pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
 def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     stated = problem(friction=friction)
-    fine = gait_motion(stated, GAIT, DELTA, np.linspace(0, 0.5, 21), 1e-6)
+    fine = gait_motion(stated, GAIT, DELTA, uniform_mesh(scheme("gauss-3"), 20, 0.5), 1e-6)
     kinks = kink_phases(stated.body, friction, path, DELTA, fine)
     assert 4 <= kinks.size <= 24
     # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 = 0)
@@ -206,7 +206,7 @@ def test_knots_on_kinks_save_points(monkeypatch):
     without = planned_mesh(stated, mesh, GAIT, DELTA, 1e-6)
     points = [(plan.edges.size - 1) * scheme(plan.scheme).s for plan in (with_knots, without)]
     assert points[0] < 0.9 * points[1]
-    fine = gait_motion(stated, GAIT, DELTA, mesh.edges, 1e-7)
+    fine = gait_motion(stated, GAIT, DELTA, mesh, 1e-7)
     knots = kink_knots(stated, GAIT, DELTA, fine)
     assert np.abs(with_knots.edges[:, None] - knots).min(axis=0).max() < 1e-4
 

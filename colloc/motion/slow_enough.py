@@ -1,8 +1,4 @@
-"""A gait played with inertia on a mesh: the momenta that repeat every period, and how slow is slow enough.
-
-The momenta (`colloc.mechanics.inertia`) are the states of the period (`colloc.motion.states`), solved for at all instants
-together. Newton's method starts from those of the slow motion.
-"""
+"""How slow is slow enough: a gait played at any pace on a mesh, and what inertia changes of its efficiency."""
 
 from __future__ import annotations
 
@@ -11,14 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import balance_jacobian
+from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import Path, checked_inertia, moment_of_inertia, momenta, momentum_rates
-from colloc.mechanics.law import Law
+from colloc.mechanics.inertia import Path, checked_inertia
+from colloc.mechanics.law import Law, rate_independent
 from colloc.motion.collocated import CollocatedPose, point_weights
-from colloc.motion.states import CollocatedStates, Rates
+from colloc.motion.kinds import OMEGA, Shapes, SlowOnLevel, WithInertia
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.system.arguments import check_finite
@@ -29,8 +24,6 @@ _INTERVALS, _DOUBLED = 50, 6
 """Of the first mesh, and how many there are, each of twice as many."""
 _ACCURACY = 0.02
 """Relative, of a loss, and of what a finer mesh may change in the Froude number for it."""
-_VISCOUS, _WETTER = 3.0, 10**0.5
-"""Delta [body lengths per period] at which friction is as good as viscous, and the factor from each tried to the next."""
 _LOSS_ACCURACY = 1e-3
 _POWER = 1.5
 """Of the Froude number, to which the change of the efficiency is in proportion; between 1 and 2 where it is small."""
@@ -40,18 +33,10 @@ farthest step between the logarithms of two."""
 
 
 class Played(NamedTuple):
-    """A period of a gait played with inertia."""
+    """A period of a gait played at some pace, and its states at the points of the mesh, ``(n_state, n_point)``."""
 
-    distance: float
-    work: float
-    rotation: float
+    efficiency: float
     states: np.ndarray
-    """Momenta at the points of the mesh, ``(3, n_point)``."""
-
-    @property
-    def efficiency(self) -> float:
-        """Distance over work."""
-        return self.distance / self.work
 
 
 class GaitOnMesh:
@@ -67,67 +52,27 @@ class GaitOnMesh:
     def __init__(self, body: Chain, friction: Law, gait: Path, mesh: Mesh) -> None:
         self._body, self._friction, self._mesh, self.times = body, friction, mesh, mesh.times
         self._angles, self._rates = gait(self.times)
-        posture = self._posture = body.posture(self._angles)
-        (x,), (y,) = body.centre_of_mass(posture)
-        one, zero, inertia = np.ones_like(x), np.zeros_like(x), moment_of_inertia(body, posture)
-        # (u, v, omega) from the momenta, and (force, moment about the centre) from (force, torque about the tail)
-        self._to_tail = np.array([[one, zero, y / inertia], [zero, one, -x / inertia], [zero, zero, 1 / inertia]])
-        self._to_centre = np.array([[one, zero, zero], [zero, one, zero], [y, -x, one]])
-
-    def slow(self, delta: float) -> Played:
-        """The gait played slowly: the balance, instant by instant."""
-        z = solve_balance(self._body, self._friction, self._angles, self._rates, delta).require().z
-        link = self._body.velocity(self._posture, self._rates, z)
-        power = self._body.sliding(self._friction, self._angles, self._rates, z, delta).power[0]
-        return self._summed(momenta(self._body, self._posture, link), z[2], power)
 
     def carried(self, times: np.ndarray, other: Played) -> Played:
         """A motion known at other times, at these points."""
-        return other._replace(states=np.stack([np.interp(self.times, times, row, period=1.0) for row in other.states]))
+        return other._replace(states=np.array([np.interp(self.times, times, row, period=1.0) for row in other.states]))
 
-    def played(self, delta: float, froude: float, near: Played) -> Played:
-        """The motion in which all periods are alike, by Newton's method from another: a slow one, or one at a pace like it.
-
-        Where that does not lead there, as on feet that hold, it is reached through more viscous friction.
+    def played(self, delta: float, froude: float = 0.0, near: Played | None = None) -> Played:
+        """The motion in which all periods are alike, sought near another one with inertia, or the slow one.
 
         Raises
         ------
         NotConvergedError
             If none is found.
         """
-        equations = CollocatedStates(self._mesh, free=np.ones(3, dtype=bool))
-
-        def found(delta: float, near: Played) -> tuple[np.ndarray, bool]:
-            begin = near.states[:, 0]
-            states, _, held = equations.solved(lambda now: self._momentum_rates(now, delta, froude), begin, near.states)
-            return states, held
-
-        states, held = found(delta, near)
-        if not held:
-            if delta > _VISCOUS:
-                raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
-            wetter = _WETTER * delta
-            states, held = found(delta, self.played(wetter, froude, self.slow(wetter)))
-            if not held:
-                raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
-        now = momentum_rates(self._body, self._friction, self._angles, self._rates, states, delta=delta, froude=froude)
-        return self._summed(states, now.z[2], now.power)
-
-    def _momentum_rates(self, states: np.ndarray, delta: float, froude: float) -> Rates:
-        body, at = self._body, (self._friction, self._angles, self._rates, states)
-        now = momentum_rates(body, *at, delta=delta, froude=froude)
-        velocity = body.velocity(self._posture, self._rates, now.z)
-        on_force = -balance_jacobian(body, self._friction, self._posture, velocity, delta)
-        on_states = np.einsum("abn,nbc,cdn->adn", self._to_centre, on_force, self._to_tail) / froude
-        (vx, vy, _), (*_, omega) = states, now.z
-        turned = self._to_tail[2, 2]
-        on_states[0] += np.stack([np.zeros_like(vx), omega, vy * turned])
-        on_states[1] -= np.stack([omega, np.zeros_like(vx), vx * turned])
-        return Rates(now.rates, on_states)
-
-    def _summed(self, states: np.ndarray, omega: np.ndarray, power: np.ndarray) -> Played:
-        pose = CollocatedPose.on_mesh(self._mesh, omega, states[:2])
-        return Played(float(abs(pose.place[-1])), float(point_weights(self._mesh) @ power), float(pose.theta[-1]), states)
+        at = self._body, self._friction, NONE
+        kind = WithInertia(*at, froude) if froude else SlowOnLevel(*at)
+        states = None if near is None or not near.states.size else near.states
+        along = kind.along(self._mesh, Shapes(self._angles, self._rates, delta), np.empty(0), (states, None))
+        if not along.held.all():
+            raise NotConvergedError(f"at a Froude number of {froude:g} no motion was found in which all periods are alike.")
+        pose = CollocatedPose.on_mesh(self._mesh, along.z[OMEGA], along.now.centre)
+        return Played(float(abs(pose.place[-1]) / (point_weights(self._mesh) @ along.now.power)), along.states)
 
 
 def slow_enough(
@@ -146,38 +91,40 @@ def slow_enough(
     times the one before in Fr, so a change that comes and goes between two of them is not seen.
 
     Parameters
-        ----------
-        body : Chain
-            Its links are as heavy as they press on the floor, evenly along their lengths.
-        friction : Law
-        gait : callable
-            Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones.
-        delta : float
-            Regularisation speed, per period.
-        loss : float
-            In (0, 0.5]; the answer is right to 2 % of it.
-        breaks : (n,), optional
-            Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
+    ----------
+    body : Chain
+        Its links are as heavy as they press on the floor, evenly along their lengths.
+    friction : Law
+    gait : callable
+        Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones.
+    delta : float
+        Regularisation speed, per period.
+    loss : float
+        In (0, 0.5]; the answer is right to 2 % of it.
+    breaks : (n,), optional
+        Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
 
-        Raises
-        ------
-        ProblemError
-            If the body is no chain, or numbers are out of range.
-        NotConvergedError
-            If the motion is not found, or the gait can be played as fast as one likes.
+    Raises
+    ------
+    ProblemError
+        If the body is no chain, or numbers are out of range.
+    NotConvergedError
+        If the motion is not found, or the gait can be played as fast as one likes.
 
-        Examples
-        --------
-        >>> import colloc
-        >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-        >>> round(colloc.slow_enough(colloc.Chain(), colloc.Friction(), gait, delta=1e-4), 4)
-        0.0031
+    Examples
+    --------
+    >>> import colloc
+    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    >>> round(colloc.slow_enough(colloc.Chain(), colloc.Friction(), gait, delta=1e-4), 4)
+    0.0031
     """
     check_finite(positive=True, loss=loss, delta=delta)
     if loss > 0.5:
         raise ProblemError(f"loss must be at most 0.5, not {loss!r}.")
     chain, accurate = checked_inertia(body, gait), _ACCURACY
     law = chain.law(friction)
+    if not rate_independent(law):
+        raise ProblemError(f"under {law.label} the pace is part of every gait: how slow is slow enough has no one answer.")
     return _refined(
         chain, law, gait, breaks, lambda on_mesh: _froude(on_mesh, law, delta, loss), lambda froude: accurate * froude
     )
@@ -210,10 +157,9 @@ def inertial_loss(
 
     def lost(on_mesh: GaitOnMesh) -> float:
         nonlocal coarser
-        slow = on_mesh.slow(delta)
-        near = slow if coarser is None else on_mesh.carried(*coarser)
+        near = None if coarser is None else on_mesh.carried(*coarser)
         coarser = on_mesh.times, on_mesh.played(delta, froude, near)
-        return 1.0 - coarser[1].efficiency / slow.efficiency
+        return 1.0 - coarser[1].efficiency / on_mesh.played(delta).efficiency
 
     return _refined(chain, chain.law(friction), gait, breaks, lost, lambda _: _LOSS_ACCURACY)
 
@@ -238,7 +184,7 @@ def _refined(
 
 def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float:
     """At which inertia first changes the efficiency of a gait on a mesh by the part `loss`."""
-    last = slow = gait.slow(delta)
+    last = slow = gait.played(delta)
     # the change is a power of the Froude number where both are small
     low, high, at = -np.inf, np.log(_FASTEST * friction.largest), np.log(_FIRST * loss * friction.largest)
     fastest, power = high, _POWER

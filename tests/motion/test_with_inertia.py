@@ -1,0 +1,101 @@
+"""Gaits with inertia as a search sees them: against shooting, differences, the slow motion, and what cannot be."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near
+
+LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
+ROUND = colloc.ellipse(A0=0, A1=2.5, B1=1.3)
+STANDING = colloc.Chain((0.3, 0.45, 0.25), feet=1)
+
+
+def problem(**fields):
+    usual = {"gait": colloc.Harmonic(1), "guess": LEANING, "friction": colloc.Friction(1.7, 1.0, 1.3), "rotation": None}
+    return colloc.Problem("paced", **({"body": colloc.Chain((0.3, 0.45, 0.25)), "froude": 0.1, "delta": 1e-2} | usual | fields))
+
+
+def program(stated):
+    space, v = space_near(stated, stated.guess)
+    return ReducedProgram(space, stated.delta), v
+
+
+@pytest.mark.parametrize("froude", [0.1, 0.5, pytest.param(0.003, marks=pytest.mark.slow)])
+def test_shooting_and_collocation_find_the_same_motion(froude):
+    """One by steps of its own through time, one for all instants at once."""
+    reduced, v = program(problem(froude=froude, intervals=200))
+    stated = reduced.space.problem
+    shot = colloc.inertial_motion(stated.body, stated.law, reduced.space.member(v), 1e-2, froude)
+    found = reduced.period(v)
+    assert shot.stable
+    assert found["distance"] == pytest.approx(shot.distance, rel=2e-4)
+    assert found["work"] == pytest.approx(shot.work, rel=2e-4)
+    assert found["rotation"] == pytest.approx(shot.rotation, abs=2e-4)
+
+
+def test_half_of_an_antipodal_gait_says_what_all_of_it_does():
+    """The mirror image of the momenta closes the half."""
+    half, v = program(problem(gait=colloc.Harmonic(1, "antipodal"), guess=ROUND, rotation=0.0, intervals=60))
+    whole, w = program(problem(guess=ROUND, intervals=120))
+    for name in ("distance", "work"):
+        assert half.period(v)[name] == pytest.approx(whole.period(w)[name], rel=1e-5)
+    assert whole.period(w)["rotation"] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0},
+        {"body": STANDING},
+        {"objective": "turning"},
+    ],
+    ids=["whole", "half", "feet", "turning"],
+)
+def test_gradients_are_those_of_differences(fields):
+    reduced, v = program(problem(intervals=30, **fields))
+    step = 1e-5
+    sides = [(reduced.objective(v + step * unit), reduced.objective(v - step * unit)) for unit in np.eye(v.size)]
+    differences = np.array([(high - low) / (2 * step) for high, low in sides])
+    np.testing.assert_allclose(reduced.gradient(v), differences, atol=2e-6 * np.abs(differences).max())
+
+
+def test_the_slow_motion_is_the_limit():
+    """The difference falls at least like the Froude number."""
+    slow, v = program(problem(froude=0.0, intervals=200))
+    off = []
+    for froude in (1.6e-3, 4e-4, 1e-4):
+        reduced, _ = program(problem(froude=froude, intervals=200))
+        off.append(abs(reduced.objective(v) / slow.objective(v) - 1))
+    assert off[0] > 3.5 * off[1] > 3.5**2 * off[2] > 0
+
+
+def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_fast():
+    stated = colloc.Problem("paced", gait=colloc.Harmonic(1, "antipodal"), froude=0.1, delta=1e-2, guess=ROUND)
+    found = colloc.solve(stated, starts=1)
+    assert found.status == "solved", found.message
+    slow = colloc.solve(stated.with_(froude=0.0), starts=1)
+    played = colloc.inertial_motion(stated.body, stated.law, slow.gait, 1e-2, 0.1)
+    assert found.efficiency > 1.2 * played.efficiency
+    assert 0 < max(check.value for check in found.certificate.checks if check.name == "stability") < 1
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"froude": -1.0}, "not negative"),
+        ({"froude": "fast"}, "not negative"),
+        ({"gait": colloc.Harmonic(1, "bilateral"), "body": colloc.Chain(), "guess": None, "rotation": 0.0}, "run backwards"),
+        ({"gait": colloc.FreePath(2.0)}, "leaves the pace open"),
+        ({"body": colloc.ModalBody(), "guess": None}, "of a ModalBody"),
+        ({"grade": 0.1, "rotation": 0.0}, "on a slope inertia"),
+        ({"torque_limit": 0.1}, "single joints"),
+        ({"scheme": "lobatto-4"}, "gauss-N"),
+        ({"formulation": "implicit velocity"}, "only the formulation"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_a_sentence(fields, said):
+    with pytest.raises(colloc.ProblemError, match=said):
+        problem(**fields)
