@@ -67,6 +67,8 @@ KEPT = {
     "slopes.md": "python -m scripts.slopes",
     "slopes.png": "python -m scripts.slopes",
     "feet.md": "python -m scripts.feet --output results/curated",
+    "pace.md": "python -m scripts.pace --output results/curated",
+    "pace.png": "python -m scripts.pace --output results/curated",
 }
 
 

@@ -268,13 +268,12 @@ class WithInertia(SlowOnLevel):
         through more viscous friction."""
         held = False
         if near[0] is not None:
-            states, held = self._closed(mesh, shapes, near[0])
+            states, out, held = self._closed(mesh, shapes, near[0])
         if not held:
-            states, held = self._closed(mesh, shapes, self._slow_momenta(shapes))
+            states, out, held = self._closed(mesh, shapes, self._slow_momenta(shapes))
         if not held and shapes.delta * shapes.unit < _VISCOUS:
             wetter = self.along(mesh, shapes._replace(delta=_WETTER * shapes.delta), begin)
-            states, held = self._closed(mesh, shapes, wetter.states)
-        out, _ = self._slopes(shapes, states)
+            states, out, held = self._closed(mesh, shapes, wetter.states)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
@@ -288,15 +287,18 @@ class WithInertia(SlowOnLevel):
         posture = body.posture(angles)
         return momenta(body, posture, body.velocity(posture, rates, z))
 
-    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray) -> tuple[np.ndarray, bool]:
-        """The momenta that repeat every period, by Newton's method from others ``(3, n_point)``, and whether there are any."""
+    def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The momenta that repeat every period, by Newton's method from others ``(3, n_point)``; what the body does with them
+        (`colloc.motion.compiled_momenta`); and whether there are any."""
+        out = near
 
         def rates(states: np.ndarray) -> Rates:
+            nonlocal out
             out, slopes = self._slopes(shapes, states)
             return Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
-        return states, held
+        return states, out, held
 
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         return CollocatedStates(mesh, np.ones(len(STATES), dtype=bool), self._image, unit)

@@ -95,7 +95,10 @@ class CollocatedStates:
         for _ in range(_STEPS):
             if off < _CLOSED or not now.known:
                 break
-            step, step_start = self._newton(now.on_states, left_over, open_by)
+            with np.errstate(over="ignore", invalid="ignore"):  # far from any motion, what it grows to by the end has no number
+                step, step_start = self._newton(now.on_states, left_over, open_by)
+            if not np.isfinite(step).all():
+                break
             if np.abs(step).max() < _ROUNDED:
                 off = 0.0
                 break
