@@ -3,11 +3,13 @@
     python -m benchmarks.zoo --problems 100
     python -m benchmarks.zoo --laws --problems 20
     python -m benchmarks.zoo --modes --problems 20
+    python -m benchmarks.zoo --paced --problems 20
 
 Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1 to 4 harmonics, free paths
 and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. With --laws another family: elliptic, viscous, power
 and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power, slopes. With --modes a
-third: smooth bodies of 2 to 6 bending modes, under the friction of the first. For each: whether it is solved, its value over
+third: smooth bodies of 2 to 6 bending modes, under the friction of the first. With --paced a fourth: bodies of 2 to 5 links,
+a third of them on feet, played at Froude numbers from 0.001 to 1. For each: whether it is solved, its value over
 the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates), and the processor time.
 Failures are printed with the reason.
 """
@@ -102,12 +104,27 @@ def modal_problem(number: int) -> Problem:
     )
 
 
+def paced_problem(number: int) -> Problem:
+    """Problem `number` of the family of bodies with inertia; it depends on that number alone."""
+    rng = np.random.default_rng([SEED + 3, number])
+    body = _drawn_body(rng, 5)
+    if rng.random() < 0.2:
+        body = Chain((0.5, 0.5))
+    body = Chain(body.lengths, feet=1) if rng.random() < 1 / 3 else body
+    mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(5.0)))), float(rng.choice([1.0, rng.uniform(1.0, 3.0)]))
+    gait = harmonics_within(int(rng.integers(1, 4)), str(rng.choice(["none", "antipodal"])))
+    froude = float(f"{np.exp(rng.uniform(np.log(1e-3), 0.0)):.3g}")
+    return Problem(f"zoo-paced-{number}", body=body, friction=Friction(mu_t, 1.0, mu_b), gait=gait, froude=froude)
+
+
 def described(problem: Problem) -> str:
     """In one line."""
     law, best = problem.friction.label, "" if problem.objective == EFFICIENCY else f"best {problem.objective.name}, "
     limit = f", power within {problem.power_limit:g}" if problem.power_limit else ""
     slope = f", on a slope of {problem.grade:g}" if problem.grade else ""
-    return f"{best}{problem.body.describe()}, {law} {problem.gait.describe()}, within {problem.joint_limit:.2f}{limit}{slope}"
+    paced = f", Fr = {problem.froude:g}" if problem.froude else ""
+    shapes = f"{problem.gait.describe()}, within {problem.joint_limit:.2f}"
+    return f"{best}{problem.body.describe()}, {law} {shapes}{limit}{slope}{paced}"
 
 
 def known_bests() -> dict[str, float]:
@@ -126,6 +143,7 @@ def main() -> None:
     family.add_argument(
         "--modes", dest="of", action="store_const", const=modal_problem, help="smooth bodies of a few bending modes"
     )
+    family.add_argument("--paced", dest="of", action="store_const", const=paced_problem, help="bodies with inertia")
     parser.set_defaults(of=zoo_problem)
     options = parser.parse_args()
     best = known_bests()

@@ -1,7 +1,7 @@
 """What inertia does to a gait, and the best gait for each pace: python -m scripts.pace [--output results]
 
-Three equal links under equal friction: the best slow gait played at Froude numbers L/(g T^2) from 0.001 to 1, and the best gait for
-each of them, certified. A table, pace.md, and a figure, pace.png, with the gaits along it.
+Three equal links under equal friction: the best slow gait played at Froude numbers L/(g T^2) from 0.001 to 1, and the best gait
+for each of them, certified. A table, pace.md, and a figure, pace.png, with the gaits along it.
 """
 
 from __future__ import annotations

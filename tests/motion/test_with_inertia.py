@@ -99,3 +99,18 @@ def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_f
 def test_what_cannot_be_asked_is_refused_in_a_sentence(fields, said):
     with pytest.raises(colloc.ProblemError, match=said):
         problem(**fields)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"body": colloc.Chain((0.5, 0.5)), "gait": colloc.Harmonic(2), "friction": colloc.Friction(), "froude": 0.2},
+        {"body": colloc.Chain(feet=1), "gait": colloc.Harmonic(1, "antipodal"), "friction": colloc.Friction(), "froude": 0.05},
+    ],
+    ids=["two links, which crawl with inertia alone", "feet"],
+)
+def test_bodies_of_other_kinds_find_a_certified_gait(fields):
+    found = colloc.solve(colloc.Problem("paced", **fields), starts=8)
+    assert found.status == "solved", found.message
+    assert found.efficiency > 0.03
