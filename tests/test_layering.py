@@ -1,9 +1,14 @@
 """Data flows one way: imports point down the packages and never in a circle; heavy libraries are named in few places."""
 
 import ast
+import importlib
 import re
 import sys
 from pathlib import Path
+
+import pytest
+
+from benchmarks.numbers import numbers
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
@@ -172,3 +177,14 @@ def test_what_checks_a_motion_shares_no_mesh_and_no_program_with_what_found_it()
         others = set(imported(known[name]))
         assert not any(map(COLLOCATED.match, others)), f"{name} imports {sorted(filter(COLLOCATED.match, others))}"
         wanted |= {other.removeprefix("colloc.") for other in others} & known.keys() - seen
+
+
+NUMBERS = {"explore": 10, "descend": 5, "refine": 7, "confirm": 7, "certify": 17, "solve": 4, "converge": 9, "optimum": 11}
+"""At most so many numbers that somebody has set, in the stages of a search; `python -m benchmarks.numbers` says what each trades.
+They may become fewer."""
+
+
+@pytest.mark.parametrize("stage", NUMBERS)
+def test_a_stage_is_steered_by_few_numbers(stage):
+    module = importlib.import_module(f"colloc.search.{stage}")
+    assert len(list(numbers(module))) <= NUMBERS[stage]

@@ -308,8 +308,8 @@ class Problem:
         if self.body.n_joint == 1 and self.law.reversible and not self.froude:
             raise ProblemError(
                 "no gait of a two-link body goes anywhere when mu_f = mu_b: one joint retraces its path, and reversed rates "
-                "reverse the motion (the scallop theorem). Give the body three links, the friction mu_b different from mu_f, or "
-                "the problem a froude."
+                "reverse the motion (the scallop theorem). Give the body three links, mu_b different from mu_f, or the problem "
+                "a froude."
             )
 
     def __repr__(self) -> str:

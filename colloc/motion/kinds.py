@@ -265,13 +265,13 @@ class WithInertia(SlowOnLevel):
         tolerance: float = TOLERANCE,
     ) -> Along:
         """Where Newton's method does not lead from the slow motion to the one with inertia, as on feet that hold, it is reached
-        through more viscous friction."""
+        through more viscous friction; not beside a motion that is known, where a search had better take a shorter step."""
         held = False
         if near[0] is not None:
             states, out, held = self._closed(mesh, shapes, near[0])
         if not held:
             states, out, held = self._closed(mesh, shapes, self._slow_momenta(shapes))
-        if not held and shapes.delta * shapes.unit < _VISCOUS:
+        if not held and near[0] is None and shapes.delta * shapes.unit < _VISCOUS:
             wetter = self.along(mesh, shapes._replace(delta=_WETTER * shapes.delta), begin)
             states, out, held = self._closed(mesh, shapes, wetter.states)
         z, centre, power, rates = np.split(out, [3, 5, 6])

@@ -22,6 +22,8 @@ from colloc.numerics.mesh import Mesh
 _CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
 """Newton's step that counts as none: where rates are steep, rounding leaves more of the equations than `_CLOSED`."""
+_ASTRAY = 5
+"""Steps in a row of which no part leads nearer, after which there is no motion near here."""
 _SHARES = 0.5 ** np.arange(7)
 """Of Newton's step, tried until the equations are off by less."""
 
@@ -92,6 +94,7 @@ class CollocatedStates:
         start = np.array(start, dtype=float)
         states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
         now, left_over, open_by, off = self._residual(rates, states, start)
+        astray = 0
         for _ in range(_STEPS):
             if off < _CLOSED or not now.known:
                 break
@@ -107,6 +110,9 @@ class CollocatedStates:
                 now, left_over, open_by, off_then = self._residual(rates, after, begin)
                 if off_then < off:
                     break
+            astray = 0 if off_then < off else astray + 1
+            if astray > _ASTRAY:
+                break
             states, start, off = after, begin, off_then
         return states, start, bool(now.known and off < _CLOSED)
 

@@ -36,12 +36,11 @@ SADDLE, FLAT = 1e-2, 1e-4
 5e-5, what the mesh may be wrong by; less than FLAT is called flat."""
 
 _FINE_PHASES = 20000
-TRIVIAL_EFFICIENCY = 1e-4
-"""Efficiency times the smallest friction coefficient (at most 1) below which a gait goes nowhere."""
 TRIVIAL_ROTATION = 1e-3
 """Rotation a period [rad] from which a gait that goes nowhere turns."""
 NOWHERE = 1e-4
-"""Value of the objective on a slope, in units of the friction, up to which a gait goes nowhere."""
+"""Efficiency times the smallest friction coefficient (at most 1), or on a slope the value of the objective in units of the
+friction, up to which a gait goes nowhere."""
 
 
 class Certified(NamedTuple):
@@ -76,7 +75,7 @@ def is_trivial(answer: Answer) -> bool:
 
 def goes_nowhere(answer: Answer) -> bool:
     """Whether what a gait on the level travels is nothing for its work; it may turn."""
-    return abs(answer.efficiency) * answer.problem.law.smallest < TRIVIAL_EFFICIENCY
+    return abs(answer.efficiency) * answer.problem.law.smallest < NOWHERE
 
 
 def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = None) -> Certificate:

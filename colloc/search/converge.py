@@ -23,16 +23,17 @@ from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
-from colloc.search.optimum import ROUGH, SKETCH, VIOLATION, Effort, Optimum, replace_keeping_space
+from colloc.search.optimum import ITERATIONS, ROUGH, SKETCH, VIOLATION, Effort, Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.system.errors import NotConvergedError
 
-FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS = 1.0, 0.5, 0.3
-"""Boxes round the last gait [rad], at the first level, later ones, and on a refined mesh: far enough for an optimum to move,
-not so far that a step ends in another world. A gait that ends on the edge of its box goes on from there."""
+FIRST_RADIUS, NEXT_RADIUS = 1.0, 0.5
+"""Boxes round the last gait [rad], at the first level and later: far enough for an optimum to move, not so far that a step ends
+in another world. A gait that ends on the edge of its box goes on from there."""
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
-_ADMISSIBLE, _AT_REST = 1e-8, 1e-8
-"""By how much checks may be exceeded where a gait rests [rad], and by how much it may still move [rad]."""
+_AT_REST = 1e-8
+"""By how much checks may be exceeded where a gait rests, by how much it may still move [rad], and penetration of links that
+counts as contact, not as crossing [body lengths]."""
 _ALIKE = 1e-3
 """Relative change of the violation below which moving the checks does not help."""
 _SWINGS = 0.1
@@ -42,8 +43,6 @@ KINK_RADIUS, _WIDEST, _MISSED = 1e-6, 1e-5, 1e-8
 much. It is larger, up to the second, where the slopes are so small that the objective is missed by no more than the third."""
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs of links are checked; the certificate checks 20000 a period."""
-TOUCHING = 1e-8
-"""Penetration [body lengths] that counts as contact, not as crossing."""
 _FRACTIONS = np.linspace(1.0, 0.0, 21)
 
 
@@ -87,9 +86,9 @@ def at_rest(
             program.space.follow_worst()
         if fresh and effort.accuracy < SKETCH.accuracy:
             curvature = program.space.metric(v)
-        result = minimised(program, v, radius, effort.accuracy, effort.iterations, curvature)
+        result = minimised(program, v, radius, effort.accuracy, ITERATIONS, curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
-        admissible = program.place_rows(v) <= _ADMISSIBLE
+        admissible = program.place_rows(v) <= _AT_REST
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < effort.kkt_error
         # what was learned across kinks may end the search too early: then it begins anew
@@ -260,7 +259,7 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     return tuple(
         pair
         for pair in body.far_pairs
-        if max(body.crossing_depth(angles, [pair]).max(), body.passing_depth(angles, [pair])) > TOUCHING
+        if max(body.crossing_depth(angles, [pair]).max(), body.passing_depth(angles, [pair])) > _AT_REST
     )
 
 

@@ -19,22 +19,19 @@ from colloc.search.run import this_run
 
 FACTOR = 0.2
 """Of one delta to the one before."""
-_ALMOST = 1.2
-"""A level within this factor of the last one is the last one."""
-_STEPS = (0.1, 0.03, 0.01)
+_STEPS = (0.1, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
 _GAIN = 1e-7
 """The part of the objective that leaving a saddle has to gain."""
-_DRIER, _LOST = 0.1, 0.5
-"""A gait that loses this part of its value at so many times its delta owes it to delta."""
+_LOST = 0.5
+"""A gait that loses this part of its value at the next delta owes it to delta."""
 
 
 def levels(problem: Problem, first: float) -> list[float]:
     """The deltas from a first one down to the problem's."""
     found = [first]
     while found[-1] > problem.delta:
-        below = FACTOR * found[-1]
-        found.append(below if below > _ALMOST * problem.delta else problem.delta)
+        found.append(max(FACTOR * found[-1], problem.delta))
     return found
 
 
@@ -93,6 +90,6 @@ def below_saddle(optimum: Optimum) -> Optimum | None:
 
 
 def is_viscous(optimum: Optimum) -> bool:
-    """Whether the gait owes its value to delta: at a tenth of it half is lost. Slow parts of a retraced gait do that."""
-    dry = ReducedProgram(optimum.space, _DRIER * optimum.delta).objective(optimum.v)
+    """Whether the gait owes its value to delta: at the next one half is lost. Slow parts of a retraced gait do that."""
+    dry = ReducedProgram(optimum.space, FACTOR * optimum.delta).objective(optimum.v)
     return not dry <= optimum.objective + (1 - _LOST) * abs(optimum.objective)

@@ -12,18 +12,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
-from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.gaits.harmonic import Fourier
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
-from colloc.mechanics.chain import Chain
+from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, seed_class
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_about, space_near
@@ -31,35 +30,22 @@ from colloc.results.answer import Alternative
 from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, as_it_is, converged
 from colloc.search.descend import FACTOR, descend, is_viscous, levels
-from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum
+from colloc.search.optimum import ROUGH, SKETCH, Optimum
 from colloc.search.run import this_run
 from colloc.search.small_starts import small_loops
 from colloc.system.errors import CollocError, NotConvergedError
 
-STARTS, _AGREE = 32, 8
+STARTS, _ENOUGH, _MOST = 32, 8, 3
 """Starts where no number is asked for, at most unless they lead on; then the search also ends once so many have met the best
-gait. On the zoo that ends 44 of 99 searches early and loses no best gait (`python -m benchmarks.zoo`; with `--starts 32`)."""
-FOLLOW = Effort(ROUGH.accuracy, ROUGH.kkt_error, 3, ROUGH.iterations)
-"""Of gaits that are followed: refinement goes on from there."""
-_FEWEST = 12
-"""Intervals of a coarse mesh, at least."""
-_BROKEN = 1e-2
-"""Violation of a row beyond which a gait is not compared with others."""
-FOLLOWED, _FOLLOWED_LOOPS, PROMISING, _CLOSE = 3, 2, 0.8, 0.01
-"""How many gaits are followed to the final delta, and of those from small loops; the share of the best value that they need at
-the coarse one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
-_TURN, _HOP_SIZES, _HOP_SEED = 16, (0.2, 0.4, 0.8), 1
+gait. In any case it goes on until as many in a row have led nowhere better, and ends at so many times the starts asked for. On
+the zoo that ends 44 of 99 searches early and loses no best gait (`python -m benchmarks.zoo`; with `--starts 32`)."""
+FOLLOWED, PROMISING, CLOSE = 3, 0.8, 0.01
+"""How many gaits are followed to the final delta, and of small loops; the share of the best value that they need at the coarse
+one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
+_TURN, _HOP_SIZES = 16, (0.2, 0.4, 0.8)
 """Starts and hops from the best gait known take turns of so many, and how far hops go [rad], in turn. At 0.2 a hop mostly falls
 back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start k is depends on
 what came before alone: more starts go wherever fewer do."""
-_LOOP = -1
-"""The number of every start that is a small loop."""
-_PATIENCE, _MOST = 8, 3
-"""The search goes on until so many in a row have led nowhere better; at most so many times the starts asked for are tried."""
-_SPARE = 8
-"""Gaits of finite size that are followed at most, until one has not shrunk."""
-_KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
-"""The two best ellipses of three equal links under isotropic friction."""
 
 
 @dataclass(eq=False)
@@ -67,18 +53,18 @@ class Candidate:
     """A gait that one or more starts came through."""
 
     optimum: Optimum
-    starts: list[int] = field(default_factory=list)
+    starts: int = 0
     leads_to: Candidate | None = None
     """Where they went from here, at the next delta."""
     dry: float = np.inf
     """Its objective at a delta that is small for all."""
     is_loop: bool = False
 
-    def joined(self, start: int) -> None:
+    def joined(self) -> None:
         """Another start came here, and will go where this one went."""
         at: Candidate | None = self
         while at is not None:
-            at.starts.append(start)
+            at.starts += 1
             at = at.leads_to
 
 
@@ -145,26 +131,25 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
     if not known:
         raise NotConvergedError("no start led to any gait of the class; give a guess.")
     ends = _followed_to_the_end(problem, known, goes_on)
-    distinct: list[tuple[Optimum, list[int]]] = []
+    distinct: list[tuple[Optimum, Candidate]] = []
     for optimum, candidate in sorted(ends, key=lambda end: end[0].objective):
         twin = next((led for other, led in distinct if same_gait(problem, other, optimum)), None)
         if twin is None:
-            distinct.append((optimum, list(candidate.starts)))
+            distinct.append((optimum, candidate))
         else:
-            twin.extend(candidate.starts)
-    followed = [_alternative(problem, optimum, led) for optimum, led in distinct]
+            twin.starts += candidate.starts
+    followed = [_alternative(problem, optimum, led.starts) for optimum, led in distinct]
     dropped = [_alternative(problem, c.optimum, c.starts) for c in known if not any(c is done for _, done in ends)]
     return Exploration(tuple(optimum for optimum, _ in distinct), tried, (*followed, *dropped))
 
 
 def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
-    """The guess, gaits known from three links, waves both ways, then seeded Latin hypercubes without end."""
+    """The guess, waves both ways, then seeded Latin hypercubes without end."""
     body, limit = problem.body, problem.joint_limit
-    known = [over_links(ellipse(*numbers), Chain(), body, limit) for numbers in _KNOWN]
     waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
     own = seed_class(problem)
-    first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in (*known, *waves))]
-    # known gaits and seeds take turns: neither are always better
+    first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in waves)]
+    # waves and seeds take turns: neither are always better
     seeds = map(partial(latin_hypercube_gait, problem, seed), itertools.count())
     return itertools.chain(itertools.chain.from_iterable(zip(first, seeds, strict=False)), seeds)
 
@@ -180,7 +165,7 @@ def same_gait(problem: Problem, a: Optimum, b: Optimum) -> bool:
 def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool]) -> tuple[list[Candidate], int]:
     """What the starts lead to on a coarse mesh, best first, and how many were tried, at least one."""
     run, count = this_run(), asked or STARTS
-    coarse = problem.with_(intervals=min(problem.intervals, max(problem.gait.coarse_intervals(problem.body.n_joint), _FEWEST)))
+    coarse = problem.with_(intervals=min(problem.intervals, problem.gait.coarse_intervals(problem.body.n_joint)))
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)  # compared where friction is nearly dry
     deltas = [max(delta, problem.delta) for delta in (problem.delta_start, FACTOR * usual)]
     # where friction is as dry for a loop as slow as may be
@@ -191,22 +176,22 @@ def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool])
     loops: list[Candidate] = []
     for loop in run.kept("small loops", (problem,), lambda: small_loops(problem)):
         with suppress(CollocError):
-            _follow(*space_about(coarse, closed_gait(coarse, loop, dry)), _LOOP, [dry], [loops])
-    starts, tried, better, best = starting_gaits(problem), 0, -_PATIENCE, 0.0
+            _follow(*space_about(coarse, closed_gait(coarse, loop, dry)), [dry], [loops])
+    starts, tried, better, best = starting_gaits(problem), 0, -_ENOUGH, 0.0
 
     def knows() -> bool:
-        enough = tried >= count or (asked is None and _met_best(known[-1]) >= _AGREE)
-        return enough and tried > better + _PATIENCE
+        enough = tried >= count or (asked is None and _met_best(known[-1]) >= _ENOUGH)
+        return enough and tried > better + _ENOUGH
 
     while tried == 0 or (tried < _MOST * count and not knows() and goes_on()):
         start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
             if start // _TURN % 2 == 0 or not known[-1]:
-                _follow(*space_about(coarse, closed_gait(coarse, next(starts), deltas[0])), start, deltas, known)
+                _follow(*space_about(coarse, closed_gait(coarse, next(starts), deltas[0])), deltas, known)
             else:
                 shaken = _shaken(problem, min((c.optimum for c in known[-1]), key=lambda f: f.objective).gait, start)
-                _follow(*space_about(coarse, shaken), start, deltas[-1:], known[-1:])
+                _follow(*space_about(coarse, shaken), deltas[-1:], known[-1:])
         before, best = best, min((c.optimum.objective for c in known[-1]), default=0.0)
         if start > 0 and best < before - SAME_VALUE * abs(before):
             better = start
@@ -225,7 +210,7 @@ def objective_at(delta: float, optimum: Optimum) -> float:
 def _met_best(candidates: Sequence[Candidate]) -> int:
     """How many starts met the best gait so far."""
     best = min(candidates, key=lambda c: c.optimum.objective, default=None)
-    return 0 if best is None else len(best.starts)
+    return 0 if best is None else best.starts
 
 
 def _best(optima: Sequence[Optimum]) -> Optimum | None:
@@ -234,7 +219,7 @@ def _best(optima: Sequence[Optimum]) -> Optimum | None:
 
 def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
     """The Fourier series of a gait with every coefficient moved by chance: where the next hop from basin to basin lands."""
-    own, rng = seed_class(problem), np.random.default_rng([_HOP_SEED, number])
+    own, rng = seed_class(problem), np.random.default_rng(number)
     series = fourier_through(gait, own)
     size = _HOP_SIZES[number % len(_HOP_SIZES)]
     falling = size / np.arange(1, series.cos.shape[1] + 1)
@@ -246,7 +231,7 @@ def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
     return own.fourier(own.parameters(moved), problem.body.n_joint)
 
 
-def _follow(space: SearchSpace, v: np.ndarray, start: int, deltas: list[float], known: list[list[Candidate]]) -> None:
+def _follow(space: SearchSpace, v: np.ndarray, deltas: list[float], known: list[list[Candidate]]) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
     problem = space.problem
     before, radius = None, FIRST_RADIUS
@@ -255,7 +240,7 @@ def _follow(space: SearchSpace, v: np.ndarray, start: int, deltas: list[float], 
         if is_viscous(found):
             continue  # as far as this delta goes, the start is as it was
         space, v, radius = found.space, found.v, NEXT_RADIUS
-        if found.violation > _BROKEN:
+        if found.violation > SKETCH.kkt_error:
             continue  # no member of the class yet, whatever its value
         at = next((c for c in here if same_gait(problem, c.optimum, found)), None)
         new = at is None
@@ -264,7 +249,7 @@ def _follow(space: SearchSpace, v: np.ndarray, start: int, deltas: list[float], 
             here.append(at)
         if before is not None:
             before.leads_to = at
-        at.joined(start)
+        at.joined()
         if not new:
             return
         before = at
@@ -285,8 +270,8 @@ def _followed_to_the_end(
     run, ends = this_run(), list[tuple[Optimum, Candidate]]()
     least = -known[0].dry - (1 - PROMISING) * abs(known[0].dry)
     promising = [c for c in known if -c.dry >= least]
-    queue = [c for c in promising if not c.is_loop][:FOLLOWED] + [c for c in promising if c.is_loop][:_FOLLOWED_LOOPS]
-    spare = [c for c in known if is_finite(c.optimum) and c not in queue][:_SPARE]
+    queue = [c for c in promising if not c.is_loop][:FOLLOWED] + [c for c in promising if c.is_loop][:FOLLOWED]
+    spare = [c for c in known if is_finite(c.optimum) and c not in queue][:_ENOUGH]
     for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(optimum) for optimum, _ in ends)):
             break
@@ -297,11 +282,11 @@ def _followed_to_the_end(
         raise NotConvergedError("no gait could be followed to the final delta; start at a larger delta or give another guess.")
     best = min(optimum.objective for optimum, _ in ends)
     best_finite = min((optimum.objective for optimum, _ in ends if is_finite(optimum)), default=0.0)
-    close = (1 - _CLOSE) * best, (1 - _CLOSE) * best_finite
+    close = (1 - CLOSE) * best, (1 - CLOSE) * best_finite
     for k, (optimum, candidate) in enumerate(ends):
         if optimum.objective <= close[0] or (is_finite(optimum) and optimum.objective <= close[1]):
             with suppress(CollocError):
-                whole = converged(*space_near(problem, optimum.gait), optimum.delta, NEXT_RADIUS, FOLLOW)
+                whole = converged(*space_near(problem, optimum.gait), optimum.delta, NEXT_RADIUS, ROUGH)
                 ends[k] = whole.after(*optimum.history), candidate
     return ends
 
@@ -311,8 +296,8 @@ def _followed(problem: Problem, optimum: Optimum) -> Optimum:
     edges = optimum.space.phase_mesh(optimum.gait).edges
     finer = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
     space, v = space_near(problem, optimum.gait, finer)
-    return descend(converged(space, v, optimum.delta, NEXT_RADIUS, FOLLOW), FOLLOW)
+    return descend(converged(space, v, optimum.delta, NEXT_RADIUS, ROUGH))
 
 
-def _alternative(problem: Problem, optimum: Optimum, starts: list[int]) -> Alternative:
-    return Alternative(optimum.value, optimum.delta, len(starts), on_speed_floor(problem, optimum.gait), optimum.gait)
+def _alternative(problem: Problem, optimum: Optimum, starts: int) -> Alternative:
+    return Alternative(optimum.value, optimum.delta, starts, on_speed_floor(problem, optimum.gait), optimum.gait)

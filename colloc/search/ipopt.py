@@ -15,23 +15,17 @@ from colloc.numerics.multiplier_estimate import estimated_multipliers
 from colloc.search.stop_request import StopRequest
 from colloc.system.interruption import interruptible
 
+_PUSHED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
 IPOPT_OPTIONS: dict[str, object] = {
     "print_level": 0,
     "sb": "yes",
     "linear_solver": "mumps",
-    "tol": 1e-9,
-    "constr_viol_tol": 1e-9,
+    **dict.fromkeys(("tol", "constr_viol_tol"), 1e-9),
     "acceptable_iter": 0,
     "mu_strategy": "monotone",
     "mu_init": 1e-4,
-    "bound_push": 1e-5,
-    "bound_frac": 1e-5,
     "warm_start_init_point": "yes",
-    "warm_start_bound_push": 1e-5,
-    "warm_start_bound_frac": 1e-5,
-    "warm_start_slack_bound_push": 1e-5,
-    "warm_start_slack_bound_frac": 1e-5,
-    "warm_start_mult_bound_push": 1e-5,
+    **dict.fromkeys([*_PUSHED[:2], *(f"warm_start_{name}" for name in _PUSHED)], 1e-5),
     "max_iter": 60,
 }
 LIFTED_OPTIONS: dict[str, object] = {"theta_max_fact": 0.1, "max_iter": 300}

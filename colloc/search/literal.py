@@ -17,7 +17,7 @@ from colloc.gaits.problem import Problem
 from colloc.reduced.spaces import heading, nearest_parameters, transcribed
 from colloc.results.answer import Answer, Step
 from colloc.search.confirm import answer_of, second_order
-from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, REMESH_RADIUS
+from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS
 from colloc.search.descend import levels
 from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.ipopt import NlpResult, Solver
@@ -70,7 +70,7 @@ def literal_answer(problem: Problem) -> Answer:
             break
         kept = np.concatenate([kept, plan.kept])
         program = transcribed(scaled.with_(scheme=plan.scheme), gait, plan.edges)
-        answer = _solved(problem, program, nearest_parameters(program, gait), delta, REMESH_RADIUS, unit)
+        answer = _solved(problem, program, nearest_parameters(program, gait), delta, NEXT_RADIUS, unit)
         history = (*history, answer.step)
         if not answer.optimal:
             return replace(answer, history=history)

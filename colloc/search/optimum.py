@@ -29,22 +29,21 @@ class Effort:
         What the first-order conditions have to keep to then; the objective is off by about its square.
     rounds : int
         Times that the shape checks are moved to the worst instants, and the gait optimised again, at most.
-    iterations : int
-        Of SQP in each round, at most.
     """
 
     accuracy: float
     kkt_error: float
     rounds: int
-    iterations: int
 
 
-SKETCH = Effort(1e-5, 1e-1, 2, 60)
+SKETCH = Effort(1e-5, 1e-1, 2)
 """Enough to tell gaits apart. A start that needs more is told apart as it is."""
-ROUGH = Effort(1e-8, 1e-3, 12, 150)
+ROUGH = Effort(1e-8, 1e-3, 12)
 """On the way: delta, or the mesh, will move the gait by more."""
-FINE = Effort(1e-14, 1e-6, 12, 150)
+FINE = Effort(1e-14, 1e-6, 12)
 """At the final delta on the final mesh."""
+ITERATIONS = 150
+"""Of SQP in a round, at most."""
 VIOLATION = 1e-6
 """By how much an optimum may break a row."""
 

@@ -13,15 +13,15 @@ import numpy as np
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_of
 from colloc.search.certify import NOWHERE
-from colloc.search.converge import NEXT_RADIUS, REMESH_RADIUS, converged
+from colloc.search.converge import NEXT_RADIUS, converged
 from colloc.search.optimum import FINE, ROUGH, Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
-MESHES, _SAME_AIM, _HALVINGS = 8, 2, 2
-"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, later ones are planned for
-half, then a quarter of it, and keep all their knots."""
+MESHES, _SAME_AIM = 8, 2
+"""Meshes tried, and how many of them with the usual aim. Where kinks move to and fro with the mesh, as many are planned for
+half of it, later ones for a quarter, and keep all their knots."""
 _GROWTH, _FEW_POINTS = 3, 300
 """A mesh has at most so many times the points of the last one, and some: the gait will move, and what was planned is wasted."""
 _MOST_PANELS, _PANELS_GROW, _LEFT = 128, 4, 6
@@ -51,7 +51,7 @@ class _Meshes:
             problem.mesh_tolerance,
             kept=self.kept,
             nested=self.count >= _SAME_AIM,
-            aim=AIM * 0.5 ** min(late, _HALVINGS),
+            aim=AIM * 0.5 ** min(late, _SAME_AIM),
             most_points=min(MOST_POINTS, _GROWTH * mesh.n_point + _FEW_POINTS),
         )
 
@@ -82,11 +82,11 @@ def refine(optimum: Optimum) -> Optimum:
         if meshes.count == MESHES:
             lacks = f"refinement ended after {MESHES} meshes: the gait still moves with the mesh."
             return replace_keeping_space(optimum, lacks=lacks)
-        space, v, radius, effort = optimum.space, optimum.v, NEXT_RADIUS, FINE
+        space, v, effort = optimum.space, optimum.v, FINE
         if finer is not None:
-            (space, v), radius, effort = finer, REMESH_RADIUS, ROUGH
+            (space, v), effort = finer, ROUGH
         if plan is not None:
-            meshes.count, meshes.kept, radius = meshes.count + 1, np.concatenate([meshes.kept, plan.kept]), REMESH_RADIUS
+            meshes.count, meshes.kept = meshes.count + 1, np.concatenate([meshes.kept, plan.kept])
             space = space.remeshed(optimum.gait, plan.edges, plan.scheme)
             effort = FINE if meshes.count > _SAME_AIM else ROUGH
             try:
@@ -94,7 +94,7 @@ def refine(optimum: Optimum) -> Optimum:
             except NotConvergedError:
                 v = space.laid(optimum.gait)  # breaks a row a little, as its own mesh lets it
         known = optimum.curvature if optimum.v.size == v.size else None
-        optimum = converged(space, v, optimum.delta, radius, effort, known).after(*optimum.history)
+        optimum = converged(space, v, optimum.delta, NEXT_RADIUS, effort, known).after(*optimum.history)
 
 
 def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:

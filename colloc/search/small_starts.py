@@ -21,10 +21,11 @@ from colloc.gaits.starts import laid_into, seed_class
 from colloc.mechanics.law import rate_independent
 from colloc.system.errors import NotConvergedError
 
-_DRAWN, _LEVELS, _SEED = 60, (-1.0, -0.5, 0.0, 0.5, 1.0), 2
-"""Shapes, and the values of every angle among which they are drawn, of the limit."""
-_DIRECTIONS, _HEADINGS = 60, 2
-"""Of rates, and in half a turn: enough to tell shapes apart; the search finds the sharp ones."""
+_DRAWN, _HEADINGS = 60, 2
+"""Shapes, and directions of rates at each; headings in half a turn: enough to tell shapes apart; the search finds the sharp
+ones."""
+_LEVELS = np.linspace(-1.0, 1.0, 5)
+"""The values of every angle among which shapes are drawn, of the limit."""
 _FIRST = 0.5
 """First heading [rad]: no axis of symmetry of the usual shapes, along and across which a mixture may go nowhere."""
 _SHAPES = 2
@@ -62,7 +63,7 @@ def small_loops(problem: Problem) -> list[AnyGait]:
 def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
     """The best small gait at every shape that was drawn, with the shape, best first; of equally good ones one."""
     body, friction, shapes = problem.body, problem.law, _drawn_shapes(problem)
-    directions = np.hstack([one_joint(body.n_joint, half=False), unit_directions(body.n_joint, _DIRECTIONS, half=False)])
+    directions = np.hstack([one_joint(body.n_joint, half=False), unit_directions(body.n_joint, _DRAWN, half=False)])
     count, delta = directions.shape[1], _DRY * problem.delta_start
     angles, rates = np.repeat(shapes, count, axis=1), np.tile(directions, shapes.shape[1])
     solved = body.solve(friction, angles, rates, delta)
@@ -89,7 +90,7 @@ def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
 def _drawn_shapes(problem: Problem) -> np.ndarray:
     """Admissible shapes ``(n_joint, n)`` about which a gait of the class may run, without repetition."""
     body, own, n_joint = problem.body, seed_class(problem), problem.body.n_joint
-    drawn = np.random.default_rng(_SEED).choice(_LEVELS, (_DRAWN, n_joint)) * widest(problem.joint_limit)
+    drawn = np.random.default_rng(0).choice(_LEVELS, (_DRAWN, n_joint)) * widest(problem.joint_limit)
     none = np.zeros((n_joint, own.harmonics))
     means = np.array([own.fourier(own.parameters(Fourier(mean, none, none)), n_joint).mean for mean in drawn])
     # of a shape and its mirror image, the one whose first bend is to the left

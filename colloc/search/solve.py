@@ -26,7 +26,7 @@ from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is
 from colloc.search.descend import FACTOR, below_saddle, descend
-from colloc.search.explore import Exploration, begin_at, explore, is_finite
+from colloc.search.explore import CLOSE, Exploration, begin_at, explore, is_finite
 from colloc.search.literal import literal_answer
 from colloc.search.optimum import Optimum
 from colloc.search.prescribed import prescribed_answer
@@ -38,14 +38,11 @@ from colloc.system.interruption import heeded
 
 REDUCED, FULL = "reduced", "full"
 SEARCHES = (REDUCED, FULL)
-_CONTENDERS, _REFINED = 3, 0.01
-"""Gaits of a kind that are solved for at most, until a certificate holds; what their values may lose on a refined mesh, as a
-share."""
-_SADDLES = 3
-"""Saddles left one after another."""
-_DRIER, _SMALL = 2, 2.0
-"""Times that delta is lowered beyond what was asked, where a gait is so small that friction is viscous: at most so many times
-the bound on the shape speed."""
+_TRIES = 3
+"""Gaits of a kind that are solved for at most, until a certificate holds; saddles left one after another; and deltas tried
+where a gait is so small that friction is viscous."""
+_SMALL = 2.0
+"""A gait is small up to so many times the bound on the shape speed."""
 _EXPLORING = 0.6
 """The share of the time allowed that is spent on starts; the rest is for the answer."""
 _ROUGHLY = 1e-3
@@ -150,9 +147,9 @@ def _tried(optima: Sequence[Optimum], counts: Callable[[Certified], bool]) -> li
     """Certified answers, best first: the next one where one does not count, or lost more on its refined mesh than the next one
     is behind."""
     tried: list[Certified] = []
-    for optimum in optima[:_CONTENDERS]:
+    for optimum in optima[:_TRIES]:
         best = max((each.answer.value for each in tried if counts(each)), default=-np.inf)
-        if optimum.value - _REFINED * abs(optimum.value) < best:
+        if optimum.value - CLOSE * abs(optimum.value) < best:
             break
         tried.append(finished(optimum))
         this_run().answers.append((tried[-1].answer, tried[-1].certificate))
@@ -165,7 +162,7 @@ def finished(optimum: Optimum) -> Certified:
     Where it turns out to be a saddle, the search goes on below it; where it is so small that friction is viscous, at a smaller
     delta: what is slow enough for a large gait is not for a small one.
     """
-    for _ in range(_DRIER + 1):
+    for _ in range(_TRIES):
         found = certified(confirmed(optimum))
         if not _is_small_and_viscous(found):
             break
@@ -177,7 +174,7 @@ def confirmed(optimum: Optimum) -> Answer:
     """An optimum through the stages to the answer, which has no certificate yet."""
     optimum = refine(descend(optimum))
     answer = confirm(optimum)
-    for _ in range(_SADDLES):
+    for _ in range(_TRIES):
         if not answer.second_order.smallest + answer.second_order.error < -SADDLE:
             break
         below = below_saddle(optimum)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -84,12 +85,16 @@ def test_starts_that_are_no_members_yet_are_not_compared_with_others(monkeypatch
     ids=["one", "none leads on", "one leads on", "two do", "three times what was asked for"],
 )
 def test_the_search_goes_on_while_one_of_the_last_eight_led_on(monkeypatch, count, better, tried):
-    def follow(space, v, number, deltas, known):
+    numbers = itertools.count()
+
+    def follow(space, v, deltas, known):
+        number = next(numbers)
         if number in better:
             found = SimpleNamespace(objective=-better[number], gait=ellipse(0, 1.0, 0.5), delta=1.0)
             known[-1].append(explore.Candidate(found))
 
     monkeypatch.setattr(explore, "_follow", follow)
+    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     found, number = candidates(Problem("hops", gait=Harmonic(1, "bilateral")), count, lambda: True)
     assert number == tried
@@ -100,18 +105,19 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
     """New starts and hops take turns, and what a hop begins from depends on what came before alone."""
     begun = {}
 
-    def follow(space, v, number, deltas, known):
+    def follow(space, v, deltas, known):
+        number = len(begun)
         begun[number] = (v, len(deltas))
         found = SimpleNamespace(objective=-1.0 if number == 0 else -2.0, gait=ellipse(0, 1.0, 0.1 * number), delta=1.0)
         known[-1].append(explore.Candidate(found))
 
     monkeypatch.setattr(explore, "_follow", follow)
+    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     problem = Problem("turns", gait=Harmonic(1, "bilateral"))
     candidates(problem, 18, lambda: True)
     fewer, begun = begun, {}
     candidates(problem, 40, lambda: True)
-    del begun[-1], fewer[-1]  # small loops
     assert [deltas for _, deltas in begun.values()] == [2] * 16 + [1] * 16 + [2] * 8
     assert len(fewer) == 18
     for number, (v, deltas) in fewer.items():
@@ -121,14 +127,13 @@ def test_more_starts_go_wherever_fewer_do(monkeypatch):
 
 @pytest.mark.parametrize(("asked", "tried"), [(None, 8), (32, 32)], ids=["by default", "as many as were asked for"])
 def test_the_search_ends_once_eight_starts_have_met_the_best_gait_unless_more_are_asked_for(monkeypatch, asked, tried):
-    def follow(space, v, number, deltas, known):
-        if number < 0:
-            return
+    def follow(space, v, deltas, known):
         if not known[-1]:
             known[-1].append(explore.Candidate(SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0)))
-        known[-1][0].joined(number)
+        known[-1][0].joined()
 
     monkeypatch.setattr(explore, "_follow", follow)
+    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
     assert candidates(Problem("same", gait=Harmonic(1, "bilateral")), asked, lambda: True)[1] == tried
 
