@@ -19,10 +19,11 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.harmonic import Fourier, ellipse
 from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, seed_class
+from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
+from colloc.mechanics.chain import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.spaces import space_about, space_near
@@ -46,6 +47,9 @@ _TURN, _HOP_SIZES = 16, (0.2, 0.4, 0.8)
 """Starts and hops from the best gait known take turns of so many, and how far hops go [rad], in turn. At 0.2 a hop mostly falls
 back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start k is depends on
 what came before alone: more starts go wherever fewer do."""
+_KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
+"""The two best ellipses of three equal links under isotropic friction: without them one harmonic of other bodies is missed at
+times, as that of `problems/purcell.py`."""
 
 
 @dataclass(eq=False)
@@ -144,12 +148,13 @@ def explore(problem: Problem, starts: int | None = None, goes_on: Callable[[], b
 
 
 def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
-    """The guess, waves both ways, then seeded Latin hypercubes without end."""
+    """The guess, gaits known from three links, waves both ways, then seeded Latin hypercubes without end."""
     body, limit = problem.body, problem.joint_limit
+    known = [over_links(ellipse(*numbers), Chain(), body, limit) for numbers in _KNOWN]
     waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
     own = seed_class(problem)
-    first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in waves)]
-    # waves and seeds take turns: neither are always better
+    first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in (*known, *waves))]
+    # known gaits and seeds take turns: neither are always better
     seeds = map(partial(latin_hypercube_gait, problem, seed), itertools.count())
     return itertools.chain(itertools.chain.from_iterable(zip(first, seeds, strict=False)), seeds)
 

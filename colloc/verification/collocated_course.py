@@ -74,18 +74,25 @@ def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact:
     spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))
     if not own.held.all():
         spent = np.nan * spent
-    theta, x, y, work = np.diff(exact.at(mesh.edges), axis=1)
+    at_edges = exact.at(mesh.edges)
+    theta, x, y, work = np.diff(at_edges, axis=1)
     length, periods = path_lengths(gait, mesh.edges[:-1], mesh.edges[1:], 4), 1.0 / problem.gait.fraction
-    rotation, displacement, energy = pose.rotations - theta, np.diff(pose.place) - (x + 1j * y), spent - work
+    rotation, energy, way = pose.rotations - theta, spent - work, np.diff(pose.place)
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()))
     found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()))
+    displacement = way - (x + 1j * y)
+    if "theta" not in kind.states:
+        # an error of rotation turns everything after it, and by half of it the direction that counts
+        place = (at_edges[1] - at_edges[1, 0]) + 1j * (at_edges[2] - at_edges[2, 0])
+        turned_back = np.exp(1j * (at_edges[0, :-1] - at_edges[0, 0] - pose.theta[:-1]))
+        displacement = way * turned_back - (x + 1j * y) + 1j * rotation * (0.5 * place[-1] - place[1:])
     period = kind.counted(true) | {"length": periods * float(length.sum()), "driven_work": np.nan}
     other = kind.counted(found) | {"length": periods * float(run.sum()), "driven_work": np.nan}
     aims, value = problem.objective.shares(period), np.zeros(mesh.n)
     for name, share in kind.shares(true).items():
-        grown = (np.conj(share.side) * displacement).real + share.rotation * rotation + share.work * energy
-        value = value + aims.get(name, 0.0) * grown
-    value = value + aims["length"] * periods * (run - length)
+        turns = rotation if name == "rotation" else 0.0
+        value += aims.get(name, 0.0) * ((np.conj(share.side) * displacement).real + turns + share.work * energy)
+    value += aims["length"] * periods * (run - length)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     return Defects(
         rotation,

@@ -136,7 +136,7 @@ def test_a_start_that_turns_the_body_does_not_collapse_onto_a_retraced_gait():
 
 def test_a_level_that_goes_nowhere_is_no_success(monkeypatch):
     # with a threshold above every efficiency each level counts as going nowhere
-    monkeypatch.setattr(certify, "TRIVIAL_EFFICIENCY", 2.0)
+    monkeypatch.setattr(certify, "NOWHERE", 2.0)
     solution = solve(problem(), 1)
     assert is_trivial(solution.answer)
     assert solution.status != SOLVED
