@@ -17,6 +17,7 @@ from colloc.laws.elliptic import Elliptic as Elliptic
 from colloc.laws.viscous import Viscous as Viscous
 from colloc.laws.power_law import PowerLaw as PowerLaw
 from colloc.laws.own_law import OwnLaw as OwnLaw
+from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
 from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
