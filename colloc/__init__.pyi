@@ -25,6 +25,7 @@ from colloc.gaits.relaxed import Relaxed as Relaxed
 from colloc.studies.calls import solve as solve, multistart as multistart, Starts as Starts, sweep as sweep
 from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.pareto import pareto_front as pareto_front
+from colloc.studies.steering import steer as steer
 from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
 from colloc.search.evaluate import evaluate as evaluate
