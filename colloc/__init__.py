@@ -47,6 +47,7 @@ bind(
         "robot": "colloc.results.robot:Robot",
         "plot_robot": "colloc.pictures.robot_figure:robot_figure",
         "export": "colloc.pictures.export:write_export",
+        "plot_steering": "colloc.pictures.steering_figure:steering_figure",
         "plot_front": "colloc.pictures.front_figure:front_figure",
     }
 )

@@ -17,6 +17,7 @@ from colloc.laws.elliptic import Elliptic as Elliptic
 from colloc.laws.viscous import Viscous as Viscous
 from colloc.laws.power_law import PowerLaw as PowerLaw
 from colloc.laws.own_law import OwnLaw as OwnLaw
+from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
 from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
@@ -24,6 +25,7 @@ from colloc.gaits.relaxed import Relaxed as Relaxed
 from colloc.studies.calls import solve as solve, multistart as multistart, Starts as Starts, sweep as sweep
 from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.pareto import pareto_front as pareto_front
+from colloc.studies.steering import steer as steer
 from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
 from colloc.search.evaluate import evaluate as evaluate

@@ -13,7 +13,7 @@ VALUES = {
     "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon",
     "PotentialSpace",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
-    "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
+    "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",
 }
 MUTABLE = {
     "Archive", "Candidate", "CellState", "Group", "Journal", "PathGeometry", "Run", "Solution", "State", "_Heard",
@@ -45,5 +45,5 @@ def test_only_what_is_under_way_can_be_changed():
 
 def test_classes_are_printed_by_their_fields_or_a_method_of_their_own():
     """Gaits by that of all gaits."""
-    gaits = {"ArcPath", "Corners", "Fourier", "Phases", "PointedSeries"}
+    gaits = {"ArcPath", "Corners", "Fourier", "Phases", "PointedSeries", "SerpenoidSeries"}
     assert {c.__name__ for c in data_classes() if not c.__dataclass_params__.repr} == gaits

@@ -154,7 +154,7 @@ def test_what_is_bound_late_exists():
     assert colloc
     assert all(callable(late_binding.bound(name)) for name in late_binding._WHERE)
     users = {name for name, path in modules().items() if "late_binding import bound" in path.read_text(encoding="utf-8")}
-    assert users == {"results.solution", "results.robot", "studies.pareto"}
+    assert users == {"results.solution", "results.robot", "studies.pareto", "studies.steering"}
 
 
 def test_the_page_names_what_exists_and_fits_a_screen():

@@ -23,6 +23,7 @@ from scipy import sparse
 
 from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
+from colloc.gaits.gait_fields import AnyClass
 from colloc.gaits.objective import QUANTITIES, Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import Slope, checked_chain
@@ -122,6 +123,13 @@ def mean_square(weights: ca.DM) -> LocalFunction:
     """The quadratic form ``p' weights p`` of gait parameters."""
     p = ca.SX.sym("p", weights.shape[0])
     return local_function("mean_square", p, ca.SX(0, 1), ca.SX.sym("delta"), ca.bilin(weights, p, p))
+
+
+def member_equations(gait: AnyClass, n_joint: int) -> LocalFunction:
+    """Fourier coefficients less those that the own parameters of a class give (`colloc.gaits.serpenoid`): 0 of members."""
+    p = ca.SX.sym("p", gait.size(n_joint))
+    given = ca.vertcat(*(value for row in gait.coefficients(p, n_joint) for value in row))
+    return local_function("members", p, ca.SX(0, 1), ca.SX.sym("delta"), p[gait.n_own :] - given)
 
 
 def path_pace(n_joint: int) -> LocalFunction:

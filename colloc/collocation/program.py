@@ -79,7 +79,7 @@ class GaitProgram:
         """
         gait = self.member(parameters)
         mesh, given = self.phase_mesh(gait), {}
-        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks), strict=True):
+        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks, self.problem.joint_limit), strict=True):
             given[check.name] = np.vstack([self.placed(times, mesh), held_shares(check, gait, times)])
         blocks = zip(self.names, self.assembly.blocks, strict=True)
         return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]

@@ -9,7 +9,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from colloc.gaits.limits import Limit
+from colloc.gaits.limits import Limit, range_of
 from colloc.mechanics.bodies import Body, Pairs, Stretch
 from colloc.mechanics.contact import Contact, tangent_of_minimum
 from colloc.numerics.constraint_rows import Group, block_group
@@ -44,7 +44,16 @@ class ShapeCheck:
     def bounds(self, limit: Limit) -> tuple[float, float]:
         """The least and the largest value allowed, for a limit on the body's angles, or one on each."""
         own = limit[self.place] if isinstance(limit, tuple) else limit
-        return (-own, own) if self.is_angle else (-np.inf, 0.0)
+        return range_of(own) if self.is_angle else (-np.inf, 0.0)
+
+    def magnitudes(self, shapes: np.ndarray, limit: Limit) -> np.ndarray:
+        """What a bound from above is laid on, ``(n_time,)``: an angle is bounded both ways, by as much from their middle."""
+        values = self.along(shapes)
+        return np.abs(values - self.middle(limit)) if self.is_angle else values
+
+    def middle(self, limit: Limit) -> float:
+        """Of an angle's bounds; 0 of other checks."""
+        return 0.5 * sum(self.bounds(limit)) if self.is_angle else 0.0
 
     def itself(self, shapes: np.ndarray) -> np.ndarray:
         """The shares at which the cuts are the function itself at shapes ``(n_joint, n_time)``."""

@@ -28,6 +28,7 @@ from colloc.collocation.point_equations import (
     driven_point,
     gait_check,
     mean_square,
+    member_equations,
     objective_block,
     path_pace,
     period_rows,
@@ -107,6 +108,12 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
         across = across_point(problem.body, friction, problem.slope)
         parts = across, point_gather[: across.n_local], none
         besides["across"] = parts, zero_total_group("across", mesh, layout.n)
+    if not problem.gait.linear:
+        members = member_equations(problem.gait, n_joint)
+        besides["members"] = (
+            (members, layout.parameters, np.empty((0, 1))),
+            block_group("members", 0.0, 0.0, members.n_out, layout.n),
+        )
     blocks |= {name: parts for name, (parts, _) in besides.items()}
 
     rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS

@@ -30,9 +30,9 @@ _STEP, _LARGEST, _STEPS = 1e-3, 0.1, 4
 """Of Newton's method for a moving worst instant, as shares of its cell: between the samples, and the largest; and how many."""
 
 
-def worst_instants(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck]) -> list[np.ndarray]:
+def worst_instants(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) -> list[np.ndarray]:
     """For each check, the instant in every mesh cell where it comes closest to its bound, ``(n_interval,)``."""
-    return [_worst(gait, mesh, check, np.arange(mesh.n)) for check in checks]
+    return [_worst(gait, mesh, check, np.arange(mesh.n), limit) for check in checks]
 
 
 def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -44,26 +44,20 @@ def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) ->
     angles = gait.angles((mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel())
     found = []
     for check in checks:
-        highest = _magnitudes(check, angles).reshape(mesh.n, -1).max(axis=1) - check.bounds(limit)[1]
+        highest = check.magnitudes(angles, limit).reshape(mesh.n, -1).max(axis=1) - check.bounds(limit)[1] + check.middle(limit)
         around = np.pad(highest, 1, constant_values=-np.inf)
         peak = (highest >= around[:-2]) & (highest >= around[2:])
         cells = np.flatnonzero((highest > -_NEAR) | (peak & (highest > -_FAR)))
-        found.append((cells, _worst(gait, mesh, check, cells) if cells.size else np.empty(0)))
+        found.append((cells, _worst(gait, mesh, check, cells, limit) if cells.size else np.empty(0)))
     return found
 
 
-def _magnitudes(check: ShapeCheck, angles: np.ndarray) -> np.ndarray:
-    """What a bound from above is laid on, ``(n_time,)``: angles are bounded both ways."""
-    values = check.along(angles)
-    return np.abs(values) if check.is_angle else values
-
-
-def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray) -> np.ndarray:
+def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray, limit: Limit) -> np.ndarray:
     rows, fine = np.arange(cells.size), np.linspace(0.0, 1.0, _SAMPLES + 1)
     left, width = mesh.edges[cells], mesh.h[cells]
     for zoom in range(_ZOOMS + 1):
         times = left[:, None] + width[:, None] * fine
-        values = _magnitudes(check, gait.angles(times.ravel())).reshape(times.shape)
+        values = check.magnitudes(gait.angles(times.ravel()), limit).reshape(times.shape)
         best = np.argmax(values, axis=1)
         inner = np.clip(best, 1, _SAMPLES - 1)
         if zoom < _ZOOMS:
@@ -86,7 +80,7 @@ def moving(values: np.ndarray, check: ShapeCheck, limit: Limit, times: np.ndarra
 
 
 def followed(
-    check: ShapeCheck, shares: np.ndarray, gait: Gait, times: np.ndarray, left: np.ndarray, h: np.ndarray
+    check: ShapeCheck, shares: np.ndarray, gait: Gait, times: np.ndarray, left: np.ndarray, h: np.ndarray, limit: Limit
 ) -> np.ndarray:
     """The worst instants of a gait near those of another one, in the same cells and with the shares held, ``(n,)``.
 
@@ -97,7 +91,7 @@ def followed(
     def heights(t: np.ndarray) -> np.ndarray:
         return check.cut(gait.angles(np.concatenate([t - step, t, t + step])), held).full().reshape(3, -1)
 
-    sign = np.sign(heights(times)[1]) if check.is_angle else 1.0  # angles are bounded both ways
+    sign = np.sign(heights(times)[1] - check.middle(limit)) if check.is_angle else 1.0  # angles are bounded both ways
     for _ in range(_STEPS):
         before, here, after = sign * heights(times)
         bend = before - 2 * here + after

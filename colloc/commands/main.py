@@ -17,6 +17,7 @@ SUBCOMMANDS = {
     "open": ("open", "what an archive of starts holds; the whole result of one of them"),
     "sweep": ("sweep", "solve a study: a grid of problems, over processes or a cluster; resumable"),
     "pareto": ("pareto", "what two objectives cost each other: a front of certified gaits"),
+    "steer": ("steer", "certified gaits from sharp right to sharp left, in one file that a controller can interpolate"),
     "evaluate": ("evaluate", "what a gait of your own achieves: joint angles from a CSV file, replayed and certified"),
     "verify": ("verify", "check a result again by independent replay, without CasADi"),
     "compare": ("compare", "hold two results against each other"),

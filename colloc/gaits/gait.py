@@ -160,6 +160,8 @@ class ClassOfGaits:
     """Whether a planned mesh may move its knots a little, to be even."""
     without_cusps = False
     """Whether members come to rest nowhere, but for paths that are retraced."""
+    linear = True
+    """Whether angles of a class of series are linear in the parameters by which its members are searched."""
     of_arcs = False
     """Whether it has curvature, and arcs that meet."""
 

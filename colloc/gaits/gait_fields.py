@@ -18,6 +18,7 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.relaxed import Mixture, Relaxed
+from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.gaits.sloped import PointedSeries
 from colloc.laws.elliptic import Elliptic
 from colloc.laws.own_law import OwnLaw
@@ -40,8 +41,8 @@ AnyGait: TypeAlias = Any
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases, PointedSeries)
-CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed)
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases, PointedSeries, SerpenoidSeries)
+CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed, Serpenoid)
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 PARTS: tuple[type, ...] = (Foot, FeetLaw)

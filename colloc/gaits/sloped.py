@@ -159,7 +159,7 @@ def class_on(slope: Slope | None, gait_class: Any) -> Any:
     level = gait_class.level
     if slope is None:
         return level
-    if not isinstance(level, Harmonic):
+    if not (isinstance(level, Harmonic) and level.linear):
         raise ProblemError(f"on a slope gaits are sought in a class Harmonic, not {type(level).__name__}.")
     return _pointed(level)
 

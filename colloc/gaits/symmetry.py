@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.limits import range_of
 from colloc.system.errors import ProblemError
 
 NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")
@@ -73,6 +74,9 @@ def tangent_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndar
     return (unit if symmetry == ANTIPODAL else -unit), unit
 
 
+_ALIKE = {BILATERAL: "mirrored joints", ANTIPODAL: "to both sides", BOTH: "mirrored joints, and to both sides,"}
+
+
 def check_symmetric(problem: Any) -> None:
     """A `ProblemError` if the body of a problem has no gaits with the symmetry of its class, or its limits forbid them."""
     symmetry = problem.gait.symmetry
@@ -82,7 +86,12 @@ def check_symmetric(problem: Any) -> None:
             f"gaits of symmetry {symmetry} need a body whose lengths, weights and feet read the same from both ends; "
             f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
         )
-    for name in ("joint_limit", "torque_limit", "power_limit"):
+    if isinstance(problem.joint_limit, tuple):
+        ranges = [range_of(own) for own in problem.joint_limit]
+        opposite = [(-high, -low) for low, high in ranges]
+        if (BILATERAL in needed and ranges != opposite[::-1]) or (ANTIPODAL in needed and ranges != opposite):
+            raise ProblemError(f"gaits of symmetry {symmetry} bend {_ALIKE[symmetry]} alike: give them the same joint_limit.")
+    for name in ("torque_limit", "power_limit"):
         limit = getattr(problem, name)
         if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
             raise ProblemError(f"gaits of symmetry {symmetry} bend mirrored joints alike: give them the same {name}.")

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from colloc.gaits.limits import of_each
+from colloc.gaits.limits import of_each_angle
 from colloc.gaits.problem import Problem
 from colloc.mechanics.actuators import ActuatorLimits
 from colloc.reduced.actuator_slopes import share_slopes
@@ -93,7 +93,7 @@ def least_share_without_cusps(problem: Problem) -> float:
     limits, law = ActuatorLimits(torque=problem.actuator_limits.torque), problem.law
     if not (limits.names and problem.gait.without_cusps and problem.body.n_joint == 2 and law.reversible and law.degree == 0):
         return 0.0
-    each = (np.linspace(-most, most, _SHAPES) for most in of_each(problem.joint_limit, 2))
+    each = (np.linspace(-most, most, _SHAPES) for most in of_each_angle(problem.joint_limit, 2))
     shapes = np.stack(np.meshgrid(*each)).reshape(2, -1)
     turns = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     ways = _slowest_pace(problem) * np.stack([np.cos(turns), np.sin(turns)])
@@ -114,7 +114,7 @@ def _instants(problem: Problem, samples: np.ndarray) -> tuple[np.ndarray, np.nda
     """Angles and rates ``(n_joint, n)`` at the slowest pace of samples (y, direction) ``(2 n_joint, n)``: angles are ``limit
     sin y``, so that they need no bounds."""
     n = problem.body.n_joint
-    most = np.array(of_each(problem.joint_limit, n))[:, None]
+    most = np.array(of_each_angle(problem.joint_limit, n))[:, None]
     return most * np.sin(samples[:n]), _slowest_pace(problem) * samples[n:]
 
 
@@ -142,7 +142,7 @@ def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
     Variables are (y, direction, s); s is what all shares are below, in units of the first value.
     """
     n, limits, body, law = problem.body.n_joint, problem.actuator_limits, problem.body, problem.law
-    on_angles, on_rates = np.array(of_each(problem.joint_limit, n)), np.full(n, _slowest_pace(problem))
+    on_angles, on_rates = np.array(of_each_angle(problem.joint_limit, n)), np.full(n, _slowest_pace(problem))
 
     def room(x: np.ndarray) -> np.ndarray:
         return x[-1] - _shares(problem, limits, *_instants(problem, x[:-1, None]))[:, 0] / value

@@ -53,12 +53,12 @@ class _Nearest:
 def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> AnyGait:
     """A gait near a given one whose net rotation is as prescribed and that encloses the same area.
 
-    Where a symmetry closes the rotation or nothing prescribes it, and for gaits that are no Fourier series, it is the gait
-    itself; those are closed among the harmonics of the problem's class, or those its starts are drawn from, at delta in the
-    units of the class, by default the problem's. A start need not be perfect: where SQP does not come to rest in a few steps,
-    what it has found is returned.
+    Where a symmetry closes the rotation or nothing prescribes it, and for gaits that are no Fourier series or not linear in
+    their parameters, it is the gait itself; those are closed among the harmonics of the problem's class, or those its starts
+    are drawn from, at delta in the units of the class, by default the problem's. A start need not be perfect: where SQP does
+    not come to rest in a few steps, what it has found is returned.
     """
-    if problem.gait.symmetry != NONE or problem.rotation is None or not gait.is_series:
+    if problem.gait.symmetry != NONE or problem.rotation is None or not gait.is_series or not seed_class(problem).linear:
         return gait
     delta = problem.delta if delta is None else delta
     if problem.gait.unit_speed:

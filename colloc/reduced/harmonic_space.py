@@ -109,7 +109,7 @@ class HarmonicSpace:
                 cells = placed.cells[which]
                 at = placed.times[which], self.mesh.edges[cells], self.mesh.h[cells]
                 matrix = matrix.copy()
-                worst = followed(placed.check, placed.shares[which], gait, *at)
+                worst = followed(placed.check, placed.shares[which], gait, *at, self.problem.joint_limit)
                 matrix[which] = self.problem.gait.angle_matrix(worst, self.problem.body.n_joint)
             found.append(placed._replace(matrix=matrix))
         return found

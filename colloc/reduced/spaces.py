@@ -20,6 +20,7 @@ from colloc.gaits.polygon import Polygon
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Relaxed
+from colloc.gaits.serpenoid import Serpenoid
 from colloc.gaits.sloped import OnSlope
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
@@ -28,6 +29,7 @@ from colloc.reduced.harmonic_space import HarmonicSpace
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
+from colloc.reduced.serpenoid_space import SerpenoidSpace
 from colloc.reduced.sloped import SlopeSpace
 from colloc.system.errors import ProblemError
 
@@ -47,6 +49,7 @@ _LINEAR = Searched(
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
 _ON_SLOPE = Searched(_LINEAR.program, lambda problem, gait, edges, scheme, far: SlopeSpace(problem, edges, scheme, far))
+_SERPENOID = Searched(_LINEAR.program, lambda problem, gait, edges, scheme, far: SerpenoidSpace(problem, edges, scheme, far))
 _MIXED = Searched(
     transcribe_path,
     lambda problem, gait, edges, scheme, far: MixtureSpace(
@@ -58,6 +61,7 @@ SEARCHED: dict[type, Searched] = {
     Polygon: _ALONG_PATHS,
     OnSlope: _ON_SLOPE,
     Relaxed: _MIXED,
+    Serpenoid: _SERPENOID,
     Harmonic: _LINEAR,
     Prescribed: _LINEAR,
 }

@@ -70,8 +70,6 @@ class RigidMotion:
     >>> quarter = RigidMotion(np.pi / 2, 1.0 + 0.0j)
     >>> np.round(quarter.repeated(np.array([2, 4])).shift, 9) + 0.0
     array([1.+1.j, 0.+0.j])
-    >>> round(quarter.radius**2, 9)
-    0.5
     """
 
     rotation: float | np.ndarray
@@ -88,12 +86,6 @@ class RigidMotion:
         """Where points ``(2, ..., n)`` of the lab go."""
         x, y = turned(points, self.rotation)
         return np.stack([x + np.real(self.shift), y + np.imag(self.shift)])
-
-    @property
-    def radius(self) -> float:
-        """Of the circle on which the origin goes round when the motion is repeated; infinite where it goes straight."""
-        turn = 2 * abs(math.sin(0.5 * self.rotation))
-        return float(np.abs(self.shift)) / turn if turn else math.inf
 
 
 class Column(NamedTuple):

@@ -18,9 +18,10 @@ from colloc.mechanics.balance_results import Sliding
 from colloc.motion.slow_enough import slow_enough
 from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
+from colloc.results.arc import PHASES, Arc, arc
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.collocated_motion import CollocatedMotion
-from colloc.results.motion import SAMPLES, Column, RigidMotion, SampledMotion, motion_columns, motion_dataset, motion_frame
+from colloc.results.motion import SAMPLES, Column, SampledMotion, motion_columns, motion_dataset, motion_frame
 from colloc.results.relaxation import Relaxation
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
@@ -156,15 +157,17 @@ class Solution:
         return self.certificate.rotation if self.certificate.replayed else self.motion.rotation
 
     @property
-    def turning_radius(self) -> float:
-        """Of the circle on which the gait crawls [body lengths]; infinite where it is asked to crawl straight on.
-
-        Period after period the centre of mass comes to points of a circle, on chords of length `distance`, which `rotation`
-        turns. That is the centre of mass at phase 0: at another phase it goes round the same point at another distance.
-        """
+    def arc(self) -> Arc:
+        """Angle, radius and chord of a period, whatever phase it is begun at (`colloc.results.arc`); straight on if no turn is
+        asked for."""
         if self.problem.rotation == 0:
-            return math.inf
-        return RigidMotion(self.rotation, complex(self.measured.distance)).radius
+            return Arc(0.0, math.inf, self.distance)
+        return arc(self.rotation, self.motion.sample(PHASES).centre)
+
+    @property
+    def turning_radius(self) -> float:
+        """Of the circle about which the gait crawls [body lengths]; infinite where it is asked to crawl straight on."""
+        return self.arc.radius
 
     @property
     def turning(self) -> str:

@@ -67,6 +67,8 @@ REFUSED = {
     "robot": ["", "nope.h5 --length 1 --mass 1 --period 1", "good.h5", "good.h5 --length 1 --mass 1"]
     + [f"good.h5 --{words}" for words in ("length 0 --mass 1 --period 1", "length 1 --mass nan --period 1")]
     + [f"good.h5 --length 1 --mass 1 --period {words}" for words in ("-5", "1 --max-speed 0", "1 --max-torque 1 2 3")],
+    "steer": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
+    + [f"problem.py --{option}" for option in ("turn 200", "turn x", "turn nan", "starts 0", "output x.txt")],
     "pareto": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
     + [f"problem.py --{option}" for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")],
     "completion": ["--no-such", "x"],

@@ -104,7 +104,7 @@ def corner_peak(gait):
     """The check at the corner, the instant of its peak, and the peak's height, on a mesh of 40 intervals."""
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
     check = next(c for c in shape_checks(problem.body) if c.name.endswith("(left)"))
-    times = worst_instants(gait, problem_mesh(problem), [check])[0]
+    times = worst_instants(gait, problem_mesh(problem), [check], np.pi)[0]
     values = check_values(check, gait, times)
     return check, times[[np.argmax(values)]], values.max()
 

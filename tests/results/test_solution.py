@@ -15,6 +15,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.pictures.publication import panels
 from colloc.pictures.solution_figure import solution_figure
+from colloc.results.arc import arc
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.certify import certify
@@ -112,8 +113,17 @@ def test_a_gait_that_turns_moves_on_from_where_a_period_left_it(turning):
 def test_the_centre_of_mass_goes_round_a_circle_of_the_radius_that_is_stated(turning):
     ends = turning.sample(np.arange(60.0)).centre
     middle = _centre_of_circle(*ends[:, :3].T)
-    np.testing.assert_allclose(np.hypot(*(ends - middle[:, None])), turning.turning_radius, rtol=1e-7)
+    radii = np.hypot(*(ends - middle[:, None]))
+    np.testing.assert_allclose(radii, radii[0], rtol=1e-7)
     np.testing.assert_allclose(np.hypot(*np.diff(ends)), turning.distance, rtol=1e-6)
+    # from any phase the arc is the same, and of all phases together the centre of mass is where the arc says
+    t = np.linspace(0.0, 1.0, 2001)
+    for begin in (0.0, 0.1, 0.45, 0.83):
+        found = arc(turning.rotation, turning.sample(begin + t).centre)
+        np.testing.assert_allclose(found, turning.arc, rtol=1e-6)
+    assert turning.turning_radius == turning.arc.radius
+    assert turning.arc.chord == pytest.approx(2 * turning.arc.radius * np.sin(abs(turning.rotation) / 2), rel=1e-12)
+    assert np.ptp([np.hypot(*np.diff(turning.sample([begin, begin + 1.0]).centre)) for begin in (0.0, 0.45)]) > 1e-3
     assert f"turns {abs(np.degrees(turning.rotation)):.4g}°" in turning.turning
 
 

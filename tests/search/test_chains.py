@@ -126,7 +126,7 @@ def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
     first = tips_passing(np.array([-0.002, 0.0, 0.001]))
 
     def peak(gait):
-        times = worst_instants(gait, mesh, [check])[0]
+        times = worst_instants(gait, mesh, [check], np.pi)[0]
         values = check_values(check, gait, times)
         return times[[np.argmax(values)]], values.max()
 

@@ -1,0 +1,38 @@
+"""Serpenoid gaits as a search sees them: by their few own parameters, from which the Fourier coefficients follow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import Pairs
+from colloc.reduced.harmonic_space import HarmonicSpace
+
+
+class SerpenoidSpace(HarmonicSpace):
+    """Members of the class `colloc.gaits.serpenoid.Serpenoid` by their own parameters v; the chain rule to what a space of
+    series knows of their coefficients."""
+
+    def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
+        super().__init__(problem, edges, scheme, far)
+        self.n = problem.gait.n_own
+        self.lower, self.upper, self.own = self.lower[: self.n], self.upper[: self.n], self.own[: self.n]
+
+    def full_parameters(self, v: np.ndarray) -> np.ndarray:
+        return self.problem.gait.full(v, self.problem.body.n_joint)
+
+    def _slopes(self, v: np.ndarray) -> np.ndarray:
+        """Of the full parameters, ``(n_full, n)``."""
+        return np.vstack([np.eye(self.n), self.problem.gait.coefficient_slopes(v, self.problem.body.n_joint)])
+
+    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return super().at(self.full_parameters(v))
+
+    def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
+        return super().pulled_back(self.full_parameters(v), on_shape, on_pace) @ self._slopes(v)
+
+    def rows(self, v: np.ndarray) -> np.ndarray:
+        return super().rows(self.full_parameters(v))
+
+    def row_slopes(self, v: np.ndarray) -> np.ndarray:
+        return super().row_slopes(self.full_parameters(v)) @ self._slopes(v)

@@ -1,0 +1,140 @@
+"""Gaits that steer: the best of a problem for every turn of a period that is asked for, from sharp right to sharp left.
+
+The straight gait comes first, of the problem's own class. The others are sought in the class without symmetry, for no
+symmetric gait turns, each from its neighbour outwards. Joint angles between those of two neighbours turn by about as much as
+lies between, so that a controller can interpolate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import NONE
+from colloc.results.solution import Solution
+from colloc.search.explore import STARTS
+from colloc.search.solve import solve
+from colloc.system.arguments import is_number
+from colloc.system.errors import ProblemError
+from colloc.system.late_binding import bound
+
+_LARGEST = math.pi
+"""By more than half a turn a period the body could as well turn the other way."""
+
+
+@dataclass(frozen=True, eq=False)
+class Steering:
+    """A family of gaits, by the angle that a period turns.
+
+    Attributes
+    ----------
+    problem : Problem
+    turns : tuple of float
+        Counter-clockwise [rad], rising.
+    points : tuple of Solution
+        One for each, with a certificate of its own.
+    """
+
+    problem: Problem
+    turns: tuple[float, ...]
+    points: tuple[Solution, ...]
+
+    @property
+    def certified(self) -> bool:
+        """Whether every gait is."""
+        return all(point.success for point in self.points)
+
+    @property
+    def efficiency(self) -> np.ndarray:
+        """Chord of the arc of a period per work, of every gait: it does not depend on the phase it is begun at."""
+        return np.array([point.arc.chord / point.work for point in self.points])
+
+    def table(self, phases: int = 100) -> dict[str, Any]:
+        """What a controller needs, as plain numbers: the turns, their arcs, and joint angles at equal phases; between two
+        turns angles are interpolated linearly."""
+        t = np.arange(phases) / phases
+        arcs = [point.arc for point in self.points]
+        return {
+            "name": self.problem.name,
+            "turn_rad": list(self.turns),
+            "chord_body_lengths": [each.chord for each in arcs],
+            "radius_body_lengths": [each.radius if math.isfinite(each.radius) else None for each in arcs],
+            "work_per_period_weight_times_length": [point.work for point in self.points],
+            "status": [point.status for point in self.points],
+            "phase": t.tolist(),
+            f"{self.problem.body.coordinate}_angles_rad": [point.gait.angles(t).T.tolist() for point in self.points],
+        }
+
+    def plot(self) -> Any:
+        """Efficiency against the turn, and the tracks, as a matplotlib Figure."""
+        return bound("plot_steering")(self)
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)
+        verdict = "all certified" if self.certified else "NOT all certified"
+        return f"<Steering of {self.problem.name}: {told} degrees a period, {verdict}>"
+
+
+def steer(
+    problem: Problem,
+    turns: Sequence[float],
+    *,
+    starts: int = STARTS,
+    progress: Callable[[float, Solution], object] | None = None,
+) -> Steering:
+    """The best gaits of a problem for given turns of a period.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of gaits that go straight; its objective is that of all of them.
+    turns : sequence of float
+        Counter-clockwise [rad], less than half a turn; 0 need not be among them.
+    starts : int
+        From which the straight gait is the best.
+    progress : callable, optional
+        Called with a turn and its solution.
+
+    Raises
+    ------
+    ProblemError
+        If a turn cannot be asked for, or the straight gait is not certified.
+    NotConvergedError
+        If no start leads anywhere.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> colloc.steer(problem, [0.0, 0.1], starts=1)
+    <Steering of quick: +0, +5.73 degrees a period, all certified>
+    """
+    if not problem.gait.free or problem.slope is not None or problem.rotation != 0:
+        raise ProblemError("steering begins at a gait that is free and goes straight on the level: rotation 0, grade 0.")
+    if not len(turns) or not all(is_number(turn) and abs(turn) < _LARGEST for turn in turns):
+        raise ProblemError(f"turns must be angles of less than half a turn a period, not {list(turns)!r}.")
+    wanted = sorted({float(turn) for turn in turns})
+    found: dict[float, Solution] = {}
+
+    def put(turn: float, solution: Solution) -> Solution:
+        if solution.interrupted:
+            raise KeyboardInterrupt
+        found[turn] = solution
+        if progress is not None:
+            progress(turn, solution)
+        return solution
+
+    straight = put(0.0, solve(problem, starts))
+    if not straight.success:
+        raise ProblemError(f"the straight gait is not certified, so there is nothing to steer: {straight.message}")
+    wide = {"gait": replace(problem.gait, symmetry=NONE), "delta_start": problem.delta}
+    for side in ([turn for turn in wanted if turn > 0], [turn for turn in reversed(wanted) if turn < 0]):
+        near = straight
+        for turn in side:
+            near = put(turn, solve(problem.with_(rotation=turn, guess=near.gait, **wide), 1))
+    return Steering(problem, tuple(wanted), tuple(found[turn] for turn in wanted))

@@ -1,0 +1,90 @@
+"""Serpenoid gaits: a few numbers for any number of links, solved and certified like all gaits."""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, ProblemError, Serpenoid
+from colloc.collocation.warm_start import feasible_point
+from colloc.numerics.blocks import oracles
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near, transcribed
+from colloc.results.store import load, save
+from colloc.search.solve import solve
+
+FIVE = Chain((0.2,) * 5)
+SNAKE = Friction(mu_t=10, mu_f=1, mu_b=1)
+CLASSES = [Serpenoid(2, "none"), Serpenoid(2, "bilateral"), Serpenoid(3, "antipodal")]
+
+
+def moved(gait_class, seed=1):
+    """A space of the class, and parameters that are no wave of the usual guess."""
+    space, v = space_near(Problem("s", body=FIVE, friction=SNAKE, gait=gait_class), Problem("g", body=FIVE).guess)
+    return space, v + 0.05 * np.random.default_rng(seed).standard_normal(v.size)
+
+
+@pytest.mark.parametrize("gait_class", CLASSES, ids=str)
+def test_every_joint_does_what_the_one_behind_it_did_a_lag_before(gait_class):
+    space, v = moved(gait_class)
+    gait, t = space.member(v), np.linspace(0, 1, 7)
+    angles, earlier = gait.angles(t), gait.angles(t - gait.lag / (2 * np.pi))
+    np.testing.assert_allclose(angles[1:], earlier[:-1], atol=1e-13)
+
+
+@pytest.mark.parametrize("gait_class", CLASSES, ids=str)
+def test_a_member_has_its_parameters_whatever_phase_or_class_it_is_told_in(gait_class):
+    space, v = moved(gait_class)
+    gait = space.member(v)
+    np.testing.assert_allclose(gait_class.parameters(gait), v, atol=1e-14)
+    told = Fourier(gait.mean, gait.cos, gait.sin)  # which does not know its lag
+    np.testing.assert_allclose(gait_class.parameters(told), v, atol=1e-6)
+
+
+@pytest.mark.parametrize("gait_class", CLASSES, ids=str)
+def test_gradients_are_those_of_finite_differences(gait_class):
+    space, v = moved(gait_class)
+    program, h = ReducedProgram(space, 1e-2), 1e-6
+    gradient = program.gradient(v)  # first: balances asked for later begin at these
+    program.place_rows(v)
+    steps = h * np.eye(v.size)
+    numeric = [(program.objective(v + step) - program.objective(v - step)) / (2 * h) for step in steps]
+    np.testing.assert_allclose(gradient, numeric, atol=1e-8)
+    rows = np.transpose([(program.rows(v + step) - program.rows(v - step)) / (2 * h) for step in steps])
+    np.testing.assert_allclose(program.row_slopes(v), rows, atol=1e-7)
+
+
+@pytest.mark.parametrize("gait_class", CLASSES, ids=str)
+def test_the_full_program_says_what_the_search_does(gait_class):
+    """At a member all its equations hold, and the objectives agree; with another lag it is no member."""
+    space, v = moved(gait_class)
+    reduced, full = ReducedProgram(space, 1e-2), transcribed(space.problem)
+    x = feasible_point(full, space.full_parameters(v), 1e-2)
+    found = oracles(full.assembly)
+    p = found.parameter_vector(1e-2 / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]]))
+    assert float(found.options["grad_f"](x, p)[0]) == pytest.approx(reduced.objective(v), rel=1e-8)
+
+    def beyond():
+        return np.abs(np.array(found.options["jac_g"](x, p)[0]).ravel()[full.groups["members"]]).max()
+
+    assert beyond() < 1e-14
+    x[full.layout.parameters[0, 0]] += 0.1
+    assert beyond() > 1e-2
+
+
+def test_a_solved_one_is_certified_kept_and_no_better_than_all_harmonics(tmp_path):
+    problem = Problem("snake", body=FIVE, friction=SNAKE, gait=Serpenoid(symmetry="antipodal"))
+    found = solve(problem, starts=1)
+    assert found.success
+    whole = solve(problem.with_(gait=Harmonic(1, "antipodal"), guess=found.gait), starts=1)
+    assert found.efficiency < whole.efficiency
+    read = load(save(found, tmp_path / "snake.h5"))
+    assert read.problem.gait == problem.gait
+    assert read.gait.lag == found.gait.lag
+    assert "waves along the body" in str(read.gait)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"), [({"body": Chain((0.5, 0.5))}, "at least three links"), ({"grade": 0.1}, "Serpenoid")]
+)
+def test_what_has_no_serpenoid_gaits_is_refused(changes, words):
+    with pytest.raises(ProblemError, match=words):
+        Problem("none", **{"body": FIVE, "friction": SNAKE, "gait": Serpenoid(), **changes})

@@ -1,0 +1,71 @@
+"""Joints that bend farther to one side than to the other."""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, FreePath, Friction, Harmonic, Problem, ProblemError
+from colloc.gaits.limits import under_one_limit
+from colloc.results.store import load, save
+from colloc.search.solve import solve
+
+LAW = Friction(3, 1, 1)
+ONE_SIDED = ((-0.6, 1.5), (-1.5, 0.6))
+
+
+def problem(joint_limit, gait=None, **changes):
+    stated = {"friction": LAW, "gait": gait or Harmonic(1), "delta": 1e-3, "mesh_tolerance": 1e-4}
+    return Problem("ranges", joint_limit=joint_limit, **(stated | changes))
+
+
+@pytest.fixture(scope="module")
+def one_sided():
+    return solve(problem(ONE_SIDED, Harmonic(1, "bilateral")), starts=4)
+
+
+def test_the_answer_keeps_both_sides_and_uses_one(one_sided, tmp_path):
+    assert one_sided.success
+    first, second = one_sided.gait.angles(np.linspace(0, 1, 4001))
+    low, high = first.min(), first.max()
+    assert low == pytest.approx(-0.6, abs=1e-5)
+    assert high == pytest.approx(1.5, abs=1e-5)
+    assert second.max() < 0.6 + 1e-5
+    read = load(save(one_sided, tmp_path / "r.h5"))
+    assert read.problem.joint_limit == ONE_SIDED
+    assert read.problem.hash == one_sided.problem.hash
+
+
+def test_it_lies_between_what_the_narrow_and_the_wide_limit_allow(one_sided):
+    narrow, wide = (solve(problem(limit, Harmonic(1, "bilateral")), starts=4) for limit in (0.6, 1.5))
+    assert narrow.efficiency < one_sided.efficiency < wide.efficiency
+
+
+def test_mirrored_ranges_give_the_mirrored_gait(one_sided):
+    mirrored = solve(problem(tuple((-high, -low) for low, high in ONE_SIDED), Harmonic(1, "bilateral")), starts=4)
+    assert mirrored.efficiency == pytest.approx(one_sided.efficiency, rel=1e-6)
+
+
+def test_a_range_that_is_even_is_a_limit():
+    assert problem(((-1, 1), 2.0)).joint_limit == problem((1.0, 2.0)).joint_limit
+
+
+def test_shapes_are_held_against_one_limit_on_either_side():
+    stretched, limit = under_one_limit(np.array([[-0.6, 1.5, 0.75]]), ((-0.6, 1.5),))
+    assert limit == 1.5
+    np.testing.assert_allclose(stretched, [[-1.5, 1.5, 0.75]])
+
+
+@pytest.mark.parametrize(
+    ("limit", "gait", "words"),
+    [
+        (((0.2, 1.0), 1.0), Harmonic(1), "straight body"),
+        (((-30, 60), 1.0), Harmonic(1), "radians"),
+        (((-1, 1, 2), 1.0), Harmonic(1), "least and its largest"),
+        (((-1, 2),), Harmonic(1), "give one for all joints"),
+        (((-1, 2), (-1, 2)), Harmonic(1, "bilateral"), "mirrored joints"),
+        (((-1, 2), (-1, 2)), Harmonic(1, "antipodal"), "both sides"),
+        (ONE_SIDED, FreePath(4.0), "series"),
+    ],
+)
+def test_ranges_that_cannot_be_kept_are_refused(limit, gait, words):
+    with pytest.raises(ProblemError, match=words):
+        problem(limit, gait, body=Chain())

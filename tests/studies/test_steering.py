@@ -1,0 +1,62 @@
+"""Gaits that steer: certified at every turn, and between two of them a controller can interpolate."""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Friction, Harmonic, Problem, ProblemError, Serpenoid, replay, steer
+from colloc.gaits.harmonic import Fourier
+from colloc.pictures.steering_figure import steering_figure
+
+PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=Friction(4, 1, 1), delta=1e-2, mesh_tolerance=1e-4)
+TURNS = np.radians([0, 10, 20])
+
+
+@pytest.fixture(scope="module")
+def family():
+    return steer(PROBLEM, TURNS, starts=1)
+
+
+def test_every_gait_turns_by_what_is_asked_and_the_sharper_the_dearer(family):
+    assert family.certified
+    np.testing.assert_allclose([point.rotation for point in family.points], TURNS, atol=PROBLEM.mesh_tolerance)
+    assert (np.diff(family.efficiency) < 0).all()
+    assert family.points[0].problem.gait == PROBLEM.gait
+
+
+def test_half_way_between_two_turns_lies_about_half_of_the_turn(family):
+    first, second = (point.gait for point in family.points[1:])
+    between = Fourier(*((getattr(first, name) + getattr(second, name)) / 2 for name in ("mean", "cos", "sin")))
+    found = replay(PROBLEM.body, PROBLEM.law, between, PROBLEM.delta)
+    assert found.rotation == pytest.approx(TURNS[1:].mean(), rel=0.05)
+
+
+def test_the_table_holds_the_joint_angles_of_every_gait(family):
+    table = family.table(phases=8)
+    for angles, point in zip(table["joint_angles_rad"], family.points, strict=True):
+        np.testing.assert_array_equal(np.transpose(angles), point.gait.angles(np.arange(8) / 8))
+    assert table["radius_body_lengths"][0] is None
+
+
+def test_an_offset_turns_a_serpenoid_snake():
+    snake = Problem("s", body=Chain((0.2,) * 5), friction=Friction(10, 1, 1), gait=Serpenoid(symmetry="antipodal"), delta=1e-2)
+    family = steer(snake, [-0.2, 0.2], starts=1)
+    assert family.certified
+    right, left = (point.gait.mean[0] for point in family.points)
+    assert right * left < 0
+
+
+def test_the_figure_names_its_axes(family):
+    cost, floor = steering_figure(family).axes
+    assert "turn" in cost.get_xlabel()
+    assert floor.get_aspect() == 1
+
+
+@pytest.mark.parametrize("turns", [[], [4.0], [float("nan")]])
+def test_turns_that_cannot_be_asked_for_are_refused(turns):
+    with pytest.raises(ProblemError, match="half a turn"):
+        steer(PROBLEM, turns)
+
+
+def test_a_problem_that_turns_already_is_no_begin():
+    with pytest.raises(ProblemError, match="straight"):
+        steer(PROBLEM.with_(gait=Harmonic(1), rotation=0.1), [0.2])
