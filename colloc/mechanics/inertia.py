@@ -71,6 +71,22 @@ def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
     return 0.5 * namespace(link.vs).sum_rows(body.weight_column() * square)
 
 
+def inertial_moments(body: Chain, angles: np.ndarray, link: LinkVelocity, growth: LinkVelocity) -> np.ndarray:
+    """What the motors of the joints spend on changing how the links of a body of mass 1 move, ``(n_joint, n_time)``.
+
+    By virtual power: that of mass times acceleration while one joint turns alone and the tail rests. `growth` is what the
+    velocities `link`, in the axes of the links, change by in a unit of time; these axes turn.
+    """
+    mass, posture, still = body.weight_column(), body.posture(angles), np.zeros((3, angles.shape[1]))
+    along, across = growth.vs - link.w * link.vn, growth.vn + link.w * link.vs
+    spin = body.length_column() ** 2 / 12 * growth.w
+    moments = []
+    for unit in np.eye(body.n_joint):
+        turns = body.velocity(posture, np.repeat(unit[:, None], angles.shape[1], axis=1), still)
+        moments.append((mass * (along * turns.vs + across * turns.vn + spin * turns.w)).sum(axis=0))
+    return np.array(moments)
+
+
 def tail_velocity(body: Chain, angles: Array, rates: Array, states: Array) -> Array:
     """Tail velocity ``(3, n_time)`` of a chain with momenta `states`, ``(3, n_time)``."""
     posture = body.posture(angles)

@@ -18,8 +18,9 @@ import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
 from colloc.mechanics.bodies import FULL
-from colloc.mechanics.inertia import GRAVITY
+from colloc.mechanics.inertia import GRAVITY, checked_mass, inertial_moments, momenta, momentum_rates, tail_velocity
 from colloc.mechanics.law import rate_independent
+from colloc.mechanics.links import LinkVelocity
 from colloc.motion.slow_enough import inertial_loss
 from colloc.results.motion import Column, motion_dataset
 from colloc.results.solution import Solution
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
 
 SLOW_ENOUGH = 0.01
 """Part of the efficiency that inertia may take from a gait that is called slow."""
+_MOMENT = 1e-5
+"""Of a period, over which velocities of links are differentiated."""
+_PACE = 0.01
+"""Relative difference of the Froude numbers of a robot and of the gait, up to which it is played at the pace that it is for."""
 _INSTANTS, _A_SIDE = 2000, 8
 """Of a period at least, and of every side of a polygon."""
 
@@ -43,22 +48,37 @@ def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
     Raises
     ------
     ProblemError
-        If the body has no joints that forces on its parts would turn, it is on a slope, or played with inertia.
+        If the body has no joints that forces on its parts would turn or it is on a slope.
     """
     problem = solution.problem
     if FULL not in problem.body.formulations:
         raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
-    if problem.froude:
-        raise ProblemError(
-            f"{problem.name} is played with inertia: torques of joints that swing masses are not worked out yet."
-        )
     if problem.slope is not None:
         raise ProblemError(f"{problem.name} is on a slope: torques of joints that lift weight are not worked out.")
-    (angles, rates), near = solution.gait(t), solution.sample(t).z
+    (angles, rates), z, delta = solution.gait(t), solution.sample(t).z, solution.delta_per_period
     at = problem.law, angles, rates
-    z = problem.body.solve(*at, solution.delta_per_period, start=near).z
-    delta = solution.delta_per_period
-    return np.asarray(joint_moments(problem.body, at[0], angles, problem.body.forces(*at, z, delta), delta))
+    if not problem.froude:
+        z = problem.body.solve(*at, delta, start=z).z
+    friction = np.asarray(joint_moments(problem.body, at[0], angles, problem.body.forces(*at, z, delta), delta))
+    return friction + _of_inertia(solution, t, z) if problem.froude else friction
+
+
+def _of_inertia(solution: Solution, t: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Torques of the motors that change how the links move, at phases with tail velocities z."""
+    problem, (angles, rates) = solution.problem, solution.gait(t)
+    body, froude = checked_mass(problem.body), problem.froude
+    link = body.velocity(body.posture(angles), rates, z)
+    states = momenta(body, body.posture(angles), link)
+    grows = momentum_rates(body, problem.law, angles, rates, states, delta=solution.delta_per_period, froude=froude).rates
+
+    def later(by: float) -> LinkVelocity:
+        then, pace = solution.gait(t + by)
+        return body.velocity(body.posture(then), pace, tail_velocity(body, then, pace, states + by * grows))
+
+    growth = LinkVelocity(
+        *((after - before) / (2 * _MOMENT) for before, after in zip(later(-_MOMENT), later(_MOMENT), strict=True))
+    )
+    return froude * inertial_moments(body, angles, link, growth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +102,8 @@ class Robot:
     Raises
     ------
     ProblemError
-        If a number is not positive, the body has no joints, it is on a slope or played with inertia, or `max_speed` or
-        `max_torque` is given where torques depend on the pace.
+        If a number is not positive, the body has no joints, it is on a slope, the gait is for another pace, or
+        `max_speed` or `max_torque` is given where torques depend on the pace.
 
     Examples
     --------
@@ -105,13 +125,19 @@ class Robot:
     def __post_init__(self) -> None:
         check_finite(positive=True, **{name: getattr(self, name) for name in ("length", "mass", "period", "gravity")})
         problem, n = self.solution.problem, self.solution.gait.n_joint
+        if problem.froude and abs(self.froude / problem.froude - 1.0) > _PACE:
+            needed = math.sqrt(self.length / (self.gravity * problem.froude))
+            raise ProblemError(
+                f"{problem.name} is the best gait for the Froude number {problem.froude:.4g}: a robot of {self.length:g} m has "
+                f"to take {needed:.4g} s a period, not {self.period:g}: solve again with froude={self.froude:.4g}."
+            )
         for name, unit in (("max_speed", "speed"), ("max_torque", "torque")):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, one_each(getattr(self, name), n, f"joint {unit} limit"))
-                if not rate_independent(problem.law):
+                if problem.froude or not rate_independent(problem.law):
                     raise ProblemError(
-                        f"{name} asks for another pace, and torques depend on it under {problem.law.label}: leave it "
-                        "out, or solve again with the coefficients in units of that period."
+                        f"{name} asks for another pace, and torques depend on it, as {problem.paced_by}: leave it out, or "
+                        "solve again for that pace."
                     )
 
     @property
@@ -188,6 +214,8 @@ class Robot:
         solution, problem = self.solution, self.solution.problem
         at = problem.body, problem.law, solution.gait, solution.answer.delta_per_period
         found: dict[str, Any] = {}
+        if problem.froude:
+            return {"played_slowly": solution.played_slowly}
         with suppress(NotConvergedError):
             found["inertia_takes"] = inertial_loss(*at, self.froude, breaks=solution.gait.corner_phases)
         with suppress(NotConvergedError):
@@ -252,6 +280,9 @@ class Robot:
                 f"Torques depend on the pace under {problem.law.label}: its coefficients are taken to be those in units "
                 "of this period."
             )
+        if problem.froude:
+            slowly = f"{problem.objective.short} {f['played_slowly']:.4g} instead of {self.solution.measured.value:.4g}"
+            return [*said, f"Torques and power include inertia; played slowly the gait would have {slowly}."]
         pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
         lost, slow = f.get("inertia_takes"), f.get("slow_enough_period_s")
         if lost is None:

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 import colloc
 from colloc.commands.main import main
 from colloc.pictures.report_page import report_page
+from colloc.results.robot import joint_torques
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
 POINTS = 400
@@ -182,3 +183,46 @@ def test_what_inertia_takes_is_told_although_no_pace_is_slow_enough(three_link, 
     facts = three_link.robot(**SIZE).facts
     assert facts["inertia_takes"] == robot.facts["inertia_takes"]
     assert "slow_enough_period_s" not in facts
+
+
+@pytest.fixture(scope="module")
+def fast():
+    stated = colloc.Problem(
+        "fast", gait=colloc.Harmonic(1, "antipodal"), guess=colloc.ellipse(A0=0, A1=2.3, B1=1.3), froude=0.05
+    )
+    return colloc.solve(stated.with_(delta=1e-2), starts=1)
+
+
+def test_torques_with_inertia_do_the_work_of_friction_and_swing_the_masses(fast):
+    """Over a period the first; at every instant of their power what is left goes into kinetic energy, here of dense points."""
+    step, t = 1e-4, np.linspace(0.0, 1.0, 401)[:-1]
+    power = (joint_torques(fast, t) * fast.gait(t)[1]).sum(axis=0)
+    assert power.mean() == pytest.approx(fast.work, rel=1e-4)
+
+    def energy(t):
+        def points(t):
+            moved = fast.sample(t)
+            heading = np.cumsum(np.vstack([moved.theta, moved.angles]), axis=0)
+            links = np.exp(1j * heading) / 3
+            ends = np.cumsum(np.vstack([moved.tail[0] + 1j * moved.tail[1], links]), axis=0)
+            return ends[:-1, :, None] + links[:, :, None] * (np.arange(POINTS) + 0.5) / POINTS
+
+        velocity = (points(t + step) - points(t - step)) / (2 * step)
+        return 0.5 * (np.abs(velocity) ** 2).mean(axis=(0, 2))
+
+    growth = 0.05 * (energy(t + 2 * step) - energy(t - 2 * step)) / (4 * step)
+    spent = fast.power(fast.sample(t))
+    np.testing.assert_allclose(power, spent + growth, atol=0.01 * np.abs(power).max())
+    assert np.abs(growth).max() > 0.1 * np.abs(power).max()
+
+
+def test_a_gait_for_a_pace_is_for_robots_of_that_pace(fast):
+    period = (1.0 / (9.81 * 0.05)) ** 0.5
+    facts = fast.robot(length=1.0, mass=2.0, period=period).facts
+    assert facts["work_per_period_J"] == pytest.approx(2.0 * 9.81 * fast.work)
+    assert facts["played_slowly"] > fast.efficiency
+    assert "include inertia" in str(fast.robot(length=1.0, mass=2.0, period=period))
+    with pytest.raises(colloc.ProblemError, match=f"take {period:.4g} s a period, not 5"):
+        fast.robot(length=1.0, mass=2.0, period=5.0)
+    with pytest.raises(colloc.ProblemError, match="max_torque asks for another pace"):
+        fast.robot(length=1.0, mass=2.0, period=period, max_torque=1.0)
