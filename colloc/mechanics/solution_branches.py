@@ -73,7 +73,12 @@ def all_balanced_velocities(
     part, known = moving.at(doubtful), Branches(z[:, :, doubtful], sign[:, doubtful])
     more = _solved(part, _between_and_beside(part, known.z))
     z, sign = (np.concatenate(pair) for pair in zip(known, more, strict=True))
-    return _merged(found, doubtful, _distinct(z, sign, _speed(part.rates)))
+    found = _merged(found, doubtful, _distinct(z, sign, _speed(part.rates)))
+    missed = np.flatnonzero(found.number == 0)
+    if not missed.size:
+        return found
+    part = moving.at(missed)  # the long way, which hardly ever has to be gone
+    return _merged(found, missed, _distinct(*_solved(part, np.zeros((1, 3, missed.size)), "auto"), _speed(part.rates)))
 
 
 def _speed(rates: np.ndarray) -> np.ndarray:

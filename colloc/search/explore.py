@@ -224,7 +224,7 @@ def _best(optima: Sequence[Optimum]) -> Optimum | None:
 
 def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
     """The Fourier series of a gait with every coefficient moved by chance: where the next hop from basin to basin lands."""
-    own, rng = seed_class(problem), np.random.default_rng(number)
+    own, rng = seed_class(problem), np.random.default_rng([1, number])
     series = fourier_through(gait, own)
     size = _HOP_SIZES[number % len(_HOP_SIZES)]
     falling = size / np.arange(1, series.cos.shape[1] + 1)

@@ -90,7 +90,7 @@ def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
 def _drawn_shapes(problem: Problem) -> np.ndarray:
     """Admissible shapes ``(n_joint, n)`` about which a gait of the class may run, without repetition."""
     body, own, n_joint = problem.body, seed_class(problem), problem.body.n_joint
-    drawn = np.random.default_rng(0).choice(_LEVELS, (_DRAWN, n_joint)) * widest(problem.joint_limit)
+    drawn = np.random.default_rng(2).choice(_LEVELS, (_DRAWN, n_joint)) * widest(problem.joint_limit)
     none = np.zeros((n_joint, own.harmonics))
     means = np.array([own.fourier(own.parameters(Fourier(mean, none, none)), n_joint).mean for mean in drawn])
     # of a shape and its mirror image, the one whose first bend is to the left

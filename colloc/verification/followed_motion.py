@@ -16,6 +16,7 @@ import numpy as np
 from colloc.mechanics.balance_results import Branches
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.system.errors import NotConvergedError
 
 FORWARDS, BACKWARDS = 1, -1
 
@@ -56,6 +57,8 @@ def followed_motion(
     found = body.all_velocities(friction, angles, rates, delta)
     if found is None:
         return None
+    if not found.number.all():
+        raise NotConvergedError(f"no velocity that balances the body was found at {(found.number == 0).sum()} instants.")
     apart = np.zeros((3, angles.shape[1]))
     several = np.flatnonzero(found.number > 1)
     if not several.size:
