@@ -19,7 +19,7 @@ from colloc.search.run import this_run
 
 FACTOR = 0.2
 """Of one delta to the one before."""
-_STEPS = (0.1, 0.03, 0.01)
+_STEPS = (0.1, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
 _GAIN = 1e-7
 """The part of the objective that leaving a saddle has to gain."""
