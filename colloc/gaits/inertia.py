@@ -24,7 +24,7 @@ def check_paced(problem: Any) -> None:
         raise ProblemError("on a slope inertia is not known yet: leave froude or grade out.")
     if not problem.gait.free:
         raise ProblemError("a prescribed motion is played with inertia by colloc.inertial_motion: leave froude out.")
-    if problem.gait.symmetry not in (NONE, ANTIPODAL):
+    if not problem.gait.unit_speed and problem.gait.symmetry not in (NONE, ANTIPODAL):
         raise ProblemError(
             f"gaits of symmetry {problem.gait.symmetry} run backwards in half of their period, as nothing with inertia does: "
             f"take symmetry {ANTIPODAL!r} or {NONE!r}."

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
+from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -23,6 +23,7 @@ from colloc.mechanics.law import Law
 from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError
+from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.replay import Path
 
 _ROUGH = 1e-4
@@ -35,7 +36,8 @@ _CLOSED = 10.0
 """Gap between the momenta at start and end that is left open, over the error of a run."""
 _MOST_PERIODS = 30
 _ONE_SIDED = 1e-12
-_NO_OTHERS = dict.fromkeys(QUANTITIES, np.nan)
+_PIECES = 400
+"""In which the length of the path is summed up."""
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 
@@ -52,6 +54,8 @@ class InertialMotion:
         period.
     distance_error, work_error, rotation_error : float
         How much they change where every step may err ten times as much.
+    length : float
+        Of the path in shape space [rad].
     multipliers : (3,)
         By what small changes of the momenta are multiplied in a period (Floquet multipliers); stable if all are within 1.
     phases, states : (n,), (7, n)
@@ -66,6 +70,7 @@ class InertialMotion:
     distance_error: float
     work_error: float
     rotation_error: float
+    length: float
     multipliers: np.ndarray = field(repr=False)
     phases: np.ndarray = field(repr=False)
     states: np.ndarray = field(repr=False)
@@ -76,9 +81,9 @@ class InertialMotion:
         return self.distance / self.work
 
     def error_of(self, objective: Objective) -> float:
-        """Relative error of an objective of distance, work and rotation."""
+        """Relative error of an objective of distance, work, rotation and length."""
         errors = {"distance": self.distance_error, "work": self.work_error, "rotation": self.rotation_error}
-        return float(objective.relative_error(_NO_OTHERS | vars(self), errors))
+        return float(objective.relative_error(vars(self) | {"driven_work": np.nan}, errors))
 
     @property
     def error(self) -> float:
@@ -205,7 +210,7 @@ def inertial_motion(
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
     objective : Objective
-        Of distance, work and rotation.
+        Of distance, work, rotation and length.
 
     Raises
     ------
@@ -226,6 +231,7 @@ def inertial_motion(
     chain, at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
     played = GaitWithInertia(chain, friction, gait, delta, froude=float(froude), breaks=at)
     start, slopes = played.closed(played.slow_momenta())
+    length = float(path_lengths(gait, np.zeros(1), np.ones(1), _PIECES)[0])
     aim, before = _FIRST * tolerance, None
     while aim >= _LEAST:
         phases, states, _ = played.settled(start, aim, slopes)
@@ -234,7 +240,10 @@ def inertial_motion(
         now = {"distance": float(np.hypot(*states[_PLACE, -1])), "work": work, "rotation": rotation}
         if before is not None:
             errors = {f"{name}_error": abs(now[name] - before[name]) for name in now}
-            found = InertialMotion(froude, **now, **errors, multipliers=np.linalg.eigvals(slopes), phases=phases, states=states)
+            multipliers = np.linalg.eigvals(slopes)
+            found = InertialMotion(
+                froude, **now, **errors, length=length, multipliers=multipliers, phases=phases, states=states
+            )
             if found.error_of(objective) <= tolerance:
                 return found
         aim, before = _TENTH * aim, now

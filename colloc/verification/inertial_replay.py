@@ -12,7 +12,8 @@ from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.inertial_motion import inertial_motion
 from colloc.verification.replay import Path, Replay
 
-_PIECES = 400, 200
+_ROUGHER = 200
+"""Pieces of the path, half as many as its length is summed up in."""
 
 
 def inertial_replay(
@@ -37,13 +38,13 @@ def inertial_replay(
     (angles, rates), chain = gait(phases), checked_inertia(body, gait)
     z = tail_velocity(chain, angles, rates, ran.states[:3])
     energy = froude * kinetic_energy(chain, angles, rates, z)[0]
-    length, rougher = (float(path_lengths(gait, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
+    rougher = float(path_lengths(gait, np.zeros(1), np.ones(1), _ROUGHER)[0])
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     return Replay(
         distance=ran.distance,
         work=ran.work,
         rotation=ran.rotation,
-        length=length,
+        length=ran.length,
         driven_work=np.nan,
         lever=float(np.hypot(x - gx, y - gy).max()),
         actuator_work=ran.work + float(energy[-1] - energy[0]),
@@ -52,7 +53,7 @@ def inertial_replay(
         distance_error=ran.distance_error,
         work_error=ran.work_error,
         rotation_error=ran.rotation_error,
-        length_error=abs(length - rougher),
+        length_error=abs(ran.length - rougher),
         driven_work_error=0.0,
         several=0.0,
         other_distance=0.0,

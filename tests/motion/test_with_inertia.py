@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import colloc
+from colloc.gaits.objective import objective_from
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 
@@ -114,3 +115,11 @@ def test_bodies_of_other_kinds_find_a_certified_gait(fields):
     found = colloc.solve(colloc.Problem("paced", **fields), starts=8)
     assert found.status == "solved", found.message
     assert found.efficiency > 0.03
+
+
+def test_objectives_of_the_length_of_the_path_are_replayed():
+    path = program(problem())[0].space.member(program(problem())[1])
+    played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), path, 1e-2, 0.1, tolerance=1e-4)
+    t = np.arange(4000) / 4000
+    assert played.length == pytest.approx(np.linalg.norm(path.rates(t), axis=0).mean(), rel=1e-6)
+    assert 0 < played.error_of(objective_from("speed")) < 1e-3
