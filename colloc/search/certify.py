@@ -35,6 +35,7 @@ SADDLE, FLAT = 1e-2, 1e-4
 """Curvatures of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
 5e-5, what the mesh may be wrong by; less than FLAT is called flat."""
 
+_BALANCED = "net force and torque at all replayed instants", "what a period changes of the momenta"
 _FINE_PHASES = 20000
 TRIVIAL_ROTATION = 1e-3
 """Rotation a period [rad] from which a gait that goes nowhere turns."""
@@ -222,7 +223,7 @@ def _motion(
     beyond = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     checks = [
-        Check("balance in replay", fine.residual, RESIDUAL, "net force and torque at all replayed instants"),
+        Check("balance in replay", fine.residual, RESIDUAL, _BALANCED[bool(problem.froude)]),
         Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, f"{body.quantity}s after one period [rad]"),
         *_rotation(problem, fine),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
@@ -237,7 +238,7 @@ def _motion(
     if claimed is not None:
         gap = _beyond(claimed / fine.value - 1, fine.ambiguity)
         checks.append(Check("replay gap", gap, GAP, "collocated over replayed efficiency, less 1"))
-    spent = "friction" if problem.slope is None else "friction and climb"
+    spent = "friction and kinetic energy" if problem.froude else "friction" if problem.slope is None else "friction and climb"
     return [
         *checks,
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
@@ -289,7 +290,9 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
     if problem.slope is not None:
         meaning = "part of the period at which several motions are balanced; what they would change is not measured"
         return Check("one motion", fine.several, SEVERAL, meaning)
-    if problem.law.associated:
+    if problem.froude:
+        meaning = "relative; between the motions that follow from slow motion and from rest"
+    elif problem.law.associated:
         meaning = "relative; the law leaves one balanced motion"
     elif not problem.body.looks_for_all_velocities:
         meaning = "relative; other balanced motions of a smooth body are not looked for"

@@ -1,6 +1,11 @@
-"""A replay with inertia: what a certificate asks of a gait that is played at some pace."""
+"""A replay with inertia: what a certificate asks of a gait that is played at some pace.
+
+What a body comes to that sets out from rest is looked at, too: if it is another motion, the gait has several.
+"""
 
 from __future__ import annotations
+
+from contextlib import suppress
 
 import numpy as np
 
@@ -8,10 +13,13 @@ from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_velocity
 from colloc.mechanics.law import Law
+from colloc.system.errors import NotConvergedError
 from colloc.verification.adaptive_motion import path_lengths
-from colloc.verification.inertial_motion import inertial_motion
+from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion
 from colloc.verification.replay import Path, Replay
 
+_APART = 1e-2
+"""Momenta [body lengths per period] by which motions differ that are not one."""
 _ROUGHER = 200
 """Pieces of the path, half as many as its length is summed up in."""
 
@@ -31,11 +39,17 @@ def inertial_replay(
     """A period of a gait with inertia (`colloc.verification.inertial_motion`), as of `colloc.verification.replay.replay`.
 
     Of the result the residual is the change of the momenta in a period; the work of the joints is that against friction and
-    what the body gains in kinetic energy. Other motions that repeat themselves are not looked for.
+    what the body gains in kinetic energy.
     """
     ran = inertial_motion(body, friction, gait, delta, froude, tolerance=tolerance, breaks=breaks, objective=objective)
     phases = ran.phases % 1.0
     (angles, rates), chain = gait(phases), checked_inertia(body, gait)
+    played = GaitWithInertia(chain, friction, gait, delta, froude=froude, breaks=tuple(sorted(float(t) for t in breaks)))
+    from_rest = ran.states[:3, 0]
+    with suppress(NotConvergedError):  # Newton's method need not lead to any from there
+        from_rest = played.closed(np.zeros(3))[0]
+    several = float(np.abs(from_rest - ran.states[:3, 0]).max() > _APART)
+    other = played.run(from_rest, tolerance).states[:, -1] if several else ran.states[:, -1]
     z = tail_velocity(chain, angles, rates, ran.states[:3])
     energy = froude * kinetic_energy(chain, angles, rates, z)[0]
     rougher = float(path_lengths(gait, np.zeros(1), np.ones(1), _ROUGHER)[0])
@@ -55,10 +69,10 @@ def inertial_replay(
         rotation_error=ran.rotation_error,
         length_error=abs(ran.length - rougher),
         driven_work_error=0.0,
-        several=0.0,
-        other_distance=0.0,
-        other_work=0.0,
-        other_rotation=0.0,
+        several=several,
+        other_distance=several * abs(float(np.hypot(*other[4:6])) - ran.distance),
+        other_work=several * abs(float(other[6]) - ran.work),
+        other_rotation=several * abs(float(other[3]) - ran.rotation),
         shares=np.empty(0),
         instants=ran.phases.size,
         tail=(phases, z),
