@@ -164,7 +164,18 @@ def test_the_page_names_what_exists_and_fits_a_screen():
 
 
 COLLOCATED = re.compile(r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b")
-ADAPTIVE = ("replay", "panels", "adaptive_motion", "followed_motion", "gait_on_slope", "slope", "slope_replay", "heading_map")
+ADAPTIVE = (
+    "replay",
+    "panels",
+    "adaptive_motion",
+    "followed_motion",
+    "gait_on_slope",
+    "slope",
+    "slope_replay",
+    "heading_map",
+    "inertial_motion",
+    "inertial_replay",
+)
 
 
 def test_what_checks_a_motion_shares_no_mesh_and_no_program_with_what_found_it():

@@ -80,12 +80,13 @@ def moving(values: np.ndarray, check: ShapeCheck, limit: Limit, times: np.ndarra
 
 
 def followed(
-    check: ShapeCheck, shares: np.ndarray, gait: Gait, times: np.ndarray, left: np.ndarray, h: np.ndarray, limit: Limit
+    check: ShapeCheck, shares: np.ndarray, gait: Gait, times: np.ndarray, *, cells: tuple[np.ndarray, np.ndarray], limit: Limit
 ) -> np.ndarray:
     """The worst instants of a gait near those of another one, in the same cells and with the shares held, ``(n,)``.
 
-    By Newton's method on the check along the gait. Cells begin at `left` and are `h` wide.
+    By Newton's method on the check along the gait. `cells`: where they begin and how wide they are, ``(n,)`` each.
     """
+    left, h = cells
     step, held = _STEP * h, np.tile(shares, 3)[None]
 
     def heights(t: np.ndarray) -> np.ndarray:

@@ -262,15 +262,6 @@ class Problem:
         return "" if self.slope is None else self.slope.describe()
 
     @property
-    def gone_wrong(self) -> str:
-        """What may be wrong where a gait has no motion, in words, and what to try."""
-        if self.froude:
-            return "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
-        if self.slope is None:
-            return "no velocity balances the body; give another guess"
-        return "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
-
-    @property
     def paced_by(self) -> str:
         """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
         if self.power_limit is not None:

@@ -106,16 +106,18 @@ def momentum_rates(
 
 def about_centre(body: Chain, angles: Array, force: Array) -> Array:
     """Force and moment about the centre of mass, from force and torque about the tail, ``(3, n_time)`` both."""
-    x, y = body.centre_of_mass(body.posture(angles))
-    fx, fy, about_tail = force[0:1, :], force[1:2, :], force[2:3, :]
-    return namespace(angles, force).stack([fx, fy, about_tail - (x * fy - y * fx)])
+    return namespace(angles, force).stack([force[0:2, :], force[2:3, :] - _lever(body, angles, force)])
 
 
 def about_tail(body: Chain, angles: Array, force: Array) -> Array:
     """Force and torque about the tail, from force and moment about the centre of mass, ``(3, n_time)`` both."""
+    return namespace(angles, force).stack([force[0:2, :], force[2:3, :] + _lever(body, angles, force)])
+
+
+def _lever(body: Chain, angles: Array, force: Array) -> Array:
+    """Torque about the tail of a force at the centre of mass, ``(1, n_time)``."""
     x, y = body.centre_of_mass(body.posture(angles))
-    fx, fy, moment = force[0:1, :], force[1:2, :], force[2:3, :]
-    return namespace(angles, force).stack([fx, fy, moment + (x * fy - y * fx)])
+    return x * force[1:2, :] - y * force[0:1, :]
 
 
 def turning(z: Array, states: Array) -> Array:

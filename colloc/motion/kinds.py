@@ -101,6 +101,8 @@ class Kind(Protocol):
     """Those of them whose begin a gait says, in its last parameters; a period closes the others."""
     periods: float
     """A whole period over the part that is solved."""
+    lack: str
+    """What may be wrong where a gait has no motion, and what to try."""
     bends: bool
     """Whether it matters what the sum of all joint angles changes by over that part; else `Passed.bend` may be 0."""
 
@@ -138,6 +140,7 @@ class SlowOnLevel:
 
     states: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
+    lack: str = "no velocity balances the body; give another guess"
 
     def __init__(self, body: Body, friction: Law, symmetry: str) -> None:
         self.body, self.friction, self._symmetry = body, friction, symmetry
@@ -189,6 +192,7 @@ class SlowOnSlope:
 
     states: tuple[str, ...] = ("theta",)
     told: tuple[str, ...] = ("theta",)
+    lack: str = "friction does not hold the body on the slope all the way, or its joints brake; take a gentler one"
     periods: float = 1.0
     bends: bool = False
 
@@ -251,6 +255,7 @@ class WithInertia(SlowOnLevel):
     `colloc.mechanics.inertia`, in the axes of the tail link, so that it does not matter where the body points."""
 
     states: tuple[str, ...] = STATES
+    lack: str = "no period with inertia was found that repeats itself; give another guess, or a smaller froude"
 
     def __init__(self, body: Chain, friction: Law, symmetry: str, froude: float) -> None:
         super().__init__(body, friction, symmetry)

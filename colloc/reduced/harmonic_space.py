@@ -107,9 +107,9 @@ class HarmonicSpace:
             which, matrix = placed.moving, placed.matrix
             if which.size:
                 cells = placed.cells[which]
-                at = placed.times[which], self.mesh.edges[cells], self.mesh.h[cells]
-                matrix = matrix.copy()
-                worst = followed(placed.check, placed.shares[which], gait, *at, self.problem.joint_limit)
+                where, matrix = (self.mesh.edges[cells], self.mesh.h[cells]), matrix.copy()
+                at = placed.check, placed.shares[which], gait, placed.times[which]
+                worst = followed(*at, cells=where, limit=self.problem.joint_limit)
                 matrix[which] = self.problem.gait.angle_matrix(worst, self.problem.body.n_joint)
             found.append(placed._replace(matrix=matrix))
         return found

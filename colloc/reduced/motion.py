@@ -63,7 +63,7 @@ class ReducedMotion:
 
     def __init__(self, kind: Kind, mesh: Mesh, shapes: Shapes, besides: Sequence[str] = ()) -> None:
         self.body, self.friction, self.shapes, self.mesh = kind.body, kind.friction, shapes, mesh
-        self._kind, self._besides, self._weight = kind, besides, stage_weights(mesh)
+        self.kind, self._besides, self._weight = kind, besides, stage_weights(mesh)
         self._last: _State | None = None
         self._near: tuple[_State, np.ndarray] | None = None
         self.solves = 0
@@ -74,27 +74,27 @@ class ReducedMotion:
         if last is not None and last.delta == delta and np.array_equal(last.v, v):
             return last
         angles, rates, pace = self.shapes.at(v)
-        begin = v[v.size - len(self._kind.told) :]
-        along = self._kind.along(self.mesh, Moving(angles, rates, delta), begin, self._start(angles, rates, begin))
+        begin = v[v.size - len(self.kind.told) :]
+        along = self.kind.along(self.mesh, Moving(angles, rates, delta), begin, self._start(angles, rates, begin))
         self.solves += 1
         now, mesh = along.now, self.mesh
         out = np.vstack([now.z[OMEGA], now.centre, now.power])
         out[:, ~along.held] = np.nan
         omega, cx, cy, power = (out * pace).reshape(4, -1, mesh.n_point).sum(axis=1)
-        first = first_theta(self._kind, begin)
+        first = first_theta(self.kind, begin)
         pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]), first)
         work = float((self._weight * power[mesh.points]).sum())
-        bend = self._bend(rates, pace) if self._kind.bends else 0.0
+        bend = self._bend(rates, pace) if self.kind.bends else 0.0
         passed = Passed(complex(pose.place[-1]), float(pose.theta[-1]) - first, bend, work)
         found = _State(v.copy(), delta, angles, rates, pace, along, out, pose, passed)
-        if not self._kind.states or along.held.all():  # a search goes on from states that there are
+        if not self.kind.states or along.held.all():  # a search goes on from states that there are
             self._last = found
         return found
 
     def _start(self, angles: np.ndarray, rates: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """States to start from, those of the last gait, and tail velocities: those of the last gait differentiated, moved along
         their slopes."""
-        if self._near is None or self._kind.states:
+        if self._near is None or self.kind.states:
             last = self._last
             if last is None:
                 return None, None
@@ -114,9 +114,9 @@ class ReducedMotion:
         """What a period comes to, as the kind of motion counts it, and, if asked for, the length of the path and the driven
         work; NaN where there is no motion."""
         s = self.at(v, delta)
-        found = self._kind.counted(s.passed)
+        found = self.kind.counted(s.passed)
         for name in self._besides:
-            found[name] = self._kind.periods * float((self._density(name, s)[0] * s.pace) @ self._on_columns(s))
+            found[name] = self.kind.periods * float((self._density(name, s)[0] * s.pace) @ self._on_columns(s))
         return found
 
     def _density(self, name: str, s: _State) -> tuple[np.ndarray, np.ndarray]:
@@ -136,7 +136,7 @@ class ReducedMotion:
 
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
-        s, mesh, kind = self.at(v, delta), self.mesh, self._kind
+        s, mesh, kind = self.at(v, delta), self.mesh, self.kind
         slopes, on_states = kind.slopes(Moving(s.angles, s.rates, delta), s.along)
         self._near = (s, slopes)
         shares = kind.shares(s.passed)

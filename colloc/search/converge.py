@@ -208,7 +208,7 @@ def _rested(
 ) -> tuple[Rested, ReducedProgram]:
     program = ReducedProgram(space, delta)
     if np.isnan(program.objective(v)):
-        raise NotConvergedError(f"there is no motion to begin with: {space.problem.gone_wrong}.")
+        raise NotConvergedError(f"there is no motion to begin with: {program.motion.kind.lack}.")
     return at_rest(program, v, radius, effort, curvature), program
 
 

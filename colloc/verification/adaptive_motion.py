@@ -60,12 +60,22 @@ def rates_at(
     return Rates(now.z.reshape(3, *t.shape), *(row.reshape(t.shape) for row in rows))
 
 
+_PIECES = 400, 200
+"""Of a whole path, in which its length is summed up, and once more for the error."""
+
+
 def path_lengths(gait: Any, left: np.ndarray, right: np.ndarray, pieces: int) -> np.ndarray:
     """Length of the path over intervals, ``(n,)``, by Gauss quadrature on so many pieces of each."""
     h = (right - left) / pieces
     starts = left[:, None] + h[:, None] * np.arange(pieces)
     t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
     return h * (np.linalg.norm(gait.rates(t.ravel()), axis=0).reshape(t.shape) @ PANEL_RULE.b).sum(axis=1)
+
+
+def whole_length(gait: Any) -> tuple[float, float]:
+    """Length of the path over a period [rad], and its error."""
+    length, rougher = (float(path_lengths(gait, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
+    return length, abs(length - rougher)
 
 
 Increments = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]

@@ -58,7 +58,8 @@ def followed_motion(
     if found is None:
         return None
     if not found.number.all():
-        raise NotConvergedError(f"no velocity that balances the body was found at {(found.number == 0).sum()} instants.")
+        lost = int((found.number == 0).sum())
+        raise NotConvergedError(f"no velocity that balances the body was found at {lost} of {found.number.size} instants.")
     apart = np.zeros((3, angles.shape[1]))
     several = np.flatnonzero(found.number > 1)
     if not several.size:

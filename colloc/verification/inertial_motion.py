@@ -23,7 +23,7 @@ from colloc.mechanics.law import Law
 from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError
-from colloc.verification.adaptive_motion import path_lengths
+from colloc.verification.adaptive_motion import whole_length
 from colloc.verification.replay import Path
 
 _ROUGH = 1e-4
@@ -36,8 +36,6 @@ _CLOSED = 10.0
 """Gap between the momenta at start and end that is left open, over the error of a run."""
 _MOST_PERIODS = 30
 _ONE_SIDED = 1e-12
-_PIECES = 400
-"""In which the length of the path is summed up."""
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 
@@ -54,7 +52,7 @@ class InertialMotion:
         period.
     distance_error, work_error, rotation_error : float
         How much they change where every step may err ten times as much.
-    length : float
+    length, length_error : float
         Of the path in shape space [rad].
     multipliers : (3,)
         By what small changes of the momenta are multiplied in a period (Floquet multipliers); stable if all are within 1.
@@ -71,6 +69,7 @@ class InertialMotion:
     work_error: float
     rotation_error: float
     length: float
+    length_error: float
     multipliers: np.ndarray = field(repr=False)
     phases: np.ndarray = field(repr=False)
     states: np.ndarray = field(repr=False)
@@ -82,7 +81,7 @@ class InertialMotion:
 
     def error_of(self, objective: Objective) -> float:
         """Relative error of an objective of distance, work, rotation and length."""
-        errors = {"distance": self.distance_error, "work": self.work_error, "rotation": self.rotation_error}
+        errors = {name: getattr(self, f"{name}_error") for name in ("distance", "work", "rotation", "length")}
         return float(objective.relative_error(vars(self) | {"driven_work": np.nan}, errors))
 
     @property
@@ -231,7 +230,7 @@ def inertial_motion(
     chain, at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
     played = GaitWithInertia(chain, friction, gait, delta, froude=float(froude), breaks=at)
     start, slopes = played.closed(played.slow_momenta())
-    length = float(path_lengths(gait, np.zeros(1), np.ones(1), _PIECES)[0])
+    length, length_error = whole_length(gait)
     aim, before = _FIRST * tolerance, None
     while aim >= _LEAST:
         phases, states, _ = played.settled(start, aim, slopes)
@@ -241,9 +240,8 @@ def inertial_motion(
         if before is not None:
             errors = {f"{name}_error": abs(now[name] - before[name]) for name in now}
             multipliers = np.linalg.eigvals(slopes)
-            found = InertialMotion(
-                froude, **now, **errors, length=length, multipliers=multipliers, phases=phases, states=states
-            )
+            path = {"length": length, "length_error": length_error}
+            found = InertialMotion(froude, **now, **errors, **path, multipliers=multipliers, phases=phases, states=states)
             if found.error_of(objective) <= tolerance:
                 return found
         aim, before = _TENTH * aim, now

@@ -14,14 +14,11 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.inertia import checked_inertia, kinetic_energy, tail_velocity
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
-from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion
 from colloc.verification.replay import Path, Replay
 
 _APART = 1e-2
 """Momenta [body lengths per period] by which motions differ that are not one."""
-_ROUGHER = 200
-"""Pieces of the path, half as many as its length is summed up in."""
 
 
 def inertial_replay(
@@ -52,7 +49,6 @@ def inertial_replay(
     other = played.run(from_rest, tolerance).states[:, -1] if several else ran.states[:, -1]
     z = tail_velocity(chain, angles, rates, ran.states[:3])
     energy = froude * kinetic_energy(chain, angles, rates, z)[0]
-    rougher = float(path_lengths(gait, np.zeros(1), np.ones(1), _ROUGHER)[0])
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     return Replay(
         distance=ran.distance,
@@ -67,7 +63,7 @@ def inertial_replay(
         distance_error=ran.distance_error,
         work_error=ran.work_error,
         rotation_error=ran.rotation_error,
-        length_error=abs(ran.length - rougher),
+        length_error=ran.length_error,
         driven_work_error=0.0,
         several=several,
         other_distance=several * abs(float(np.hypot(*other[4:6])) - ran.distance),

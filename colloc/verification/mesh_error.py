@@ -23,7 +23,7 @@ from colloc.motion.heading import heading
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, path_lengths, rates_at
+from colloc.verification.adaptive_motion import FineMotion, Rates, fine_motion, path_lengths, rates_at, whole_length
 from colloc.verification.collocated_course import course, course_defects
 
 FINER = 0.05
@@ -31,7 +31,6 @@ FINER = 0.05
 _OF_WAY = 0.1
 """The way of a motion with states is usually no less: its error over a relative one."""
 _SAMPLES = 32
-_LENGTH_PIECES = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +103,7 @@ def _whole_length(problem: Problem, gait: AnyGait) -> float:
     """Length of the path over a period [rad]; 1 where nobody asks for it."""
     if not problem.uses("length"):
         return 1.0
-    return gait.length if problem.gait.unit_speed else float(path_lengths(gait, np.zeros(1), np.ones(1), _LENGTH_PIECES)[0])
+    return gait.length if problem.gait.unit_speed else whole_length(gait)[0]
 
 
 def mesh_error(

@@ -17,7 +17,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
 from colloc.system.errors import NotConvergedError
-from colloc.verification.adaptive_motion import path_lengths
+from colloc.verification.adaptive_motion import whole_length
 from colloc.verification.gait_on_slope import SlopeMotion
 from colloc.verification.replay import Replay
 from colloc.verification.slope import gait_on_slope
@@ -26,7 +26,6 @@ _FIRST, _TENTH, _LEAST = 0.1, 0.1, 1e-12
 """Error of the first run over the relative one that is asked for, of each next over the last, and the smallest tried."""
 _LONGEST = 4.0
 """Longest step, in instants of a uniform grid."""
-_PIECES = 400, 200
 
 
 def slope_replay(
@@ -49,7 +48,7 @@ def slope_replay(
     instant, or rounding hides the accuracy that is asked for.
     """
     on, aim = gait_on_slope(body, friction, gait, delta, slope.grade, breaks), _FIRST * tolerance
-    length, rougher = (float(path_lengths(gait, np.zeros(1), np.ones(1), pieces)[0]) for pieces in _PIECES)
+    length, length_error = whole_length(gait)
 
     def run(aim: float) -> tuple[SlopeMotion, complex, dict[str, float]]:
         ran = on.run(0.0, gait.theta, 1, aim, _LONGEST / instants)
@@ -84,7 +83,7 @@ def slope_replay(
         distance_error=errors["distance"],
         work_error=errors["work"],
         rotation_error=errors["rotation"],
-        length_error=abs(length - rougher),
+        length_error=length_error,
         driven_work_error=0.0,
         several=on.several(ran),
         other_distance=0.0,

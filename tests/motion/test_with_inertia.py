@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import colloc
+from colloc.bounds.optimality_gap import gap_line
+from colloc.commands.summary import summary_lines
 from colloc.gaits.objective import objective_from
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
@@ -123,3 +125,21 @@ def test_objectives_of_the_length_of_the_path_are_replayed():
     t = np.arange(4000) / 4000
     assert played.length == pytest.approx(np.linalg.norm(path.rates(t), axis=0).mean(), rel=1e-6)
     assert 0 < played.error_of(objective_from("speed")) < 1e-3
+
+
+def test_a_gait_that_is_given_is_evaluated_at_its_pace():
+    stated = colloc.Problem("paced", froude=0.1, delta=1e-2)
+    found = colloc.evaluate(stated, ROUND)
+    played = colloc.inertial_motion(stated.body, stated.law, ROUND, 1e-2, 0.1)
+    assert found.success
+    assert found.efficiency == pytest.approx(played.efficiency, rel=1e-4)
+    told = "\n".join(summary_lines(found, None, verbose=True))
+    assert "played at the Froude number 0.1" in told
+    slowly = colloc.replay(stated.body, stated.law, ROUND, 1e-2).efficiency
+    assert f"played slowly   {slowly:.4f}" in told
+
+
+def test_bounds_of_slow_gaits_are_not_told_of_fast_ones():
+    fast = colloc.Problem("paced", froude=0.1)
+    assert gap_line(fast, 0.1, None) == "  no upper bound on the efficiency is known"
+    assert "1/min(mu)" in gap_line(fast.with_(froude=0.0), 0.1, None)

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Fourier
+from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.mechanics.balance_results import Branches
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.chain_motion import chain_motion
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.system.errors import NotConvergedError
 from colloc.verification.followed_motion import BACKWARDS, FORWARDS, followed_motion
 from colloc.verification.replay import replay
 
@@ -96,3 +98,18 @@ def test_a_period_that_is_open_at_its_ends_is_followed_around_them():
     assert shifted.several == pytest.approx(first.several, rel=0.02)
     assert shifted.work == pytest.approx(first.work, rel=1e-4)
     assert shifted.rotation == pytest.approx(first.rotation, rel=1e-3)
+
+
+def test_an_instant_without_any_balance_is_said_to_have_none():
+    """Not followed, nor an error of NumPy's."""
+
+    class Lost(Chain):
+        def all_velocities(self, friction, angles, rates, delta):
+            found = super().all_velocities(friction, angles, rates, delta)
+            z, sign = found.z.copy(), found.sign.copy()
+            z[:, :, 3], sign[:, 3] = np.nan, 0.0
+            return Branches(z, sign)
+
+    angles, rates = ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 20))
+    with pytest.raises(NotConvergedError, match="at 1 of 20 instants"):
+        followed_motion(Lost(), Friction(1.0, 0.01, 100.0), angles, rates, 1e-4)
