@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from benchmarks.reference import balanced_velocity
+from colloc.gaits.harmonic import ellipse
+from colloc.mechanics import solution_branches
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -110,3 +112,15 @@ def test_numpy_finds_the_same_as_the_compiled_solver():
     with numpy_instead():
         found = all_balanced_velocities(Chain(), Friction(1, 0.01, 100), angles, rates, 1e-4)
     np.testing.assert_allclose(np.sort(found.z, axis=0), np.sort(compiled.z, axis=0), atol=1e-7)
+
+
+def test_where_no_start_at_rest_leads_to_a_balance_the_long_way_is_gone(monkeypatch):
+    def direct_fails(moving, starts, method="direct"):
+        z, sign = solved(moving, starts, method)
+        return z, sign if method == "auto" else 0.0 * sign
+
+    solved, at = solution_branches._solved, ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 5))
+    friction = Friction(1.0, 0.5, 2.0)
+    monkeypatch.setattr(solution_branches, "_solved", direct_fails)
+    found = all_balanced_velocities(Chain(), friction, *at, 1e-2)
+    np.testing.assert_allclose(found.z[0], solve_balance(Chain(), friction, *at, 1e-2).z, atol=1e-9)

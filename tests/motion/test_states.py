@@ -144,3 +144,11 @@ def test_newtons_method_solves_linear_equations_in_one_step(k, free):
 
     assert CollocatedStates(mesh, np.full(k, free)).solved(rates, np.full(k, 0.7))[2]
     assert len(asked) == 2
+
+
+def test_where_states_grow_beyond_all_numbers_no_motion_is_found_and_none_is_warned_of():
+    """Fourteenfold in each of 300 intervals."""
+    mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, 301))
+    growth, equations = 3.46 * mesh.n, CollocatedStates(mesh, free=np.ones(1, dtype=bool))
+    slope = np.full((1, 1, mesh.n_point), growth)
+    assert not equations.solved(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))[2]

@@ -7,8 +7,16 @@ import colloc
 from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
 from colloc.gaits.objective import objective_from
+from colloc.mechanics.inertia import kinetic_energy
+from colloc.motion.kinds import WithInertia
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
+from colloc.search.converge import converged
+from colloc.search.optimum import ROUGH
+from colloc.search.small_starts import small_loops
+from colloc.verification.inertial_motion import GaitWithInertia
+from colloc.verification.inertial_replay import inertial_replay
+from colloc.verification.mesh_error import mesh_error
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 ROUND = colloc.ellipse(A0=0, A1=2.5, B1=1.3)
@@ -79,6 +87,7 @@ def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_f
     stated = colloc.Problem("paced", gait=colloc.Harmonic(1, "antipodal"), froude=0.1, delta=1e-2, guess=ROUND)
     found = colloc.solve(stated, starts=1)
     assert found.status == "solved", found.message
+    assert found.answer.program == stated.formulation, "IPOPT confirms it on the full program"
     slow = colloc.solve(stated.with_(froude=0.0), starts=1)
     played = colloc.inertial_motion(stated.body, stated.law, slow.gait, 1e-2, 0.1)
     assert found.efficiency > 1.2 * played.efficiency
@@ -143,3 +152,55 @@ def test_bounds_of_slow_gaits_are_not_told_of_fast_ones():
     fast = colloc.Problem("paced", froude=0.1)
     assert gap_line(fast, 0.1, None) == "  no upper bound on the efficiency is known"
     assert "1/min(mu)" in gap_line(fast.with_(froude=0.0), 0.1, None)
+
+
+def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
+    """Each has an error of its own, though the body turns, and what comes later with it."""
+    stated = problem(intervals=12, delta=0.1, objective="efficiency")
+    space, v = space_near(stated, LEANING)
+    error = mesh_error(stated, space.mesh, space.member(v), 0.1, 1e-5)
+    assert error.value.sum() == pytest.approx(error.total, rel=0.1)
+    assert abs(error.total) > 1e-5
+
+
+def test_a_motion_that_does_not_follow_from_rest_is_another_one(monkeypatch):
+    def other_from_rest(self, near):
+        found = closed(self, near)
+        return found if near.any() else (found[0] + np.array([0.5, 0.0, 0.0]), found[1])
+
+    closed = GaitWithInertia.closed
+    at = colloc.Chain(), colloc.Friction(), ROUND, 1e-2
+    one = inertial_replay(*at, froude=0.1, tolerance=1e-4)
+    monkeypatch.setattr(GaitWithInertia, "closed", other_from_rest)
+    two = inertial_replay(*at, froude=0.1, tolerance=1e-4)
+    assert (one.several, one.ambiguity) == (0.0, 0.0)
+    assert two.several == 1.0
+    assert two.ambiguity > 1e-3
+
+
+def test_kinetic_energy_is_that_of_dense_points():
+    body, points = colloc.Chain((0.3, 0.45, 0.25)), (np.arange(400) + 0.5) / 400
+    (angles, rates), z = LEANING(np.array([0.2])), np.array([[0.3], [-0.2], [0.7]])
+    heading, spin = np.concatenate([[0.0], np.cumsum(angles)]), z[2, 0] + np.concatenate([[0.0], np.cumsum(rates)])
+    links = np.array(body.lengths) * np.exp(1j * heading)
+    starts = z[0, 0] + 1j * z[1, 0] + np.concatenate([[0.0], np.cumsum(1j * spin * links)[:-1]])
+    velocity = starts[:, None] + 1j * (spin * links)[:, None] * points
+    expected = 0.5 * (np.array(body.lengths)[:, None] * np.abs(velocity) ** 2).mean(axis=1).sum()
+    assert kinetic_energy(body, angles, rates, z)[0, 0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_where_no_motion_is_found_the_search_says_so(monkeypatch):
+    closed = WithInertia._closed
+    monkeypatch.setattr(WithInertia, "_closed", lambda *arguments: (*closed(*arguments)[:2], False))
+    stated = problem(delta=5.0, delta_start=5.0)
+    with pytest.raises(colloc.NotConvergedError, match="repeats itself"):
+        converged(*space_near(stated, LEANING), 5.0, 1.0, ROUGH)
+
+
+def test_what_holds_slowly_alone_is_not_asked_of_a_fast_body():
+    """One joint goes somewhere with inertia, and loops too small for the pace to matter do not exist."""
+    assert colloc.Problem("burst", body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2), froude=0.1).froude == 0.1
+    with pytest.raises(colloc.ProblemError, match="scallop"):
+        colloc.Problem("slow", body=colloc.Chain((0.5, 0.5)), gait=colloc.Harmonic(2))
+    assert small_loops(problem()) == []
+    assert small_loops(problem(froude=0.0))
