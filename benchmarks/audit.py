@@ -73,8 +73,8 @@ def solved(number: int) -> dict[str, Any]:
         "claimed": solution.efficiency,
         "ambiguity": ambiguity,
         "efficiency": [certificate.efficiency, certificate.efficiency_error],
-        "distance": [certificate.distance, certificate.distance_error],
-        "work": [certificate.work, certificate.work_error],
+        "distance": [certificate.distance, certificate.errors["distance"]],
+        "work": [certificate.work, certificate.errors["work"]],
     }
 
 
@@ -117,9 +117,9 @@ def measured_again(row: dict[str, Any]) -> dict[str, Any]:
     known = measured(problem.body, problem.friction, path_of(row["gait"]), row["delta"])
     fine = known.fine
     row = row | {
-        "efficiency": [fine.efficiency, known.efficiency_error],
-        "distance": [fine.distance, known.distance_error],
-        "work": [fine.work, known.work_error],
+        "efficiency": [fine.efficiency, known.efficiency.error],
+        "distance": [fine.distance, known.errors["distance"]],
+        "work": [fine.work, known.errors["work"]],
     }
     others = {name: size for name, size in row["wrong"].items() if not name.startswith("error of")}
     return row | {"wrong": outside(row) | others}

@@ -81,9 +81,9 @@ def compared(
 
 def against(references: Sequence[float], known: Measured) -> dict[str, list[float]]:
     """What is stated of the quantities and by how much it may be wrong, with their references."""
-    fine, limit = known.fine, known.limit
+    fine, limit = known.fine, known.value.limit
     values = (fine.efficiency, fine.distance, fine.work, limit.value)
-    errors = (known.efficiency_error, known.distance_error, known.work_error, limit.error)
+    errors = (known.efficiency.error, known.errors["distance"], known.errors["work"], limit.error)
     rows = zip(QUANTITIES, values, errors, references, strict=True)
     return {name: [value, error, reference] for name, value, error, reference in rows} | {"open": [fine.several]}
 

@@ -10,7 +10,7 @@ import colloc
 # fmt: off
 VALUES = {
     "Bound", "Budget", "Certificate", "Check", "Concertina", "CrawlerBody", "Domain", "Elliptic", "FeetLaw", "Foot",
-    "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Polygon",
+    "FreePath", "Friction", "GaitClass", "Harmonic", "Limit", "Links", "ModalBody", "Objective", "OwnLaw", "Period", "Polygon",
     "PotentialSpace",
     "PowerLaw", "Prescribed", "Problem", "ProblemFile", "Reference", "Relaxed", "Replay", "Rows", "Saved", "TensorSpline",
     "Serpenoid", "Viscous", "Wave", "Lost", "Task", "Axis", "Study", "Effort", "SecondOrder", "Step",

@@ -37,8 +37,8 @@ def summary_lines(solution: Solution, reference: Reference | None, *, verbose: b
             f"({certificate.instants} instants); {certificate.value_at_zero_delta:.6f} +- "
             f"{certificate.value_error_at_zero_delta:.0e} for delta -> 0",
             *_besides(solution),
-            f"  distance d      {certificate.distance:.6f} +- {certificate.distance_error:.0e}      "
-            f"work W  {certificate.work:.6f} +- {certificate.work_error:.0e}      at delta {solution.answer.delta:.0e}",
+            f"  distance d      {certificate.distance:.6f} +- {certificate.errors['distance']:.0e}      "
+            f"work W  {certificate.work:.6f} +- {certificate.errors['work']:.0e}      at delta {solution.answer.delta:.0e}",
         ]
         lines += _background(solution) if verbose else []
         lines += _check_lines(certificate, verbose)

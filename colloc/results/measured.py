@@ -28,6 +28,13 @@ class Limit:
     error: float
 
 
+class Estimate(NamedTuple):
+    """Error of a value at delta, and the value for delta -> 0."""
+
+    error: float
+    limit: Limit
+
+
 def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limit:
     """Limit for delta -> 0 of one gait's value, from its values at delta, delta/10 and delta/100.
 
@@ -53,12 +60,10 @@ class Measured(NamedTuple):
     """What replays of a gait at delta, a tenth and a hundredth of it say, with errors that hold for every balanced motion."""
 
     fine: Replay
-    value_error: float
-    limit: Limit
-    efficiency_error: float
-    efficiency_limit: Limit
-    distance_error: float
-    work_error: float
+    errors: dict[str, float]
+    """Of quantities."""
+    value: Estimate
+    efficiency: Estimate
 
 
 def measured(
@@ -90,13 +95,13 @@ def measured(
         replays.append(run(*at, **settings, near=near, objective=objective))
     known = []
     for aim in (objective, EFFICIENCY):
-        values = [aim(each.period) for each in replays]
+        values = [aim(each.values) for each in replays]
         errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
-        limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
-        known.append((errors[0], limit))
+        known.append(Estimate(errors[0], extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])))
     fine = replays[0]
-    distance_error = fine.distance_error + astray(fine, rotation) + fine.other_distance
-    return Measured(fine, *known[0], *known[1], distance_error, fine.work_error + fine.other_work)
+    errors_of = {name: error + fine.others.get(name, 0.0) for name, error in fine.errors.items() if name in fine.values}
+    errors_of["distance"] += astray(fine, rotation)
+    return Measured(fine, errors_of, *known)
 
 
 def astray(replayed: Replay, rotation: float | None) -> float:
@@ -106,6 +111,6 @@ def astray(replayed: Replay, rotation: float | None) -> float:
 
 def _error(replayed: Replay, aim: Objective, rotation: float | None) -> float:
     """Relative error of an objective, for every reason."""
-    by_lever = float(aim.relative_error(replayed.period, {"distance": astray(replayed, rotation)}))
+    by_lever = float(aim.relative_error(replayed.values, {"distance": astray(replayed, rotation)}))
     error = replayed.error if aim == replayed.objective else replayed.error_of(aim)
     return error + by_lever + replayed.ambiguity_of(aim)

@@ -9,7 +9,7 @@ Layout of a file (every dataset carries ``units`` and ``dims``)::
         modes and mode_rates
     /answer/{edges,x,lam_x,lam_g}, knots of a free path; attributes delta, value, distance, work, kkt_error, panels, ...
     /history/{delta,intervals,value,distance,work,...}: how the search came there, a row a step
-    /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, efficiency, efficiency_error, ...
+    /certificate/{name,value,threshold,passed,meaning}, attributes value, value_error, distance, distance_error, work, ...
     /relaxed/{durations,directions,start}, attribute symmetry and those of `results.relaxation.Optimality`, with
         /relaxed/certificate and /relaxed/realised/000/{corners,certificate}, attributes repeats, sense, symmetry
 """
@@ -27,13 +27,14 @@ import numpy as np
 
 from colloc.collocation.layout import problem_layout
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
+from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.answer import REALISED, Alternative, Answer, SecondOrder, Step
-from colloc.results.checks import UNCERTIFIED, Certificate, Check
+from colloc.results.checks import NUMBERS, UNCERTIFIED, Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.results.solution import Solution
 from colloc.system.errors import ChangedFileWarning, StoreError
@@ -243,9 +244,9 @@ def _read_relaxation(group: h5py.Group) -> Relaxation:
 
 def _write_certificate(group: h5py.Group, certificate: Certificate) -> None:
     """Write a certificate into a group of its own."""
-    for field in dataclasses.fields(certificate):
-        if field.name != "checks":
-            put_attribute(group, field.name, getattr(certificate, field.name))
+    for name, number in certificate.numbers.items():
+        if name != "efficiency":  # which is the distance over the work
+            put_attribute(group, name, number)
     for name in ("name", "value", "threshold", "passed", "meaning"):
         put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
@@ -254,9 +255,9 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-    return Certificate(
-        checks, **{f.name: attribute(group, f.name) for f in dataclasses.fields(Certificate) if f.name != "checks"}
-    )
+    values = {name: float(attribute(group, name)) for name in QUANTITIES if name in group.attrs}
+    errors = {name: float(attribute(group, f"{name}_error")) for name in QUANTITIES if f"{name}_error" in group.attrs}
+    return Certificate(values, errors, {}, checks, **{name: attribute(group, name) for name in NUMBERS})
 
 
 def _read(file: h5py.File) -> Solution:

@@ -165,26 +165,21 @@ def gait_certificate(
         *_direction(problem, fine),
         _one_motion(problem, fine),
         *after,
-        *_delta(problem, fine, known.limit.value),
+        *_delta(problem, fine, known.value.limit.value),
     )
     return Certificate(
-        checks,
-        fine.efficiency,
-        fine.distance,
-        fine.work,
-        known.efficiency_error,
-        known.efficiency_limit.value,
-        fine.instants,
-        known.efficiency_limit.error,
-        known.distance_error,
-        known.work_error,
-        fine.value,
-        known.value_error,
-        known.limit.value,
-        known.limit.error,
-        fine.rotation,
-        fine.length,
-        fine.driven_work,
+        values=fine.values,
+        errors=known.errors,
+        others={},
+        checks=checks,
+        instants=fine.instants,
+        efficiency_error=known.efficiency.error,
+        efficiency_at_zero_delta=known.efficiency.limit.value,
+        error_at_zero_delta=known.efficiency.limit.error,
+        value=fine.value,
+        value_error=known.value.error,
+        value_at_zero_delta=known.value.limit.value,
+        value_error_at_zero_delta=known.value.limit.error,
     )
 
 
@@ -259,7 +254,7 @@ def _reached(problem: Problem, fine: Replay) -> list[Check]:
     """Values that have to be reached."""
     checks = []
     for aim, least in problem.at_least:
-        lacks = max(least - aim(fine.period), 0.0) / max(abs(least), 1e-300)
+        lacks = max(least - aim(fine.values), 0.0) / max(abs(least), 1e-300)
         checks.append(Check(f"least {aim.name}", lacks, GAP, f"relative, below {least:g}, in replay"))
     return checks
 

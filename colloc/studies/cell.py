@@ -130,7 +130,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
     except CollocError:
         return 0.0
     turned = 0.0 if problem.rotation is None else abs(found.rotation - problem.rotation)
-    sure = problem.objective(found.period | {"distance": max(0.0, found.distance - _LEVER * turned)})
+    sure = problem.objective({**found.values, "distance": max(0.0, found.distance - _LEVER * turned)})
     return float(sure) if np.isfinite(sure) else 0.0
 
 

@@ -155,7 +155,7 @@ def _uninterrupted(problem: Problem, starts: int) -> Solution:
 
 def _value(solution: Solution, aim: Objective) -> float:
     """An objective of a solution, of its certificate or, where that does not hold what it takes, of a replay."""
-    value = aim(solution.certificate.period)
+    value = aim(solution.certificate.values)
     if not np.isnan(value):
         return value
     problem, gait = solution.problem, solution.gait

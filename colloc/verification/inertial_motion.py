@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.gaits.period import Period
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -40,20 +41,16 @@ _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 
 
 @dataclass(frozen=True, eq=False)
-class InertialMotion:
+class InertialMotion(Period):
     """A gait played with inertia, over one period of the motion in which all periods are alike.
+
+    The work is that against friction [weight x length]; errors are how much a quantity changes where every step may err ten
+    times as much.
 
     Attributes
     ----------
     froude : float
         Froude number L/(g T^2).
-    distance, work, rotation : float
-        Displacement of the centre of mass [body lengths], work against friction [weight x length], and net rotation [rad] of a
-        period.
-    distance_error, work_error, rotation_error : float
-        How much they change where every step may err ten times as much.
-    length, length_error : float
-        Of the path in shape space [rad].
     multipliers : (3,)
         By what small changes of the momenta are multiplied in a period (Floquet multipliers); stable if all are within 1.
     phases, states : (n,), (7, n)
@@ -62,27 +59,9 @@ class InertialMotion:
     """
 
     froude: float
-    distance: float
-    work: float
-    rotation: float
-    distance_error: float
-    work_error: float
-    rotation_error: float
-    length: float
-    length_error: float
     multipliers: np.ndarray = field(repr=False)
     phases: np.ndarray = field(repr=False)
     states: np.ndarray = field(repr=False)
-
-    @property
-    def efficiency(self) -> float:
-        """Distance over work."""
-        return self.distance / self.work
-
-    def error_of(self, objective: Objective) -> float:
-        """Relative error of an objective of distance, work, rotation and length."""
-        errors = {name: getattr(self, f"{name}_error") for name in ("distance", "work", "rotation", "length")}
-        return float(objective.relative_error(vars(self) | {"driven_work": np.nan}, errors))
 
     @property
     def error(self) -> float:
@@ -238,10 +217,9 @@ def inertial_motion(
         rotation, work = float(states[_THETA, -1]), float(states[_WORK, -1])
         now = {"distance": float(np.hypot(*states[_PLACE, -1])), "work": work, "rotation": rotation}
         if before is not None:
-            errors = {f"{name}_error": abs(now[name] - before[name]) for name in now}
-            multipliers = np.linalg.eigvals(slopes)
-            path = {"length": length, "length_error": length_error}
-            found = InertialMotion(froude, **now, **errors, **path, multipliers=multipliers, phases=phases, states=states)
+            errors = {name: abs(now[name] - before[name]) for name in now} | {"length": length_error}
+            values, multipliers = now | {"length": length}, np.linalg.eigvals(slopes)
+            found = InertialMotion(values, errors, {}, froude, multipliers, phases=phases, states=states)
             if found.error_of(objective) <= tolerance:
                 return found
         aim, before = _TENTH * aim, now

@@ -46,30 +46,20 @@ def inertial_replay(
     with suppress(NotConvergedError):  # Newton's method need not lead to any from there
         from_rest = played.closed(np.zeros(3))[0]
     several = float(np.abs(from_rest - ran.states[:3, 0]).max() > _APART)
-    other = played.run(from_rest, tolerance).states[:, -1] if several else ran.states[:, -1]
+    ends = ran.states[:, -1], played.run(from_rest, tolerance).states[:, -1] if several else ran.states[:, -1]
     z = tail_velocity(chain, angles, rates, ran.states[:3])
     energy = froude * kinetic_energy(chain, angles, rates, z)[0]
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
+    here, there = ({"distance": float(np.hypot(*end[4:6])), "work": float(end[6]), "rotation": float(end[3])} for end in ends)
     return Replay(
-        distance=ran.distance,
-        work=ran.work,
-        rotation=ran.rotation,
-        length=ran.length,
-        driven_work=np.nan,
+        values=ran.values,
+        errors=ran.errors,
+        others={name: abs(there[name] - here[name]) for name in here},
         lever=float(np.hypot(x - gx, y - gy).max()),
         actuator_work=ran.work + float(energy[-1] - energy[0]),
         residual=float(np.abs(ran.states[:3, -1] - ran.states[:3, 0]).max()),
         error=ran.error_of(objective),
-        distance_error=ran.distance_error,
-        work_error=ran.work_error,
-        rotation_error=ran.rotation_error,
-        length_error=ran.length_error,
-        driven_work_error=0.0,
         several=several,
-        other_distance=several * abs(float(np.hypot(*other[4:6])) - ran.distance),
-        other_work=several * abs(float(other[6]) - ran.work),
-        other_rotation=several * abs(float(other[3]) - ran.rotation),
-        shares=np.empty(0),
         instants=ran.phases.size,
         tail=(phases, z),
         objective=objective,

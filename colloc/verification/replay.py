@@ -19,7 +19,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from colloc.gaits.objective import EFFICIENCY, QUANTITIES, Objective
+from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.gaits.period import Period
 from colloc.mechanics.actuators import UNLIMITED, ActuatorLimits, driven_power_in_balance
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
@@ -38,31 +39,24 @@ _NARROWEST = 1e-10
 
 
 @dataclass(frozen=True)
-class Replay:
-    """A gait replayed over one period.
+class Replay(Period):
+    """A gait replayed over one period: the quantities of a `Period`, and what tells how far they can be trusted.
+
+    The distance is that of the centre of mass. Errors are what halving the panels would change, summed as magnitudes, and the
+    residual. Of laws with equal coefficients there are no other motions.
 
     Attributes
     ----------
-    distance, work : float
-        The distance is that of the centre of mass.
-    rotation, length : float
-        Net rotation over the period, and length of the path in shape space [rad].
     lever : float
         Largest distance of a point of the body from its centre of mass [body lengths].
-    driven_work : float
-        Of the actuators where none takes energy back (`colloc.mechanics.actuators.driven_power`); NaN if it was not asked for.
     actuator_work : float
         Work of the joints, from the moments of the friction forces about them; equals `work` in balance.
     residual : float
         Largest force or torque left over, at any instant, in units of the largest friction coefficient.
     error : float
-        Relative error of the objective: what halving the panels would change, summed as magnitudes, and the residual.
-    distance_error, work_error, rotation_error, length_error, driven_work_error : float
-        Of these, for the same reasons.
+        Relative error of the objective, for the same reasons.
     several : float
         Part of the period at which several motions are balanced; 0 for equal coefficients, where there is one.
-    other_distance, other_work, other_rotation : float
-        How much these could change if the body took any others of them, at most.
     shares : (n_share,)
         Largest shares of the actuators' limits; none unless limits were given.
     instants : int
@@ -76,27 +70,14 @@ class Replay:
         With inertia, by what small changes of the momenta are multiplied in a period.
     """
 
-    distance: float
-    work: float
-    rotation: float
-    length: float
-    driven_work: float
     lever: float
     actuator_work: float
     residual: float
     error: float
-    distance_error: float
-    work_error: float
-    rotation_error: float
-    length_error: float
-    driven_work_error: float
     several: float
-    other_distance: float
-    other_work: float
-    other_rotation: float
-    shares: np.ndarray = field(compare=False)
     instants: int
     tail: tuple[np.ndarray, np.ndarray] = field(compare=False)
+    shares: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
     objective: Objective = EFFICIENCY
     across: float = 0.0
     multipliers: tuple[complex, ...] = ()
@@ -111,35 +92,14 @@ class Replay:
         return np.stack([np.interp(t, known, row, period=1.0) for row in z])
 
     @property
-    def efficiency(self) -> float:
-        """Distance over work."""
-        return self.distance / self.work
-
-    @property
-    def period(self) -> dict[str, float]:
-        """What the period comes to, by the names of `colloc.gaits.objective.QUANTITIES`."""
-        return {name: getattr(self, name) for name in QUANTITIES}
-
-    @property
     def value(self) -> float:
         """Of the objective."""
-        return self.objective(self.period)
+        return self.objective(self.values)
 
     @property
     def ambiguity(self) -> float:
-        """How much other balanced motions could change the objective, relative, at most."""
+        """How much other balanced motions could change it, relative, at most."""
         return self.ambiguity_of(self.objective)
-
-    def ambiguity_of(self, objective: Objective) -> float:
-        """The same of any objective."""
-        others = {"distance": self.other_distance, "work": self.other_work, "rotation": self.other_rotation}
-        # what other motions do to the work they do to its driven part as well
-        return float(objective.relative_error(self.period, others | {"driven_work": self.other_work}))
-
-    def error_of(self, objective: Objective) -> float:
-        """`error` of any objective."""
-        errors = {name: getattr(self, f"{name}_error") for name in QUANTITIES}
-        return float(objective.relative_error(self.period, errors))
 
     @property
     def turning(self) -> float:
@@ -276,16 +236,16 @@ def replay(
     while True:
         turn, move, spent, passed, delivered = increments(WHOLE, panels, 1)
         heading, place = travelled(turn, move)
-        distance, work = float(abs(place[-1])), float(spent.sum())
-        if not work > 0:
+        values = {"distance": max(float(abs(place[-1])), 1e-300), "work": float(spent.sum()), "rotation": float(heading[-1])}
+        values["length"] = float(passed.sum())
+        if driven:
+            values["driven_work"] = float(delivered.sum())
+        if not values["work"] > 0:
             raise ProblemError("the path does not move, or too little to do work against friction: it has no efficiency.")
         changed, near_by, far = changes(panels)
-        turn_error, astray, work_error, length_error, driven_error = left_over(near_by, far, panels.wider).T
-        period = {"distance": max(distance, 1e-300), "work": work, "rotation": heading[-1], "length": float(passed.sum())}
-        period["driven_work"] = float(delivered.sum())
-        errors = {"distance": astray, "work": work_error, "rotation": turn_error, "length": length_error}
-        errors["driven_work"] = driven_error
-        gap = objective.relative_error(period, errors)
+        missed = left_over(near_by, far, panels.wider).T
+        lost = dict(zip(("rotation", "distance", "work", "length", "driven_work"), missed, strict=True))
+        gap = objective.relative_error(values, lost)
         residual = float(panels.residual.max())
         order = np.argsort(gap)
         # finer panels do not make up for what the balance leaves over
@@ -299,31 +259,22 @@ def replay(
         start = _starts(old.z, friction, sense).reshape(-1, 3).T
         new = at(between, start, whole=False)
         panels = panels.take(np.setdiff1d(order, chosen)).joined(halves(old, new, changed[chosen]))
-    several, other_distance, other_work, other_rotation = _others(panels, np.abs(place - place[-1]).max())
+    several, others = _others(panels, np.abs(place - place[-1]).max())
     known = (panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)).ravel()
+    left_in_balance = residual * np.array([1.0, values["distance"], values["work"], 0.0, values["work"]])
     return Replay(
-        distance,
-        work,
-        float(heading[-1]),
-        period["length"],
-        period["driven_work"] if driven else np.nan,
-        float(panels.lever.max()),
-        float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
-        residual,
-        float(gap.sum()) + residual,
-        float(astray.sum()) + residual * distance,
-        float(work_error.sum()) + residual * work,
-        float(turn_error.sum()) + residual,
-        float(length_error.sum()),
-        float(driven_error.sum()) + residual * work,
-        several,
-        other_distance,
-        other_work,
-        other_rotation,
-        panels.shares.max(axis=(0, 1)),
-        4 * panels.left.size,
-        (known, panels.z[:, :4].reshape(-1, 3).T),
-        objective,
+        values=values,
+        errors={name: float(each.sum() + left) for (name, each), left in zip(lost.items(), left_in_balance, strict=True)},
+        others=others,
+        lever=float(panels.lever.max()),
+        actuator_work=float(((panels.actuator @ WHOLE[-1]) * panels.width).sum()),
+        residual=residual,
+        error=float(gap.sum()) + residual,
+        several=several,
+        instants=4 * panels.left.size,
+        tail=(known, panels.z[:, :4].reshape(-1, 3).T),
+        shares=panels.shares.max(axis=(0, 1)),
+        objective=objective,
     )
 
 
@@ -343,12 +294,13 @@ def _starts(z: np.ndarray, friction: Law, sense: int) -> np.ndarray:
     return z[:, :-1] if sense == FORWARDS else z[:, 1:]
 
 
-def _others(panels: Panels, reach: float) -> tuple[float, float, float, float]:
-    """Part of the period with several motions, and how far any others would lead at most: distance, work, rotation.
+def _others(panels: Panels, reach: float) -> tuple[float, dict[str, float]]:
+    """Part of the period with several motions, and how far any others would lead at most, by quantities.
 
     Between two instants they count as at the worse; a rotation moves what is within `reach`.
     """
     worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
-    speed, spin, power = np.einsum("n,nki->i", 0.25 * panels.width, worse)
+    speed, spin, power = map(float, np.einsum("n,nki->i", 0.25 * panels.width, worse))
     several = 0.25 * panels.width @ worse.any(axis=2).sum(axis=1)
-    return float(several), float(speed + reach * spin), float(power), float(spin)
+    # what other motions do to the work they do to its driven part as well
+    return float(several), {"distance": speed + reach * spin, "work": power, "rotation": spin, "driven_work": power}

@@ -54,7 +54,7 @@ def slope_replay(
         ran = on.run(0.0, gait.theta, 1, aim, _LONGEST / instants)
         way = complex(ran.climb[0], ran.aside[0]) * complex(np.exp(-1j * slope.ahead))
         work = float(ran.friction_work[0] + slope.grade * ran.climb[0])
-        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn, "length": length, "driven_work": np.nan}
+        return ran, way, {"distance": way.real, "work": work, "rotation": ran.turn, "length": length}
 
     before = run(aim)[2]
     while True:
@@ -71,25 +71,14 @@ def slope_replay(
     solved = solve_balance(on.body, friction, angles, rates, delta, load=on.pull(ran.states[0]))
     (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
     return Replay(
-        distance=period["distance"],
-        work=period["work"],
-        rotation=period["rotation"],
-        length=length,
-        driven_work=np.nan,
+        values=period,
+        errors=errors | {"length": length_error},
+        others={},
         lever=float(np.hypot(x - gx, y - gy).max()),
         actuator_work=float(ran.joint_work[0]),
         residual=float(solved.residual.max()),
         error=error,
-        distance_error=errors["distance"],
-        work_error=errors["work"],
-        rotation_error=errors["rotation"],
-        length_error=length_error,
-        driven_work_error=0.0,
         several=on.several(ran),
-        other_distance=0.0,
-        other_work=0.0,
-        other_rotation=0.0,
-        shares=np.empty(0),
         instants=ran.phases.size,
         tail=(phases, solved.z),
         objective=objective,

@@ -329,11 +329,11 @@ def test_a_result_that_another_program_opened_is_read_and_verify_decides(result,
     assert "the file was changed after colloc wrote it" in printed.out
     assert printed.err.count("was changed") == 1
     with h5py.File(result, "r+") as file:
-        file["certificate"].attrs["efficiency"] = 0.5
+        file["certificate"].attrs["distance"] = 0.5
     assert colloc(["verify", str(result), "--json"]) == 4
     verdict = json.loads(capsys.readouterr().out)
     assert verdict["changed"]
-    assert "the file certifies an efficiency of 0.5" in verdict["complaint"]
+    assert "the file certifies an efficiency of 0.48" in verdict["complaint"]
 
 
 @pytest.mark.parametrize("cut", [1, 1000, 100_000])

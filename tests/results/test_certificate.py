@@ -9,6 +9,7 @@ import pytest
 from colloc.commands.verify import main as recheck
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.chain import Chain
@@ -57,6 +58,12 @@ def with_answer(solution, **changes):
     return Solution(solution.problem, replace(solution.answer, **changes))
 
 
+def changed(replayed, **numbers):
+    """A replay with other numbers, quantities of its period among them."""
+    values = {name: numbers.pop(name) for name in QUANTITIES if name in numbers}
+    return replace(replayed, values=replayed.values | values, **numbers)
+
+
 def judged(name, run):
     """`run` of a factor makes a violation of so many times the limit: only `name` fails, and only above it."""
     assert run(JUST_BELOW) == set()
@@ -103,7 +110,7 @@ def test_balance_at_the_nodes(failures, three_link):
     ],
 )
 def test_what_the_replay_measures(failures, name, changes):
-    judged(name, lambda f: failures(change=lambda part, r: replace(r, **changes(r, f))))
+    judged(name, lambda f: failures(change=lambda part, r: changed(r, **changes(r, f))))
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -187,8 +194,8 @@ def test_influence_of_delta(failures, replays, sign):
     largest = replays[max(replays)].efficiency
 
     def run(f):
-        changed = largest * (1 + sign * f * 1e-2)
-        return failures(change=lambda part, r: r if part == 1 else replace(r, distance=changed * r.work))
+        limit = largest * (1 + sign * f * 1e-2)
+        return failures(change=lambda part, r: r if part == 1 else changed(r, distance=limit * r.work))
 
     judged("delta influence", run)
 
@@ -259,7 +266,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_b
 
 def test_a_certificate_knows_the_limit_of_a_distance_that_falls_in_proportion_to_delta(three_link, replays, monkeypatch):
     fine = replays[max(replays)]
-    monkeypatch.setattr(replayer, "replay", lambda *a, **k: replace(fine, distance=fine.distance * (1 + 3 * a[3])))
+    monkeypatch.setattr(replayer, "replay", lambda *a, **k: changed(fine, distance=fine.distance * (1 + 3 * a[3])))
     assert certify(three_link.answer).efficiency_at_zero_delta == pytest.approx(fine.efficiency, rel=1e-12)
 
 
@@ -274,12 +281,12 @@ def test_a_certificate_says_whether_other_motions_were_looked_for_and_found(thre
 
 
 def test_rotation_counts_in_the_error(failures, three_link, replays, monkeypatch):
-    monkeypatch.setattr(replayer, "replay", lambda *a, **k: replace(replays[a[3]], rotation=3e-5))
+    monkeypatch.setattr(replayer, "replay", lambda *a, **k: changed(replays[a[3]], rotation=3e-5))
     known, fine = certify(three_link.answer), replays[max(replays)]
     assert known.efficiency_error >= known.efficiency * 3e-5 * fine.lever / fine.distance
     assert known.error_at_zero_delta >= known.efficiency * 3e-5 * fine.lever / fine.distance
     # a point at the end of the longest lever goes by so much less or more
-    assert known.distance_error == pytest.approx(fine.distance_error + 3e-5 * fine.lever, rel=1e-9)
+    assert known.errors["distance"] == pytest.approx(fine.errors["distance"] + 3e-5 * fine.lever, rel=1e-9)
 
 
 def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, three_link, replays, monkeypatch):
@@ -287,7 +294,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     fine = replays[max(replays)]
 
     def open_by(part):
-        return lambda _, r: replace(r, other_work=part * r.work, several=0.01)
+        return lambda _, r: replace(r, others={"work": part * r.work}, several=0.01)
 
     judged("one motion", lambda f: failures(change=lambda p, r: open_by(f * 1e-2)(p, r)))
     gapped = with_answer(three_link, value=fine.efficiency * (1 + 3e-4))
@@ -296,7 +303,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(failures, t
     monkeypatch.setattr(replayer, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
     known = certify(three_link.answer)
     assert min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency) >= 5e-3
-    assert known.work_error >= 5e-3 * known.work
+    assert known.errors["work"] >= 5e-3 * known.work
 
 
 def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):

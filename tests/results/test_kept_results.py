@@ -22,7 +22,9 @@ PROBLEM = Problem("mine", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"),
 def valued(solution, value, **changes):
     """The solution with another certified value, of the same problem with some fields changed."""
     problem = solution.problem.with_(**changes) if changes else solution.problem
-    return replace(solution, problem=problem, certificate=replace(solution.certificate, value=value, efficiency=value))
+    quantities = solution.certificate.values | {"distance": value * solution.certificate.work}
+    certificate = replace(solution.certificate, value=value, values=quantities)
+    return replace(solution, problem=problem, certificate=certificate)
 
 
 def values(folder):

@@ -119,7 +119,7 @@ def test_the_fastest_gait_is_faster_and_less_efficient_and_the_replay_says_so(us
     t = np.linspace(0, 1, 200_001)
     length = np.linalg.norm(np.diff(fast.gait.angles(t)), axis=0).sum()
     assert measured.length == pytest.approx(length, rel=1e-8)
-    assert best.value > SPEED(known.period) + 100 * best.value_error
+    assert best.value > SPEED(known.values) + 100 * best.value_error
     assert best.efficiency < known.efficiency - 100 * known.efficiency_error
 
 

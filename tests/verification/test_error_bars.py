@@ -42,10 +42,10 @@ def test_stated_errors_cover_what_the_other_program_found(entry):
     body, friction, path = random_gait(int(entry["name"].split("-")[1]))
     known = measured(body, friction, path, DELTA)
     stated = {
-        "efficiency": (known.fine.efficiency, known.efficiency_error),
-        "distance": (known.fine.distance, known.distance_error),
-        "work": (known.fine.work, known.work_error),
-        "limit": (known.limit.value, known.limit.error),
+        "efficiency": (known.fine.efficiency, known.efficiency.error),
+        "distance": (known.fine.distance, known.errors["distance"]),
+        "work": (known.fine.work, known.errors["work"]),
+        "limit": (known.value.limit.value, known.value.limit.error),
     }
     for name in QUANTITIES:
         value, error = stated[name]

@@ -81,8 +81,9 @@ def test_the_stated_error_covers_both_directions(law, seeds):
         for known, other in ((forwards, backwards), (backwards, forwards)):
             allowed = known.error + other.error + known.ambiguity
             assert abs(other.efficiency / known.efficiency - 1) <= allowed
-            assert abs(other.distance - known.distance) <= known.distance_error + other.distance_error + known.other_distance
-            assert abs(other.work - known.work) <= known.work_error + other.work_error + known.other_work
+            for name in ("distance", "work"):
+                known_by = known.errors[name] + other.errors[name] + known.others[name]
+                assert abs(other.values[name] - known.values[name]) <= known_by
         assert (forwards.several > 0) == (forwards.ambiguity > 0) == (seed not in (4, 8))
 
 

@@ -144,6 +144,6 @@ def test_the_triangle_that_moves_one_joint_at_a_time_reaches_two_fifths():
 def test_the_error_of_the_efficiency_is_made_of_those_of_distance_and_work():
     body, friction, path = random_path(2)
     result = replay(body, friction, path, 1e-4, instants=200, tolerance=1e-3)
-    parts = result.distance_error / result.distance + result.work_error / result.work
-    assert min(result.distance_error, result.work_error) > 0
+    parts = result.errors["distance"] / result.distance + result.errors["work"] / result.work
+    assert min(result.errors["distance"], result.errors["work"]) > 0
     assert result.error <= parts <= result.error + 2 * result.residual

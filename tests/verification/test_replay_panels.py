@@ -123,7 +123,7 @@ def test_stated_errors_cover_optimised_gaits(number):
     row = OPTIMA[number]
     result = replay(problem.body, problem.friction, path_of(row["gait"]), row["delta"])
     found = row["played"]  # by another program
-    assert abs(result.work - found["work"]) <= result.work_error
-    assert abs(result.distance - found["distance"]) <= result.distance_error
+    assert abs(result.work - found["work"]) <= result.errors["work"]
+    assert abs(result.distance - found["distance"]) <= result.errors["distance"]
     assert abs(result.efficiency - found["efficiency"]) <= result.error * result.efficiency
     assert result.error < 1e-6

@@ -1,0 +1,72 @@
+"""What a period of a gait comes to: values of the quantities that objectives speak of, each with its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from colloc.gaits.objective import Objective
+
+
+@dataclass(frozen=True)
+class Period:
+    """Quantities of a period, by the names of `colloc.gaits.objective.QUANTITIES`; what nobody measured is left out.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+    errors : mapping of str to float
+        How much each may be wrong by, of unknown sign.
+    others : mapping of str to float
+        How much each could change at most if the body took any other of its balanced motions; empty where there is one motion.
+
+    Examples
+    --------
+    >>> known = Period({"distance": 0.5, "work": 2.0}, {"distance": 1e-3, "work": 2e-3}, {})
+    >>> known.efficiency
+    0.25
+    >>> round(known.error_of(Objective("distance / work")), 6)
+    0.003
+    """
+
+    values: Mapping[str, float] = field(hash=False)
+    errors: Mapping[str, float] = field(hash=False)
+    others: Mapping[str, float] = field(hash=False)
+
+    @property
+    def distance(self) -> float:
+        """Displacement of the centre of mass [body lengths]."""
+        return self.values["distance"]
+
+    @property
+    def work(self) -> float:
+        """Work of the joints [weight x body length]."""
+        return self.values["work"]
+
+    @property
+    def rotation(self) -> float:
+        """Net rotation, counter-clockwise [rad]."""
+        return self.values["rotation"]
+
+    @property
+    def length(self) -> float:
+        """Of the path in shape space [rad]."""
+        return self.values["length"]
+
+    @property
+    def driven_work(self) -> float:
+        """Of actuators where none takes energy back; NaN if nobody asked."""
+        return self.values.get("driven_work", float("nan"))
+
+    @property
+    def efficiency(self) -> float:
+        """Distance over work."""
+        return self.distance / self.work
+
+    def error_of(self, objective: Objective) -> float:
+        """Relative error of an objective."""
+        return float(objective.relative_error(self.values, self.errors))
+
+    def ambiguity_of(self, objective: Objective) -> float:
+        """How much other balanced motions could change an objective, relative, at most."""
+        return float(objective.relative_error(self.values, self.others))
