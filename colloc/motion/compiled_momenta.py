@@ -20,28 +20,22 @@ N_OUT = 9
 
 
 @lru_cache(maxsize=32)
-def _function(body: Chain, friction: Law, along: str) -> ca.Function:
-    """(angles, rates, momenta, delta, Froude number) to the outputs, and their derivatives along those of the first three that
-    are named."""
+def _function(body: Chain, friction: Law, *, differentiated: bool) -> ca.Function:
+    """(angles, rates, momenta, delta, Froude number) to the outputs, and their derivatives along the first three."""
     sizes = {"angles": body.n_joint, "rates": body.n_joint, "momenta": len(STATES)}
     given = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
     delta, froude = ca.SX.sym("delta"), ca.SX.sym("froude")
     now = momentum_rates(body, friction, *given.values(), delta=delta, froude=froude)
     out = ca.vertcat(now.z, given["momenta"][:2], now.power, now.rates)
-    named = ca.vertcat(*(given[name] for name in along.split()))
-    slopes = ca.vec(ca.densify(ca.jacobian(out, named).T)) if along else ca.SX(0, 1)
+    slopes = ca.vec(ca.densify(ca.jacobian(out, ca.vertcat(*given.values())).T)) if differentiated else ca.SX(0, 1)
     return ca.Function("momenta", [*given.values(), delta, froude], [out, slopes], {"cse": True})
 
 
-def momentum_slopes(
-    body: Chain,
-    friction: Law,
-    shapes: tuple[np.ndarray, np.ndarray, float],
-    states: np.ndarray,
-    froude: float,
-    along: str = "momenta",
-) -> tuple[np.ndarray, np.ndarray]:
-    """Tail velocity, velocity of the centre of mass, power and rates of the momenta, ``(9, n_time)``, and their derivatives.
+def all_slopes(
+    body: Chain, friction: Law, shapes: tuple[np.ndarray, np.ndarray, float], states: np.ndarray, froude: float
+) -> np.ndarray:
+    """Derivatives ``(9, 2 n_joint + 3, n_time)`` of tail velocity, velocity of the centre of mass, power and rates of the
+    momenta along angles, rates and momenta.
 
     Parameters
     ----------
@@ -50,12 +44,10 @@ def momentum_slopes(
         Angles and rates ``(n_joint, n_time)``, and delta.
     states : (3, n_time)
     froude : float
-    along : str
-        Along which of "angles rates momenta" derivatives are taken, ``(9, n, n_time)``.
     """
     angles, rates, delta = shapes
-    out, slopes = (found.full() for found in _function(body, friction, along)(angles, rates, states, delta, froude))
-    return out, slopes.reshape(N_OUT, -1, states.shape[1])
+    _, slopes = _function(body, friction, differentiated=True)(angles, rates, states, delta, froude)
+    return np.asarray(slopes.full()).reshape(N_OUT, -1, states.shape[1])
 
 
 class MomentaAt:
@@ -69,7 +61,7 @@ class MomentaAt:
             np.array([delta]),
             np.array([froude]),
         )
-        self._out, self._function = np.zeros(N_OUT), _function(body, friction, "")
+        self._out, self._function = np.zeros(N_OUT), _function(body, friction, differentiated=False)
         self._buffer, self._evaluate = self._function.buffer()
         for k, given in enumerate(self._given):
             self._buffer.set_arg(k, memoryview(given.data))

@@ -23,7 +23,7 @@ from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.inertia import STATES, checked_mass, momenta
+from colloc.mechanics.inertia import STATES, checked_mass, momenta, momentum_slopes
 from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.heading import heading, heading_shares, momenta_image
@@ -294,13 +294,14 @@ class WithInertia(SlowOnLevel):
 
     def _closed(self, mesh: Mesh, shapes: Shapes, near: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """The momenta that repeat every period, by Newton's method from others ``(3, n_point)``; what the body does with them
-        (`colloc.motion.compiled_momenta`); and whether there are any."""
+        (`colloc.motion.compiled_momenta.N_OUT`); and whether there are any."""
         out = near
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
-            out, slopes = self._slopes(shapes, states)
-            return Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
+            now, slopes = momentum_slopes(self._chain, self.friction, shapes[:3], states, self._froude_at(shapes))
+            out = np.concatenate([now.z, states[:2], now.power, now.rates])
+            return Rates(now.rates, slopes, bool(np.isfinite(out).all()))
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
         return states, out, held
@@ -308,16 +309,14 @@ class WithInertia(SlowOnLevel):
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         return CollocatedStates(mesh, np.ones(len(STATES), dtype=bool), self._image, unit)
 
-    def _slopes(self, shapes: Shapes, states: np.ndarray, along: str = "momenta") -> tuple[np.ndarray, np.ndarray]:
-        from colloc.motion.compiled_momenta import momentum_slopes
-
-        # momentum grows by what friction gives it in a unit of time, and has as much to grow
-        froude = self._froude * shapes.unit**2
-        at = shapes.angles, shapes.rates, shapes.delta
-        return momentum_slopes(self._chain, self.friction, at, states, froude, along)
+    def _froude_at(self, shapes: Shapes) -> float:
+        """Momentum grows by what friction gives it in a unit of time, and has as much to grow."""
+        return self._froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        slopes = self._slopes(shapes, along.states, "angles rates momenta")[1]
+        from colloc.motion.compiled_momenta import all_slopes
+
+        slopes = all_slopes(self._chain, self.friction, shapes[:3], along.states, self._froude_at(shapes))
         return slopes[:, : -len(STATES)], slopes[:, -len(STATES) :]
 
     def through_pose(
