@@ -105,14 +105,16 @@ def course(problem: Problem, gait: Any, delta: float, mesh: Mesh, error: float) 
     return CourseOfGait(ran, slice(3, 7), moving, end, error)
 
 
-def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float) -> Along:
+def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float, near: np.ndarray | None = None) -> Along:
+    """The collocated motion, sought near states ``(n_state, n_point)``."""
     kind, (angles, rates) = kind_of_motion(problem), gait(mesh.times)
-    return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait))
+    return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait), (near, None))
 
 
 def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> Defects:
     """Errors of collocating a gait whose motion has states, delta per period."""
-    kind, own = kind_of_motion(problem), _along(problem, mesh, gait, delta)
+    kind = kind_of_motion(problem)
+    own = _along(problem, mesh, gait, delta, exact.course.at(mesh.times)[: len(kind.states)])
     pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA], own.now.centre, first_theta(kind, own.begin))
     passed = np.linalg.norm(gait(mesh.times)[1], axis=0)
     spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))
