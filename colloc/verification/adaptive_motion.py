@@ -115,15 +115,6 @@ class FineMotion:
         """Phases of the panel nodes, ``(n, s)``."""
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
-    @property
-    def z(self) -> np.ndarray:
-        """Tail velocities at the nodes, in order of time, ``(3, n s)``."""
-        return self.rates.z.reshape(3, -1)
-
-    def tail_velocity(self, body: Body, friction: Law, path: Path, delta: float, t: np.ndarray) -> np.ndarray:
-        """Tail velocities of the gait at phases t of any shape by the balance, ``(3, t.size)``."""
-        return rates_at(body, friction, path, delta, t, self.velocity(t)).z.reshape(3, -1)
-
     def velocity(self, t: np.ndarray) -> np.ndarray:
         """Tail velocities at phases t of any shape by the panels' polynomials, ``(3, ...)``: good to start a solve from."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)

@@ -15,18 +15,13 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import NONE
-from colloc.mechanics.bodies import Body
-from colloc.mechanics.inertia import checked_mass, tail_velocity
-from colloc.mechanics.law import Law
+from colloc.mechanics.inertia import checked_mass
 from colloc.motion.collocated import CollocatedPose, stage_weights
-from colloc.motion.follow import Course
 from colloc.motion.kinds import OMEGA, Along, Passed, Shapes, begin_of, first_theta, kind_of_motion
-from colloc.motion.on_slope import balance_on_slope
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.gait_on_slope import GaitOnSlope
 from colloc.verification.inertial_motion import GaitWithInertia
-from colloc.verification.replay import Path
 
 
 class Defects(NamedTuple):
@@ -48,61 +43,29 @@ class Defects(NamedTuple):
 class CourseOfGait(NamedTuple):
     """A gait's motion by the differential equation."""
 
-    course: Course
+    states: Callable[[np.ndarray], np.ndarray]
+    """At phases in order."""
     place: slice
-    """Which states are theta, place and work against friction."""
-    velocity: Callable[[np.ndarray, np.ndarray], np.ndarray]
-    """Tail velocities ``(3, n_time)`` at phases and states."""
-    end: float
-    """Of the part of the period that is solved."""
+    """Which of them are theta, place and work against friction."""
     error: float
     """About that of the states."""
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Theta, place, work against friction, ``(4, n_time)``, at phases in order."""
-        return self.course.at(t)[self.place]
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """Where the solver stepped."""
-        return self.course.phases[self.course.phases <= self.end]
-
-    @property
-    def edges(self) -> np.ndarray:
-        """Begin and end of the solved part."""
-        return np.array([0.0, self.end])
-
-    @property
-    def z(self) -> np.ndarray:
-        """Tail velocities at the nodes, ``(3, n)``."""
-        return self.velocity(self.nodes, self.course.states[:, : self.nodes.size])
-
-    def tail_velocity(self, body: Body, friction: Law, path: Path, delta: float, t: np.ndarray) -> np.ndarray:
-        """Tail velocities of the gait at phases t of any shape, ``(3, t.size)``."""
-        return self.velocity(t.ravel(), self.course.at(t.ravel()))
+        return self.states(t)[self.place]
 
 
 def course(problem: Problem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     """The motion of a gait without breaks, delta per period; with inertia it is sought near the one on a mesh."""
-    body, friction, end = problem.body, problem.law, problem.gait.fraction
+    body, friction = problem.body, problem.law
     if problem.slope is not None:
-        slope = problem.slope
-        on = GaitOnSlope(checked_chain(body, friction, slope.grade), friction, gait, delta, (), slope.grade)
+        grade = problem.slope.grade
+        on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
         ran = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
-
-        def balanced(t: np.ndarray, states: np.ndarray) -> np.ndarray:
-            return balance_on_slope(on.body, friction, slope, (*gait(t), delta), states[0]).solved.z
-
-        return CourseOfGait(ran, slice(0, 4), balanced, end, error)
-    chain = checked_mass(body)
-    played = GaitWithInertia(chain, friction, gait, delta, froude=problem.froude)
+        return CourseOfGait(ran.at, slice(0, 4), error)
+    played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=problem.froude)
     ran = played.settled(_along(problem, mesh, gait, delta).edges[:, 0], error)
-
-    def moving(t: np.ndarray, states: np.ndarray) -> np.ndarray:
-        angles, rates = gait(t)
-        return tail_velocity(chain, angles, rates, states[:3])
-
-    return CourseOfGait(ran, slice(3, 7), moving, end, error)
+    return CourseOfGait(ran.at, slice(3, 7), error)
 
 
 def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float, near: np.ndarray | None = None) -> Along:
@@ -114,7 +77,7 @@ def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float, near: np.ndarr
 def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> Defects:
     """Errors of collocating a gait whose motion has states, delta per period."""
     kind = kind_of_motion(problem)
-    own = _along(problem, mesh, gait, delta, exact.course.at(mesh.times)[: len(kind.states)])
+    own = _along(problem, mesh, gait, delta, exact.states(mesh.times)[: len(kind.states)])
     pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA], own.now.centre, first_theta(kind, own.begin))
     passed = np.linalg.norm(gait(mesh.times)[1], axis=0)
     spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))

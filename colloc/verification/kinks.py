@@ -12,8 +12,7 @@ import numpy as np
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.verification.adaptive_motion import FineMotion
-from colloc.verification.collocated_course import CourseOfGait
+from colloc.verification.adaptive_motion import FineMotion, rates_at
 from colloc.verification.replay import Path
 
 SLOW = 30.0
@@ -22,11 +21,11 @@ _ZOOMS, _SAMPLES = 5, 9
 _SEPARATE = 1e-6
 
 
-def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineMotion | CourseOfGait) -> np.ndarray:
-    """Phases of kinks inside the solved part of a gait, ascending, to 1e-3 of the spacing of the nodes of its motion there,
-    which are dense where velocities change quickly; delta is per period."""
+def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineMotion) -> np.ndarray:
+    """Phases of kinks inside the solved part of a gait, ascending, to 1e-3 of the spacing of the panels of its motion there,
+    which are narrow where velocities change quickly; delta is per period."""
     t = fine.nodes.ravel()
-    speed = _slowness(body, friction, path, delta, t, fine.z)
+    speed = _slowness(body, friction, path, delta, t, fine.rates.z.reshape(3, -1))
     inner = speed[:, 1:-1]
     link, index = np.nonzero((inner <= speed[:, :-2]) & (inner <= speed[:, 2:]))
     centre = t[index + 1]
@@ -34,7 +33,7 @@ def kink_phases(body: Body, friction: Law, path: Path, delta: float, fine: FineM
     least = inner[link, index]
     for _ in range(_ZOOMS if centre.size else 0):
         near = centre[:, None] + radius[:, None] * np.linspace(-1, 1, _SAMPLES)
-        z = fine.tail_velocity(body, friction, path, delta, near)
+        z = rates_at(body, friction, path, delta, near, fine.velocity(near)).z.reshape(3, -1)
         sampled = _slowness(body, friction, path, delta, near.ravel(), z)
         own = sampled[np.repeat(link, _SAMPLES), np.arange(near.size)].reshape(near.shape)
         best = own.argmin(axis=1)

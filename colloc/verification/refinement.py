@@ -48,6 +48,8 @@ _ONE_KINK = 0.02 / 16
 _LEFT = 0.2
 """How far, in mean intervals, a kink can have moved from the knot that it left."""
 _NARROWEST = 1e-7
+_WORST = 0.1
+"""Of the largest error of an interval on a slope: others are not cut with it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +143,8 @@ def planned_mesh(
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
+    if kind_of_motion(problem).states:
+        return _halved(known, mesh.scheme, knots, tolerance, aim, most_points)
     given = scheme(problem.scheme)
     kinks = kink_knots(problem, gait, delta, fine)
     switches = not problem.law.reversible
@@ -153,7 +157,7 @@ def planned_mesh(
         first = np.union1d(mesh.edges if nested else problem.gait.first_edges(mesh.edges), knots)
         edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
-        plan = _split(known, rule, edges, knots, on_knots, tolerance=tolerance, aim=aim, budget=budget)
+        plan = _split(known, rule, edges, knots, on_knots, tolerance, aim, budget)
         if best is None or (plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best))):
             best = plan
     return best
@@ -195,47 +199,47 @@ def _split(
     edges: np.ndarray,
     kept: np.ndarray,
     kinks: np.ndarray,
-    *,
     tolerance: float,
     aim: float,
     budget: float,
 ) -> MeshPlan:
     """Cut the intervals with the largest errors until all together are small enough, or the budget is exhausted."""
-    shares, unresolved = _shares(known, rule, edges, tolerance)
+    left, right = edges[:-1], edges[1:]
+    shares = interval_shares(known, rule, left, right)
+    unresolved = float(known.fine.unresolved.sum())
     wanted = max(aim * tolerance - unresolved, 0.25 * aim * tolerance)
-    while shares.sum() > wanted and shares.size * (rule.s - rule.left) < budget:
+    while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
         order = np.argsort(shares)[::-1]
         # those that hold the excess, half of them at a time: what they leave behind is not known yet
         excess = np.cumsum(shares[order]) < shares.sum() - 0.3 * wanted
         chosen = order[: max(1, int(excess.sum()) // 2)]
-        chosen = np.sort(chosen[np.diff(edges)[chosen] > 2 * _NARROWEST])
+        chosen = chosen[right[chosen] - left[chosen] > 2 * _NARROWEST]
         if chosen.size == 0:
             break
-        finer = np.insert(edges, chosen + 1, _cut(edges[chosen], edges[chosen + 1], kinks))
-        shares, _ = _shares(known, rule, finer, tolerance, (edges, shares))
-        edges = finer
+        middle = _cut(left[chosen], right[chosen], kinks)
+        new_left, new_right = np.concatenate([left[chosen], middle]), np.concatenate([middle, right[chosen]])
+        new = interval_shares(known, rule, new_left, new_right)
+        left, right, shares = (
+            np.concatenate([np.delete(old, chosen), added])
+            for old, added in ((left, new_left), (right, new_right), (shares, new))
+        )
     estimate = float(shares.sum() + unresolved)
-    return MeshPlan(rule.name, edges, estimate, estimate <= tolerance, kept)
+    return MeshPlan(rule.name, np.sort(np.append(left, right.max())), estimate, estimate <= tolerance, kept)
 
 
-def _shares(
-    known: Known, rule: Scheme, edges: np.ndarray, tolerance: float, before: tuple[np.ndarray, np.ndarray] | None = None
-) -> tuple[np.ndarray, float]:
-    """What each interval adds to the relative error of the objective, ``(n,)``, and what is unresolved of it.
-
-    An interval stands for itself, so of `before`, edges and shares, those are known that are there still; but where a motion
-    has states, what an interval errs by is handed on to all.
-    """
-    if kind_of_motion(known.problem).states:
-        error = mesh_error(known.problem, Mesh(rule, edges), known.gait, known.delta, tolerance, known.fine)
-        return np.abs(error.value), error.unresolved
-    left, right = edges[:-1], edges[1:]
-    shares, new = np.zeros(left.size), np.ones(left.size, dtype=bool)
-    if before is not None:
-        new = ~(np.isin(left, before[0]) & np.isin(right, before[0]))
-        shares[~new] = before[1][np.isin(before[0][:-1], left[~new]) & np.isin(before[0][1:], right[~new])]
-    shares[new] = interval_shares(known, rule, left[new], right[new])
-    return shares, float(known.fine.unresolved.sum())
+def _halved(known: Known, rule: Scheme, kept: np.ndarray, tolerance: float, aim: float, most_points: int) -> MeshPlan:
+    """A uniform mesh whose intervals with the largest errors are halved until all together are small enough."""
+    problem, gait, delta, fine = known
+    edges = np.union1d(np.linspace(0.0, problem.gait.fraction, problem.intervals + 1), kept)
+    while True:
+        error = mesh_error(problem, Mesh(rule, edges), gait, delta, tolerance, fine)
+        shares = np.abs(error.value)
+        if shares.sum() <= aim * tolerance or edges.size * rule.s > most_points or np.isnan(shares).any():
+            return MeshPlan(rule.name, edges, error.estimate, error.estimate <= tolerance, kept)
+        order = np.argsort(shares)[::-1]
+        excess = np.cumsum(shares[order]) < shares.sum() - 0.3 * aim * tolerance
+        chosen = order[excess & (shares[order] > _WORST * shares.max())] if excess.any() else order[:1]
+        edges = np.sort(np.concatenate([edges, 0.5 * (edges[chosen] + edges[chosen + 1])]))
 
 
 def _cut(left: np.ndarray, right: np.ndarray, kinks: np.ndarray) -> np.ndarray:
