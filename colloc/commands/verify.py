@@ -63,9 +63,9 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
     if not recorded.replayed:
         return "the file holds no certificate."
     for name, error, words in _NUMBERS:
-        if name not in recorded.numbers or name not in now.numbers:
+        if name not in recorded.numbers:
             continue  # nothing is stated
-        stated, found = recorded.numbers[name], now.numbers[name]
+        stated, found = recorded.numbers[name], now.numbers.get(name, float("nan"))
         own = max(tolerance, _TOLERANCE) * max(abs(found), 1.0)
         errors = [each.numbers[error] for each in (recorded, now)] if error else [own, 0.0]
         if error and not max(errors) <= _SAME_SIZE * min(errors) + own:

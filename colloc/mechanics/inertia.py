@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import balance_jacobian, net_force, total_power
+from colloc.mechanics.balance import balance_jacobian
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.law import Law
@@ -106,29 +106,24 @@ def momentum_rates(
 
 
 def momentum_slopes(
-    body: Chain, friction: Law, shapes: tuple[np.ndarray, np.ndarray, float], states: np.ndarray, froude: float
-) -> tuple[MomentumRates, np.ndarray]:
-    """`momentum_rates` in NumPy for angles, rates and delta, with derivatives along the momenta, ``(3, 3, n_time)``.
+    body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarray, now: MomentumRates, *, delta: float, froude: float
+) -> np.ndarray:
+    """Derivatives of the rates of the momenta along these, ``(3, 3, n_time)``, where `momentum_rates` says `now`; NumPy.
 
-    The tail velocity is ``z = z_0 + T s`` in the momenta s, and the force about the centre of mass ``F_c = C F`` of that about
-    the tail, so the derivatives are ``-C K T / Fr``, K being minus that of F along z, and those of the turning axes.
+    The tail velocity is affine in the momenta, its derivative T, and the force about the centre of mass is C times that about
+    the tail, whose derivative along the tail velocity is -K. So the derivative is -C K T / Fr, and that of the turning axes.
     """
-    angles, rates, delta = shapes
     posture = body.posture(angles)
-    still = momenta(body, posture, body.velocity(posture, rates, np.zeros_like(states)))
     x, y, inertia = (row[0] for row in (*body.centre_of_mass(posture), moment_of_inertia(body, posture)))
-    one, zero = np.ones_like(x), np.zeros_like(x)
+    velocity = body.velocity(posture, rates, now.z)
+    vx, vy = (row[0] for row in body.centre_velocity(posture, velocity))
+    omega, one, zero = now.z[2], np.ones_like(x), np.zeros_like(x)
     T = np.array([[one, zero, y / inertia], [zero, one, -x / inertia], [zero, zero, 1 / inertia]])
     C = np.array([[one, zero, zero], [zero, one, zero], [y, -x, one]])
-    z = np.einsum("ijt,jt->it", T, states - still)
-    velocity = body.velocity(posture, rates, z)
-    force = body.contact.force(friction, velocity, delta)
-    K = balance_jacobian(body, friction, posture, velocity, np.full((1, one.size), delta))
-    grown = np.einsum("ijt,jt->it", C, net_force(posture, force)) / froude
-    turned = np.zeros((3, 3, one.size))
-    turned[0, 1], turned[1, 0], turned[0, 2], turned[1, 2] = z[2], -z[2], states[1] / inertia, -states[0] / inertia
-    slopes = turned - np.einsum("ijt,tjk,klt->ilt", C, K, T, optimize=["einsum_path", (0, 1), (0, 1)]) / froude
-    return MomentumRates(grown + turning(z, states), z, total_power(velocity, force)), slopes
+    axes = np.array([[zero, omega, vy / inertia], [-omega, zero, -vx / inertia], [zero, zero, zero]])
+    K = balance_jacobian(body, friction, posture, velocity, np.full((1, x.size), delta))
+    by_friction = -C.transpose(2, 0, 1) @ K @ T.transpose(2, 0, 1) / froude
+    return axes + by_friction.transpose(1, 2, 0)
 
 
 def about_centre(body: Chain, angles: Array, force: Array) -> Array:

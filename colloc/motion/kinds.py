@@ -23,7 +23,7 @@ from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.inertia import STATES, checked_mass, momenta, momentum_slopes
+from colloc.mechanics.inertia import STATES, checked_mass, momenta, momentum_rates, momentum_slopes
 from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.heading import heading, heading_shares, momenta_image
@@ -299,7 +299,9 @@ class WithInertia(SlowOnLevel):
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
-            now, slopes = momentum_slopes(self._chain, self.friction, shapes[:3], states, self._froude_at(shapes))
+            at, pace = (self._chain, self.friction, shapes.angles, shapes.rates), self._froude_at(shapes)
+            now = momentum_rates(*at, states, delta=shapes.delta, froude=pace)
+            slopes = momentum_slopes(*at, now, delta=shapes.delta, froude=pace)
             out = np.concatenate([now.z, states[:2], now.power, now.rates])
             return Rates(now.rates, slopes, bool(np.isfinite(out).all()))
 

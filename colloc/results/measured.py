@@ -99,9 +99,9 @@ def measured(
         errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
         known.append(Estimate(errors[0], extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])))
     fine = replays[0]
-    errors_of = {name: error + fine.others.get(name, 0.0) for name, error in fine.errors.items() if name in fine.values}
-    errors_of["distance"] += astray(fine, rotation)
-    return Measured(fine, errors_of, *known)
+    stated = {name: error + fine.others.get(name, 0.0) for name, error in fine.errors.items() if name in fine.values}
+    stated["distance"] += astray(fine, rotation)
+    return Measured(fine, stated, *known)
 
 
 def astray(replayed: Replay, rotation: float | None) -> float:

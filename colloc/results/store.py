@@ -52,7 +52,7 @@ from colloc.system.store_file import (
     was_changed,
 )
 
-FORMAT, FORMAT_VERSION = "colloc solution", 4
+FORMAT, FORMAT_VERSION = "colloc solution", 5
 _LAYOUT = "see colloc.collocation.layout"
 _ANSWER_ARRAYS = {
     "edges": ("period", "edge"),
@@ -255,8 +255,8 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     """The certificate that `_write_certificate` wrote."""
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
-    values = {name: float(attribute(group, name)) for name in QUANTITIES if name in group.attrs}
-    errors = {name: float(attribute(group, f"{name}_error")) for name in QUANTITIES if f"{name}_error" in group.attrs}
+    stated = [name for name in QUANTITIES if name != "driven_work" or name in group.attrs]  # which is only known if asked for
+    values, errors = ({name: attribute(group, name + of) for name in stated} for of in ("", "_error"))
     return Certificate(values, errors, {}, checks, **{name: attribute(group, name) for name in NUMBERS})
 
 

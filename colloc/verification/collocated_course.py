@@ -41,18 +41,11 @@ class Defects(NamedTuple):
 
 
 class CourseOfGait(NamedTuple):
-    """A gait's motion by the differential equation."""
+    """A gait's motion by the differential equation: theta, place, work against friction, ``(4, n)``, at phases in order; and
+    about the error of these."""
 
-    states: Callable[[np.ndarray], np.ndarray]
-    """At phases in order."""
-    place: slice
-    """Which of them are theta, place and work against friction."""
+    at: Callable[[np.ndarray], np.ndarray]
     error: float
-    """About that of the states."""
-
-    def at(self, t: np.ndarray) -> np.ndarray:
-        """Theta, place, work against friction, ``(4, n_time)``, at phases in order."""
-        return self.states(t)[self.place]
 
 
 def course(problem: Problem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
@@ -62,22 +55,20 @@ def course(problem: Problem, gait: Any, delta: float, mesh: Mesh, error: float) 
         grade = problem.slope.grade
         on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
         ran = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
-        return CourseOfGait(ran.at, slice(0, 4), error)
+        return CourseOfGait(lambda t: ran.at(t)[:4], error)
     played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=problem.froude)
     ran = played.settled(_along(problem, mesh, gait, delta).edges[:, 0], error)
-    return CourseOfGait(ran.at, slice(3, 7), error)
+    return CourseOfGait(lambda t: ran.at(t)[3:], error)
 
 
-def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float, near: np.ndarray | None = None) -> Along:
-    """The collocated motion, sought near states ``(n_state, n_point)``."""
+def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float) -> Along:
     kind, (angles, rates) = kind_of_motion(problem), gait(mesh.times)
-    return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait), (near, None))
+    return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait))
 
 
 def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> Defects:
     """Errors of collocating a gait whose motion has states, delta per period."""
-    kind = kind_of_motion(problem)
-    own = _along(problem, mesh, gait, delta, exact.states(mesh.times)[: len(kind.states)])
+    kind, own = kind_of_motion(problem), _along(problem, mesh, gait, delta)
     pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA], own.now.centre, first_theta(kind, own.begin))
     passed = np.linalg.norm(gait(mesh.times)[1], axis=0)
     spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))

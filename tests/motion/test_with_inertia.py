@@ -7,7 +7,7 @@ import colloc
 from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
 from colloc.gaits.objective import objective_from
-from colloc.mechanics.inertia import kinetic_energy
+from colloc.mechanics.inertia import kinetic_energy, momentum_rates, momentum_slopes
 from colloc.motion.kinds import WithInertia
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
@@ -31,6 +31,30 @@ def problem(**fields):
 def program(stated):
     space, v = space_near(stated, stated.guess)
     return ReducedProgram(space, stated.delta), v
+
+
+@pytest.mark.parametrize(
+    ("body", "friction"),
+    [
+        (colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(1.7, 1.0, 1.3)),
+        (colloc.Chain((0.2, 0.3, 0.1, 0.4), weights=(0.4, 0.2, 0.2, 0.2)), colloc.Friction(0.4)),
+        (STANDING, colloc.Friction(3.0, 0.5, 1.0)),
+        (colloc.Chain((0.5, 0.5)), colloc.Viscous(2.0)),
+    ],
+)
+def test_derivatives_along_the_momenta_are_those_of_differences(body, friction):
+    """Of fourth order, at random shapes, rates and momenta."""
+    rng, law, step = np.random.default_rng(4), body.law(friction), 1e-4
+    angles, rates, states = (rng.normal(size=(n, 50)) for n in (body.n_joint, body.n_joint, 3))
+    settings = {"delta": 0.3, "froude": 0.1}
+
+    def at(states):
+        return momentum_rates(body, law, angles, rates, states, **settings)
+
+    found = momentum_slopes(body, law, angles, rates, at(states), **settings)
+    for k, unit in enumerate(np.eye(3)[:, :, None]):
+        near, far = ((at(states + n * step * unit).rates - at(states - n * step * unit).rates) / (2 * n) for n in (1, 2))
+        np.testing.assert_allclose(found[:, k], (4 * near - far) / (3 * step), rtol=1e-7, atol=1e-7)
 
 
 @pytest.mark.parametrize("froude", [0.1, 0.5, pytest.param(0.003, marks=pytest.mark.slow)])
