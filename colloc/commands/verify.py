@@ -44,8 +44,7 @@ _NUMBERS = (
     ("length", "", "a path length"),
     ("driven_work", "", "a driven work"),
 )
-"""What a certificate states: its number, the error of it, and words. The last three are held against the tolerance: their
-errors are by-products of a replay that ends where that of the value is small enough."""
+"""What a certificate states: its number, the error of it, and words. What has no error of its own is known to the tolerance."""
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -35,7 +35,8 @@ class Check:
 class Certificate(Period):
     """The verdict of an independent replay, with the quantities of the period at the solution's delta.
 
-    Their errors hold for every balanced motion, and for every point of the body that could be followed.
+    Errors are those of distance and work; they hold for every balanced motion, and for every point of the body that could be
+    followed, so that `others` is empty.
 
     Attributes
     ----------
@@ -101,7 +102,7 @@ NUMBERS = tuple(each.name for each in fields(Certificate) if each.type in ("int"
 """Of a certificate, beside the quantities of its period."""
 UNCERTIFIED = Certificate(
     values=dict.fromkeys(QUANTITIES, np.nan),
-    errors=dict.fromkeys(QUANTITIES, np.nan),
+    errors=dict.fromkeys(("distance", "work"), np.nan),
     others={},
     checks=(Check("replay", np.inf, 0.0, "not made, since the solve did not converge: nothing was checked"),),
     **(dict.fromkeys(NUMBERS, np.nan) | {"instants": 0}),  # type: ignore[arg-type]

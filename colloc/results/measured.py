@@ -61,7 +61,7 @@ class Measured(NamedTuple):
 
     fine: Replay
     errors: dict[str, float]
-    """Of quantities."""
+    """Of distance and work."""
     value: Estimate
     efficiency: Estimate
 
@@ -99,7 +99,7 @@ def measured(
         errors = [abs(value) * _error(each, aim, rotation) for value, each in zip(values, replays, strict=True)]
         known.append(Estimate(errors[0], extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])))
     fine = replays[0]
-    stated = {name: error + fine.others.get(name, 0.0) for name, error in fine.errors.items() if name in fine.values}
+    stated = {name: fine.errors[name] + fine.others.get(name, 0.0) for name in ("distance", "work")}
     stated["distance"] += astray(fine, rotation)
     return Measured(fine, stated, *known)
 

@@ -256,7 +256,8 @@ def _read_certificate(group: h5py.Group) -> Certificate:
     columns = [array(group, name) for name in ("name", "value", "threshold", "meaning")]
     checks = tuple(Check(str(n), float(v), float(t), str(m)) for n, v, t, m in zip(*columns, strict=True))
     stated = [name for name in QUANTITIES if name != "driven_work" or name in group.attrs]  # which is only known if asked for
-    values, errors = ({name: attribute(group, name + of) for name in stated} for of in ("", "_error"))
+    values = {name: attribute(group, name) for name in stated}
+    errors = {name: attribute(group, f"{name}_error") for name in ("distance", "work")}
     return Certificate(values, errors, {}, checks, **{name: attribute(group, name) for name in NUMBERS})
 
 

@@ -48,7 +48,7 @@ def test_nothing_is_left_behind_and_a_failed_write_keeps_the_old_file(three_link
     assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
 
 
-@pytest.mark.parametrize("name", ["distance", "rotation_error", "value_at_zero_delta"])
+@pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta"])
 def test_a_certificate_without_one_of_its_numbers_is_refused(name, three_link, tmp_path):
     path = save(three_link, tmp_path / "x.h5")
     with h5py.File(path, "a") as file:
