@@ -6,10 +6,10 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
-from colloc.reduced.harmonic_space import HarmonicSpace
+from colloc.reduced.linear_space import LinearSpace
 
 
-class SerpenoidSpace(HarmonicSpace):
+class SerpenoidSpace(LinearSpace):
     """Members of the class `colloc.gaits.serpenoid.Serpenoid` by their own parameters v; the chain rule to what a space of
     series knows of their coefficients."""
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.motion.kinds import SlowOnLevel
-from colloc.reduced.harmonic_space import HarmonicSpace
+from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.motion import ReducedMotion
 
 
-class SlopeSpace(HarmonicSpace):
+class SlopeSpace(LinearSpace):
     """Members of a class of harmonics on a slope; a gait that does not say where it points is pointed to where it would go,
     on the level, in the direction that counts."""
 

@@ -25,7 +25,7 @@ from colloc.gaits.sloped import OnSlope
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.heading import whole_turns
-from colloc.reduced.harmonic_space import HarmonicSpace
+from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import SearchSpace
@@ -45,7 +45,7 @@ class Searched(NamedTuple):
 
 _LINEAR = Searched(
     lambda problem, gait, edges, far: transcribe(problem, edges, far),
-    lambda problem, gait, edges, scheme, far: HarmonicSpace(problem, edges, scheme, far),
+    lambda problem, gait, edges, scheme, far: LinearSpace(problem, edges, scheme, far),
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
 _ON_SLOPE = Searched(_LINEAR.program, lambda problem, gait, edges, scheme, far: SlopeSpace(problem, edges, scheme, far))

@@ -7,7 +7,7 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem
 from colloc.gaits.starts import latin_hypercube_gait
-from colloc.reduced.harmonic_space import HarmonicSpace
+from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 from colloc.search.converge import at_rest
@@ -74,7 +74,7 @@ def test_placing_the_checks_anew_ends_it(placed):
 def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, monkeypatch):
     """With the instants held it swings: every round is optimal for the instants of the one before."""
     if not follows:
-        monkeypatch.setattr(HarmonicSpace, "follow_worst", lambda space: None)
+        monkeypatch.setattr(LinearSpace, "follow_worst", lambda space: None)
     body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(0.4, 1, 1)
     problem = Problem("touch", body=body, friction=friction, gait=Harmonic(4), joint_limit=2.5, intervals=20)
     space, v = space_near(problem, latin_hypercube_gait(problem, 0, 0))

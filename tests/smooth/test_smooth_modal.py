@@ -10,7 +10,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.balance_results import BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
-from colloc.reduced.harmonic_space import HarmonicSpace
+from colloc.reduced.linear_space import LinearSpace
 from colloc.results.distinct_optima import distance, reversed_in_time, swapped
 from colloc.results.store import load, save
 from colloc.search.solve import solve
@@ -150,7 +150,7 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
     assert (largest <= gait.largest_parameters(body, 1.0).max() * np.pi / 4).all()
     problem = Problem("modes", body=body, gait=gait, joint_limit=1.0)
     program = transcribe(problem)
-    np.testing.assert_allclose(program.upper[program.layout.parameters[:, 0]], HarmonicSpace(problem).upper)
+    np.testing.assert_allclose(program.upper[program.layout.parameters[:, 0]], LinearSpace(problem).upper)
 
 
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])

@@ -21,7 +21,7 @@ from colloc.numerics.sqp import remembered
 from colloc.reduced.given import Given
 
 
-class HarmonicSpace:
+class LinearSpace:
     """Members of a class of harmonics by their parameters v, in which angles and rates are linear, on a mesh (by default the
     problem's first), with pairs of links `far` apart that are kept from crossing; what it answers is
     told by `colloc.reduced.program.SearchSpace`.
@@ -63,11 +63,11 @@ class HarmonicSpace:
         """The mesh in phases of a member: it is the same for all."""
         return self.mesh
 
-    def remeshed(self, gait: Fourier, edges: np.ndarray, scheme: str) -> HarmonicSpace:
+    def remeshed(self, gait: Fourier, edges: np.ndarray, scheme: str) -> LinearSpace:
         """The class on another mesh."""
         return type(self)(self.problem, edges, scheme, self.far)
 
-    def with_far(self, far: Pairs) -> HarmonicSpace:
+    def with_far(self, far: Pairs) -> LinearSpace:
         return type(self)(self.problem, self.mesh.edges, self.mesh.scheme.name, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
