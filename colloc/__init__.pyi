@@ -19,6 +19,8 @@ from colloc.laws.power_law import PowerLaw as PowerLaw
 from colloc.laws.own_law import OwnLaw as OwnLaw
 from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
+from colloc.gaits.bspline import BSpline as BSpline
+from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.free_path import FreePath as FreePath, ArcPath as ArcPath
 from colloc.gaits.polygon import Polygon as Polygon, Corners as Corners
 from colloc.gaits.relaxed import Relaxed as Relaxed

@@ -94,7 +94,7 @@ class Tents(ClassOfGaits):
 @pytest.mark.parametrize("starts", [1, 2])
 def test_a_class_without_a_search_is_refused_in_words(monkeypatch, starts):
     monkeypatch.setattr(gait_fields, "CLASSES", (*gait_fields.CLASSES, Tents))
-    with pytest.raises(ProblemError, match="no search is known for the class Tents: derive it from Harmonic"):
+    with pytest.raises(ProblemError, match="no search is known for the class Tents: derive it from LinearClass"):
         solve(Problem("tents", gait=Tents(), delta=1e-2), starts=starts)
 
 
@@ -107,6 +107,14 @@ def test_a_class_of_your_own_is_searched_certified_kept_and_read(monkeypatch, tm
     read = load(save(own.found, tmp_path / "eight.h5"))
     assert type(read.problem.gait) is own.OwnHarmonics
     assert read.problem.hash == own.problem.hash
+
+
+def test_a_class_that_is_no_fourier_series_is_one_file_too(monkeypatch, tmp_path):
+    own = run("own_gait_class.md", monkeypatch)
+    found = solve(Problem("pulses", gait=own.Pulses(6, symmetry="antipodal")), starts=3)
+    assert found.status == "solved", found.message
+    read = load(save(found, tmp_path / "pulses.h5"))
+    assert (type(read.problem.gait), read.problem.hash) == (own.Pulses, found.problem.hash)
 
 
 @pytest.mark.slow

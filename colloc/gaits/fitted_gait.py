@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
 from colloc.system.errors import ProblemError
 
@@ -67,7 +68,7 @@ def fitted_gait(
 
     Parameters
     ----------
-    given : Fourier, array, path of a CSV file, or callable
+    given : gait, array, path of a CSV file, or callable
         See `Given`. A file has a column of times, then one for each joint; names and ``#`` lines are optional, and columns
         whose names end in ``_per_s``, ``_N_m`` or ``_W`` are left out.
     n_joint : int
@@ -102,7 +103,7 @@ def fitted_gait(
         degrees = degrees or in_degrees
     elif callable(given):
         time = np.arange(_PHASES) / _PHASES
-        angles = _numbers(name, given(time))
+        angles = _numbers(name, given.angles(time) if isinstance(given, GaitFunction) else given(time))
     else:
         angles = _numbers(name, given)
         time = np.arange(angles.shape[1], dtype=float)

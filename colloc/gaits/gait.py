@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced
+from colloc.gaits.symmetry import SYMMETRIES, fraction, imaged, reduced, symmetric_samples
 from colloc.system.errors import ProblemError
+
+_SEED_HARMONICS = 2
 
 DELTA_START = 0.01
 """Where searches begin in delta at unit shape speed [body lengths per radian of path]."""
@@ -36,7 +38,7 @@ class GaitFunction:
     """
 
     is_series = False
-    """Whether it is a Fourier series of the phase."""
+    """Whether it is a sum of functions of the phase with coefficients, a Fourier series for one."""
     theta: float | None = None
     """Where the tail link points at phase 0, of a gait for a slope (`colloc.gaits.sloped`)."""
     coordinate = "joint"
@@ -67,6 +69,10 @@ class GaitFunction:
     def speed_unit(self) -> float:
         """Speeds among the variables of a program are those per period divided by this: by default per radian of phase."""
         return 2 * np.pi
+
+    def grown(self, factor: float) -> Any:
+        """The gait with shapes multiplied by a factor about their mean, where it can grow; else as it is."""
+        return self
 
     @property
     def corner_phases(self) -> np.ndarray:
@@ -143,7 +149,7 @@ class UnitSpeedGait(GaitFunction):
 
 
 class ClassOfGaits:
-    """Base of the classes of gaits; besides what stands here a class has ``symmetry``, and ``series(harmonics)``."""
+    """Base of the classes of gaits; besides what stands here a class has ``symmetry``."""
 
     symmetry: str
     symmetries: tuple[str, ...] = SYMMETRIES
@@ -188,6 +194,28 @@ class ClassOfGaits:
     def closing_symmetry(self) -> str:
         """What is known of the net rotation of all members: that of gaits with this symmetry."""
         return self.symmetry
+
+    @property
+    def seeds(self) -> Any:
+        """The class that starts are drawn from: by default a few harmonics, where the class bounds the path."""
+        return self.series(_SEED_HARMONICS)
+
+    def series(self, harmonics: int) -> Any:
+        """The class of Fourier series with about so many harmonics that stand for its gaits."""
+        raise NotImplementedError
+
+    def first_guess(self, gait: Any) -> Any:
+        """What a search begins with where no guess is given but a wave: by default that."""
+        return gait
+
+    def through(self, gait: Any) -> Any:
+        """The gait that stands for any gait where a search in the class begins: by default itself."""
+        return gait
+
+    def guessed(self, gait: Any) -> tuple[Any, float]:
+        """What is checked of a guess, and its shape speed in rad per radian of phase: by default those of its path."""
+        points = symmetric_samples(gait, self.symmetry)
+        return gait, float(np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * self.fraction))
 
     @property
     def level(self) -> Any:

@@ -13,8 +13,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from colloc.gaits.bspline import BSpline
+from colloc.gaits.columns import Basis
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.linear import Combination
 from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.relaxed import Mixture, Relaxed
@@ -41,8 +44,8 @@ AnyGait: TypeAlias = Any
 AnyClass: TypeAlias = Any
 """One of `CLASSES`."""
 KIND = "kind"
-GAITS: tuple[type, ...] = (Fourier, ArcPath, Corners, Mixture, Phases, PointedSeries, SerpenoidSeries)
-CLASSES: tuple[type, ...] = (Harmonic, FreePath, Polygon, Relaxed, Prescribed, Serpenoid)
+GAITS: tuple[type, ...] = (Fourier, ArcPath, Combination, Corners, Mixture, Phases, PointedSeries, SerpenoidSeries)
+CLASSES: tuple[type, ...] = (Harmonic, BSpline, Basis, FreePath, Polygon, Relaxed, Prescribed, Serpenoid)
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 PARTS: tuple[type, ...] = (Foot, FeetLaw)
@@ -73,10 +76,10 @@ def _plain(value: Any) -> Any:
 
 
 def _revived(value: Any) -> Any:
-    """A part of a body or a law, such as a foot, from what `fields` made of it; anything else as it is."""
+    """A part of a body, a law or a gait, such as a foot, from what `fields` made of it; anything else as it is."""
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
         return tuple(_revived(part) for part in value)
-    return _from((*LAWS, *PARTS), value) if isinstance(value, dict) and KIND in value else value
+    return _from((*LAWS, *PARTS, *CLASSES), value) if isinstance(value, dict) and KIND in value else value
 
 
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:

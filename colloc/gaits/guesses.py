@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import Limit, under_one_limit
-from colloc.gaits.path_samples import fourier_through, symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.system.errors import ProblemError
 
@@ -66,14 +65,7 @@ def check_guess(body: Body, gait_class: Any, stated: Any, joint_limit: Limit, sm
     """Raise a `ProblemError` for a gait that no search can begin with: of another body, at rest, or inadmissible."""
     if stated.n_joint != body.n_joint:
         raise ProblemError(f"guess has {stated.n_joint} {body.coordinate}s but the body has {body.n_joint}.")
-    if isinstance(gait_class, Harmonic):
-        near = fourier_through(stated, gait_class)
-        guess = gait_class.fourier(gait_class.parameters(near), body.n_joint)
-        rms = guess.shape_speed
-    else:
-        guess = stated
-        points = symmetric_samples(guess, gait_class.symmetry)
-        rms = np.linalg.norm(np.diff(points), axis=0).sum() / (2 * np.pi * gait_class.fraction)
+    guess, rms = gait_class.guessed(stated)
     if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
         raise ProblemError(
             f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import ClassOfGaits, GaitFunction, finite_array
-from colloc.gaits.symmetry import ANTIPODAL
+from colloc.gaits.gait import GaitFunction, finite_array
+from colloc.gaits.linear import LinearClass
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
-
-_COARSE = 16
-"""Intervals a period, at least, from which a mesh is grown; also two for every harmonic."""
 
 
 @named_arguments
@@ -132,7 +131,7 @@ def ellipse(A0: float, A1: float, B1: float) -> Fourier:
 
 @named_arguments
 @dataclass(frozen=True)
-class Harmonic(ClassOfGaits):
+class Harmonic(LinearClass):
     """The class of gaits with `harmonics` harmonics and a given symmetry.
 
     A member is a parameter vector p; angles are linear in it. Without a symmetry that fixes it, the start phase is
@@ -159,8 +158,6 @@ class Harmonic(ClassOfGaits):
     harmonics: int = 1
     symmetry: str = "none"
 
-    moves_knots = True
-
     def __post_init__(self) -> None:
         if not is_whole(self.harmonics, 1, 64):
             raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {self.harmonics!r}.")
@@ -175,18 +172,6 @@ class Harmonic(ClassOfGaits):
     def without_cusps(self) -> bool:  # type: ignore[override]
         """Whether members come to rest nowhere, but for paths that are retraced: ellipses do not."""
         return self.harmonics == 1
-
-    def intervals(self, n_joint: int) -> int:
-        """Intervals that a first mesh wants: enough for the waves, and some for stick and slip."""
-        return round(self.fraction * (30 + 10 * self.harmonics))
-
-    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
-        """Intervals that a mesh with so many points on each needs at least, and for what."""
-        return max(2, -(-4 * self.harmonics // per_interval)), f"{self.harmonics} harmonics"
-
-    def first_edges(self, edges: np.ndarray) -> np.ndarray:
-        """The mesh from which a finer one is grown: a coarse uniform one."""
-        return np.linspace(edges[0], edges[-1], max(int(_COARSE * self.fraction), 2 * self.harmonics) + 1)
 
     def series(self, harmonics: int) -> Harmonic:
         """Fourier series that stand for its gaits: its members are such."""
@@ -217,9 +202,24 @@ class Harmonic(ClassOfGaits):
                 columns.append(column.ravel())
         return np.array(columns).T
 
-    def size(self, n_joint: int, n_interval: int | None = None) -> int:
-        """Number of parameters."""
-        return self._basis(n_joint).shape[1]
+    @property
+    def instants(self) -> np.ndarray:
+        """As many as make means of products exact."""
+        n = 4 * self.harmonics + 4
+        return np.arange(n) / n
+
+    def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """``(2 K + 1, n_time)``: 1, cos 1, sin 1, cos 2, ... at phases t, or what they change by per period."""
+        k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
+        waves = np.empty((2 * self.harmonics + 1, t.size))
+        if derivative:
+            waves[0], waves[1::2], waves[2::2] = 0.0, -k * np.sin(k * t), k * np.cos(k * t)
+        else:
+            waves[0], waves[1::2], waves[2::2] = 1.0, np.cos(k * t), np.sin(k * t)
+        return waves
+
+    def check_joints(self, n_joint: int) -> None:
+        """Any number will do."""
 
     def fourier(self, parameters: np.ndarray, n_joint: int) -> Fourier:
         """The gait of a parameter vector."""
@@ -229,6 +229,41 @@ class Harmonic(ClassOfGaits):
     def member(self, parameters: np.ndarray, n_joint: int, edges: np.ndarray | None = None) -> Fourier:
         """The gait of a parameter vector; the mesh does not matter."""
         return self.fourier(parameters, n_joint)
+
+    def through(self, gait: Any) -> Fourier:
+        """The Fourier series of a gait, paced by its own phase, with the symmetry and harmonics of the class."""
+        if isinstance(gait, Fourier):
+            return gait
+        half = symmetric_samples(gait, self.symmetry)
+        if self.symmetry == NONE:
+            whole = half[:, :-1]
+        else:
+            image = -half[::-1, ::-1] if self.symmetry == BILATERAL else -half
+            whole = np.concatenate([half[:, :-1], image[:, :-1]], axis=1)
+        spectrum = np.fft.rfft(whole, axis=1)[:, : self.harmonics + 1] * (2 / whole.shape[1])
+        return Fourier(0.5 * spectrum[:, 0].real, spectrum[:, 1:].real, -spectrum[:, 1:].imag)
+
+    def first_guess(self, gait: Fourier) -> Fourier:
+        return gait
+
+    def dimension(self, n_joint: int) -> int:
+        return n_joint * (2 * self.harmonics + 1)
+
+    def drawn(self, unit: np.ndarray, n_joint: int) -> Fourier:
+        """Harmonic k has an amplitude that falls like 1/k, so that no harmonic dominates the rates."""
+        table = (2 * unit - 1).reshape(n_joint, -1)
+        falling = 1.0 / np.arange(1, self.harmonics + 1)
+        return Fourier(table[:, 0], table[:, 1 : self.harmonics + 1] * falling, table[:, self.harmonics + 1 :] * falling)
+
+    def moved(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Fourier:
+        series = self.through(gait).resized(self.harmonics)
+        steps = step / np.arange(1, self.harmonics + 1) ** fall
+        drawn = Fourier(
+            series.mean + step * rng.normal(size=series.mean.shape),
+            series.cos + steps * rng.normal(size=series.cos.shape),
+            series.sin + steps * rng.normal(size=series.sin.shape),
+        )
+        return self.fourier(self.parameters(drawn), gait.n_joint)
 
     def parameters(self, gait: Fourier) -> np.ndarray:
         """The parameter vector of the class member nearest to `gait`, after shifting its start phase if that is free."""
@@ -250,38 +285,6 @@ class Harmonic(ClassOfGaits):
         # coordinates, such as amplitudes of modes, may be larger than what is bounded
         largest = max(1.0, np.abs(np.linalg.pinv(body.limited)).sum(axis=1).max())
         return np.full(self.size(body.n_joint), largest * 4 * limit / np.pi)
-
-    def angle_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
-        """``(n_time, n_joint, n_parameter)``: joint angles at phases t per parameter."""
-        k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
-        return self._combined(np.ones((1, t.size)), np.cos(k * t), np.sin(k * t), n_joint)
-
-    def rate_matrix(self, t: np.ndarray, n_joint: int) -> np.ndarray:
-        """``(n_time, n_joint, n_parameter)``: joint rates per period at phases t per parameter."""
-        k = 2 * np.pi * np.arange(1, self.harmonics + 1)[:, None]
-        return self._combined(np.zeros((1, t.size)), -k * np.sin(k * t), k * np.cos(k * t), n_joint)
-
-    def mean_square_rate(self, n_joint: int) -> np.ndarray:
-        """``(n_parameter, n_parameter)``: the mean square shape speed per period as a quadratic form of the parameters."""
-        n_time = 4 * self.harmonics + 4
-        rates = self.rate_matrix(np.arange(n_time) / n_time, n_joint)
-        return np.einsum("tjp,tjq->pq", rates, rates) / n_time
-
-    def enclosed_area(self, n_joint: int) -> np.ndarray:
-        """``(n_parameter, n_parameter)``: the area ``integral of sum_(i<j) (q_i dq_j - q_j dq_i) / 2`` that a path encloses in
-        the planes of its joints [rad^2], as a quadratic form of the parameters; 0 for retraced paths."""
-        n_time = 4 * self.harmonics + 4
-        t = np.arange(n_time) / n_time
-        angles, rates = self.angle_matrix(t, n_joint), self.rate_matrix(t, n_joint)
-        sign = np.triu(np.ones((n_joint, n_joint)), 1)
-        form = 0.5 * np.einsum("tip,ij,tjq->pq", angles, sign - sign.T, rates) / n_time
-        return 0.5 * (form + form.T)
-
-    def _combined(self, constant: np.ndarray, cos: np.ndarray, sin: np.ndarray, n_joint: int) -> np.ndarray:
-        waves = np.empty((2 * self.harmonics + 1, constant.shape[1]))
-        waves[:1], waves[1::2], waves[2::2] = constant, cos, sin
-        basis = self._basis(n_joint).reshape(n_joint, waves.shape[0], -1)
-        return np.einsum("wt,jwp->tjp", waves, basis)
 
 
 def harmonics_within(highest: int, symmetry: str) -> Harmonic:

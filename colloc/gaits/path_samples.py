@@ -11,9 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from colloc.gaits.free_path import ArcPath, FreePath, across_the_axis
-from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.polygon import Corners, Polygon
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, BOTH, NONE, fraction
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, fraction, symmetric_samples
 
 _DENSE = 2000
 _BEND = 1.5
@@ -40,33 +39,6 @@ def path_length(gait: Gait) -> float:
     """Length of the closed path of a gait [rad], which is its mean shape speed per period."""
     points = gait.angles(np.linspace(0.0, 1.0, _DENSE + 1))
     return float(np.linalg.norm(np.diff(points), axis=0).sum())
-
-
-def symmetric_samples(gait: Gait, symmetry: str, count: int = _DENSE) -> np.ndarray:
-    """Points ``(n_joint, count + 1)`` along the solved part of the symmetric gait nearest to `gait`, evenly in phase.
-
-    Phase 0 is kept if the gait has the symmetry about it, else moved to where it comes closest to having it.
-    """
-    if symmetry == NONE:
-        return gait.angles(np.linspace(0.0, 1.0, count + 1))
-    if symmetry == BOTH:
-        half = symmetric_samples(gait, BILATERAL, 2 * count)
-        return (0.5 * (half + half[::-1, ::-1]))[:, : count + 1]
-    n = 2 * count
-    t = np.arange(n) / n
-    angles = gait.angles(t)
-    if symmetry == ANTIPODAL:
-        angles = 0.5 * (angles - np.roll(angles, count, axis=1))
-        return np.concatenate([angles[:, :count], -angles[:, :1]], axis=1)
-    exchanged = -angles[::-1]
-    # asymmetry about phase k/(2n): sum over i of |q(i) - S q(k - i)|^2, up to a constant minus twice a circular convolution
-    spectrum = np.fft.rfft(angles, axis=1) * np.fft.rfft(exchanged, axis=1)
-    match = np.fft.irfft(spectrum, n, axis=1).sum(axis=0)
-    shift = 0 if match[0] > match.max() - 1e-9 * n else int(np.argmax(match))
-    shift += shift % 2 * (1 if match[(shift + 1) % n] > match[shift - 1] else -1)
-    angles = np.roll(angles, -(shift // 2), axis=1)
-    angles = 0.5 * (angles - np.roll(angles[::-1, ::-1], 1, axis=1))
-    return angles[:, : count + 1]
 
 
 def _by_arc_length(points: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, float]:
@@ -133,20 +105,6 @@ def _end_correction(headings: np.ndarray, target: FreePath, at: np.ndarray) -> n
     if target.symmetry == BILATERAL:
         first = across_the_axis(headings[0, 0]) - headings[0, 0]
     return first + at * (winding * unit - turned)
-
-
-def fourier_through(gait: Gait, target: Harmonic) -> Fourier:
-    """The Fourier series of a gait, paced by its own phase, with the symmetry and harmonics of a class."""
-    if isinstance(gait, Fourier):
-        return gait
-    half = symmetric_samples(gait, target.symmetry)
-    if target.symmetry == NONE:
-        whole = half[:, :-1]
-    else:
-        image = -half[::-1, ::-1] if target.symmetry == BILATERAL else -half
-        whole = np.concatenate([half[:, :-1], image[:, :-1]], axis=1)
-    spectrum = np.fft.rfft(whole, axis=1)[:, : target.harmonics + 1] * (2 / whole.shape[1])
-    return Fourier(0.5 * spectrum[:, 0].real, spectrum[:, 1:].real, -spectrum[:, 1:].imag)
 
 
 def corners_through(gait: Gait, target: Polygon) -> Corners:

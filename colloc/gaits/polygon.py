@@ -15,6 +15,7 @@ from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, both_halves, fract
 from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
+_EVENLY = np.linspace(0.0, 1.0, 1001)[:-1]
 _MOST_TOLD = 64
 """Vertices of a polygon that are told one by one."""
 
@@ -105,6 +106,11 @@ class Corners(UnitSpeedGait):
         phases, vertices = self.phases, self.vertices
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
         return vertices[:, k], (np.diff(vertices) / np.diff(phases))[:, k], phase - phases[k]
+
+    def grown(self, factor: float) -> Corners:
+        """The polygon with shapes multiplied by a factor about their mean over the path."""
+        mean = self.angles(_EVENLY).mean(axis=1, keepdims=True)
+        return Corners(mean + factor * (self.corners - mean), self.symmetry)
 
     def lines(self) -> list[str]:
         """Length and, if they are few, corners."""

@@ -165,11 +165,12 @@ class Problem:
             check_asked(self)
         if self.froude != 0:
             check_paced(self)
+        self._check_gaits()
         if self.guess is None:
             free = self.gait.free
-            self._fill(guess=travelling_wave(self.body, self.joint_limit) if free else self.gait.member(np.empty(0), 2))
+            wave = self.gait.first_guess(travelling_wave(self.body, self.joint_limit)) if free else None
+            self._fill(guess=wave or self.gait.member(np.empty(0), 2))
         check_kind("guess", self.guess, gait_fields.GAITS)
-        self._check_gaits()
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
     def _fill(self, **usual: object) -> None:

@@ -2,8 +2,8 @@
 
 Start number k of a seed is the same whatever the number of starts.
 Admissible shapes form a region that is star-shaped about the straight body (joint limits and non-crossing keep holding
-when all angles shrink together). So a gait is sampled as a direction in the space of Fourier parameters, from a Latin
-hypercube over the harmonics, times a fraction of the largest amplitude that is admissible in that direction.
+when all angles shrink together). So a gait is sampled as a direction in the space of parameters, from a Latin
+hypercube, times a fraction of the largest amplitude that is admissible in that direction.
 """
 
 from __future__ import annotations
@@ -12,10 +12,8 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.guesses import largest_factor
-from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.limits import Limit
-from colloc.gaits.path_samples import fourier_through, path_length
-from colloc.gaits.polygon import Corners
+from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
@@ -25,7 +23,6 @@ LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
 SAMPLERS = (LATIN_HYPERCUBE, PERTURBED)
 BLOCK = 25
 """Starts per Latin hypercube: start k belongs to hypercube k // BLOCK, seeded by that number and the run's seed."""
-PATH_SEED_HARMONICS = 2
 _FRACTIONS = (0.2, 0.95)
 _PHASES = 200
 _ATTEMPTS = 200
@@ -40,14 +37,9 @@ _NEAR = 10.0
 gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 times the final delta 0.3998)."""
 
 
-def largest_amplitude(problem: Problem, gait: Fourier) -> float:
+def largest_amplitude(problem: Problem, gait: AnyGait) -> float:
     """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for the straight body."""
     return largest_factor(problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES))
-
-
-def seed_class(problem: Problem) -> Harmonic:
-    """The harmonics that starts are drawn from: the problem's own, or a few where its class bounds the path."""
-    return problem.gait.series(PATH_SEED_HARMONICS)
 
 
 def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
@@ -66,15 +58,13 @@ def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndar
     return (order.T - within) / n
 
 
-def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
-    """Start number `start` of a Latin hypercube over the mean and the harmonics of the problem's class of gaits.
+def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
+    """Start number `start` of a Latin hypercube over the problem's class of gaits.
 
-    Harmonic k is sampled with an amplitude that falls like 1/k, so that no harmonic dominates the rates. `ProblemError` if no
-    admissible gait moves as fast as the problem's ``smallest_shape_speed``.
+    `ProblemError` if no admissible gait moves as fast as the problem's ``smallest_shape_speed``.
     """
     block, row = divmod(start, BLOCK)
-    n_joint, harmonics = problem.body.n_joint, seed_class(problem).harmonics
-    dimension = n_joint * (2 * harmonics + 1) + 1
+    dimension = problem.gait.seeds.dimension(problem.body.n_joint) + 1
     rng = np.random.default_rng([seed, block]).spawn(1)[0]  # as newer releases of SciPy do
     unit = latin_hypercube(BLOCK, dimension, rng)[row]
     again = np.random.default_rng([seed, block, row + 1])
@@ -88,42 +78,37 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> Fourier:
     )
 
 
-def _scaled(problem: Problem, unit: np.ndarray) -> Fourier:
+def _scaled(problem: Problem, unit: np.ndarray) -> AnyGait:
     """The member of the class that a point of the unit cube stands for."""
-    n_joint, harmonics = problem.body.n_joint, seed_class(problem).harmonics
-    table = (2 * unit[:-1] - 1).reshape(n_joint, -1)
-    falling = 1.0 / np.arange(1, harmonics + 1)
-    drawn = Fourier(table[:, 0], table[:, 1 : harmonics + 1] * falling, table[:, harmonics + 1 :] * falling)
+    drawn = problem.gait.seeds.drawn(unit[:-1], problem.body.n_joint)
     return _multiplied(problem, drawn, _FRACTIONS[0] + unit[-1] * (_FRACTIONS[1] - _FRACTIONS[0]))
 
 
-def _multiplied(problem: Problem, drawn: Fourier, fraction: float) -> Fourier:
+def _multiplied(problem: Problem, drawn: AnyGait, fraction: float) -> AnyGait:
     """The class member nearest to `drawn`, at a fraction of the largest admissible amplitude."""
-    gait = seed_class(problem).fourier(seed_class(problem).parameters(drawn), problem.body.n_joint)
+    own = problem.gait.seeds
+    gait = own.member(own.parameters(drawn), problem.body.n_joint)
     largest = largest_amplitude(problem, gait)
     if not np.isfinite(largest):
         return gait
     return gait.scaled(fraction * largest)
 
 
-def perturbed_gait(problem: Problem, seed: int, start: int) -> Fourier:
+def perturbed_gait(problem: Problem, seed: int, start: int) -> AnyGait:
     """Start number `start` near the problem's own guess, whose coefficients move by normals of 0.3 rad.
 
     Where that leaves the admissible region, the whole gait is shrunk back into it.
     """
     rng = np.random.default_rng([seed, start])
-    near = fourier_through(problem.guess, seed_class(problem)).resized(seed_class(problem).harmonics)
     for _ in range(_ATTEMPTS):
-        mean, cos, sin = (a + _SPREAD * rng.standard_normal(a.shape) for a in (near.mean, near.cos, near.sin))
-        drawn = Fourier(mean, cos, sin)
-        member = seed_class(problem).fourier(seed_class(problem).parameters(drawn), problem.body.n_joint)
+        member = problem.gait.seeds.moved(problem.guess, _SPREAD, 0, rng)
         gait = _multiplied(problem, member, min(1.0, 1.0 / largest_amplitude(problem, member)))
         if gait.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
     raise ProblemError(f"found no admissible start within {_SPREAD:g} rad of the guess.")
 
 
-def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> Fourier:
+def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> AnyGait:
     """The gait of start number `start` of a sampler by name; "perturbed" ones lie near the problem's own guess."""
     if sampler not in SAMPLERS:
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {sampler!r}.")
@@ -147,19 +132,16 @@ def over_links(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = flo
 def laid_into(
     gait_class: AnyClass, gait: AnyGait, body: Body, joint_limit: Limit = float(np.pi), smallest_shape_speed: float = 0.1
 ) -> AnyGait:
-    """The gait that starts a search in a class: its Fourier series for harmonics, else itself, made admissible.
+    """The gait that starts a search in a class: what stands for it there, made admissible.
 
     A truncated series overshoots, and a path that touches its limits is no longer admissible then: all angles shrink. It cuts
     corners, and a path as short as it may be becomes too short: it grows about its mean.
     """
-    near = fourier_through(gait, gait_class) if isinstance(gait_class, Harmonic) else gait
+    near = gait_class.through(gait)
     growth = 2 * np.pi * smallest_shape_speed / path_length(near)
-    if growth > _SHORT and isinstance(near, Fourier):
+    if growth > _SHORT:
         near = near.grown(growth)
-    elif growth > _SHORT and isinstance(near, Corners):
-        mean = near.angles(_PERIOD[:-1]).mean(axis=1, keepdims=True)
-        near = Corners(mean + growth * (near.corners - mean), near.symmetry)
-    if near is gait or not isinstance(near, Fourier):
+    if near is gait or not near.is_series:
         return near
     return near.scaled(min(1.0, largest_factor(body, joint_limit, near.angles(_PERIOD))))
 

@@ -23,6 +23,7 @@ from colloc.system.errors import ProblemError
 
 NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")
 BOTH = "both"
+_DENSE = 2000
 
 
 def fraction(symmetry: str) -> float:
@@ -52,6 +53,33 @@ def imaged(symmetry: str, values: np.ndarray, image: np.ndarray, derivative: int
     if symmetry == BILATERAL:  # time runs backwards
         return np.where(image, -((-1) ** derivative) * values[::-1], values)
     return np.where(image, -values, values) if symmetry == ANTIPODAL else values
+
+
+def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarray:
+    """Points ``(n_joint, count + 1)`` along the solved part of the symmetric gait nearest to `gait`, evenly in phase.
+
+    Phase 0 is kept if the gait has the symmetry about it, else moved to where it comes closest to having it.
+    """
+    if symmetry == NONE:
+        return gait.angles(np.linspace(0.0, 1.0, count + 1))
+    if symmetry == BOTH:
+        half = symmetric_samples(gait, BILATERAL, 2 * count)
+        return (0.5 * (half + half[::-1, ::-1]))[:, : count + 1]
+    n = 2 * count
+    t = np.arange(n) / n
+    angles = gait.angles(t)
+    if symmetry == ANTIPODAL:
+        angles = 0.5 * (angles - np.roll(angles, count, axis=1))
+        return np.concatenate([angles[:, :count], -angles[:, :1]], axis=1)
+    exchanged = -angles[::-1]
+    # asymmetry about phase k/(2n): sum over i of |q(i) - S q(k - i)|^2, up to a constant minus twice a circular convolution
+    spectrum = np.fft.rfft(angles, axis=1) * np.fft.rfft(exchanged, axis=1)
+    match = np.fft.irfft(spectrum, n, axis=1).sum(axis=0)
+    shift = 0 if match[0] > match.max() - 1e-9 * n else int(np.argmax(match))
+    shift += shift % 2 * (1 if match[(shift + 1) % n] > match[shift - 1] else -1)
+    angles = np.roll(angles, -(shift // 2), axis=1)
+    angles = 0.5 * (angles - np.roll(angles[::-1, ::-1], 1, axis=1))
+    return angles[:, : count + 1]
 
 
 def end_conditions(symmetry: str, n_joint: int) -> tuple[np.ndarray, np.ndarray]:

@@ -11,10 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import seed_class
 from colloc.gaits.symmetry import NONE
 from colloc.numerics.sqp import minimised
 from colloc.reduced.program import ReducedProgram
@@ -58,14 +56,12 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
     are drawn from, at delta in the units of the class, by default the problem's. A start need not be perfect: where SQP does
     not come to rest in a few steps, what it has found is returned.
     """
-    if problem.gait.symmetry != NONE or problem.rotation is None or not gait.is_series or not seed_class(problem).linear:
+    if problem.gait.symmetry != NONE or problem.rotation is None or not gait.is_series or not problem.gait.seeds.linear:
         return gait
     delta = problem.delta if delta is None else delta
     if problem.gait.unit_speed:
         delta *= path_length(gait)
-    harmonics: Harmonic = seed_class(problem)
-    space, v = space_near(
-        problem.with_(gait=harmonics, guess=gait, intervals=_INTERVALS + 4 * harmonics.harmonics, **_ELSE_FREE), gait
-    )
-    program, area = ReducedProgram(space, delta), harmonics.enclosed_area(problem.body.n_joint)
+    own = problem.gait.seeds
+    space, v = space_near(problem.with_(gait=own, guess=gait, intervals=_INTERVALS + 4 * own.harmonics, **_ELSE_FREE), gait)
+    program, area = ReducedProgram(space, delta), own.enclosed_area(problem.body.n_joint)
     return space.member(minimised(_Nearest(program, v, area), v, np.inf, _ACCURACY, _STEPS).v)

@@ -1,4 +1,4 @@
-"""Harmonic gaits as a search sees them: shapes on a mesh and rows that keep them admissible, in terms of their parameters."""
+"""Gaits that are linear in their parameters as a search sees them: shapes on a mesh, and rows that keep them admissible."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, peaks
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import widest
-from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
@@ -22,7 +20,7 @@ from colloc.reduced.given import Given
 
 
 class LinearSpace:
-    """Members of a class of harmonics by their parameters v, in which angles and rates are linear, on a mesh (by default the
+    """Members of a linear class by their parameters v, in which angles and rates are linear, on a mesh (by default the
     problem's first), with pairs of links `far` apart that are kept from crossing; what it answers is
     told by `colloc.reduced.program.SearchSpace`.
 
@@ -47,23 +45,23 @@ class LinearSpace:
         self.own = np.arange(self.n)
         self.move_checks(np.zeros(self.n))
 
-    def member(self, v: np.ndarray) -> Fourier:
-        return self.problem.gait.fourier(v, self.problem.body.n_joint)
+    def member(self, v: np.ndarray) -> AnyGait:
+        return self.problem.gait.member(v, self.problem.body.n_joint)
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait."""
-        return self.problem.gait.parameters(fourier_through(gait, self.problem.gait))
+        return self.problem.gait.parameters(self.problem.gait.through(gait))
 
     laid = parameters
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         return v
 
-    def phase_mesh(self, gait: Fourier) -> Mesh:
+    def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member: it is the same for all."""
         return self.mesh
 
-    def remeshed(self, gait: Fourier, edges: np.ndarray, scheme: str) -> LinearSpace:
+    def remeshed(self, gait: AnyGait, edges: np.ndarray, scheme: str) -> LinearSpace:
         """The class on another mesh."""
         return type(self)(self.problem, edges, scheme, self.far)
 

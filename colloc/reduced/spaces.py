@@ -1,6 +1,6 @@
 """Programs and classes of gaits for a problem of any kind: which of them a class of gaits wants.
 
-A class that derives from `Harmonic` needs nothing here; any other has a line in `SEARCHED`.
+A class that derives from `LinearClass`, as `Harmonic` does, needs nothing here; any other has a line in `SEARCHED`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.harmonic import Harmonic
+from colloc.gaits.linear import LinearClass
 from colloc.gaits.polygon import Polygon
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
@@ -62,7 +62,7 @@ SEARCHED: dict[type, Searched] = {
     OnSlope: _ON_SLOPE,
     Relaxed: _MIXED,
     Serpenoid: _SERPENOID,
-    Harmonic: _LINEAR,
+    LinearClass: _LINEAR,
     Prescribed: _LINEAR,
 }
 """By class, for it and those that derive from it; the first that fits counts."""
@@ -72,8 +72,8 @@ def _searched(problem: Problem) -> Searched:
     found = next((how for kind, how in SEARCHED.items() if isinstance(problem.gait, kind)), None)
     if found is None:
         raise ProblemError(
-            f"no search is known for the class {type(problem.gait).__name__}: derive it from Harmonic if its gaits are Fourier "
-            "series, or give its program and its space a line in SEARCHED of colloc.reduced.spaces "
+            f"no search is known for the class {type(problem.gait).__name__}: derive it from LinearClass if its angles are "
+            "linear in its parameters, or give its program and its space a line in SEARCHED of colloc.reduced.spaces "
             "(docs/howto/own_gait_class.md)."
         )
     return found

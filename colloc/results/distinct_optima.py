@@ -24,7 +24,6 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.path_samples import fourier_through
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
@@ -108,7 +107,7 @@ def series_class(problem: Problem) -> Harmonic:
 
 def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
     """The Fourier series that stands for a gait of a problem."""
-    return fourier_through(gait, series_class(problem))
+    return series_class(problem).through(gait)
 
 
 @dataclass(frozen=True, eq=False)

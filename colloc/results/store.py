@@ -67,6 +67,7 @@ _GAIT_ARRAYS = {
     "mean": ("rad", "joint"),
     "cos": ("rad", "joint, harmonic"),
     "sin": ("rad", "joint, harmonic"),
+    "table": ("", "joint, function"),
     "edges": ("period", "edge"),
     "shapes": ("rad", "joint, edge"),
     "tangents": ("heading in rad, or unit vector", "component, edge"),
@@ -206,6 +207,8 @@ def _write_gait(group: h5py.Group, gait: AnyGait, coordinate: str) -> None:
         if name in _GAIT_ARRAYS:
             units, dims = _GAIT_ARRAYS[name]
             put(group, name, value, units=units, dims=dims.replace("joint", coordinate))
+        elif isinstance(value, dict):  # a class, whose functions the gait is a sum of
+            put(group, name, json.dumps(value))
         else:
             put_attribute(group, name, value)
 

@@ -28,7 +28,7 @@ def evaluate(
     ----------
     problem : Problem
         Whose body, friction, limits and objective are meant; its class of gaits is left out.
-    gait : Fourier, array, path of a CSV file, or callable
+    gait : any gait, array, path of a CSV file, or callable
         Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a period, a file with a column of times, or a function
         of phases ``(n_time,)``.
     period, harmonics, degrees

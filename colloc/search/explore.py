@@ -19,10 +19,9 @@ import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.guesses import travelling_wave
-from colloc.gaits.harmonic import Fourier, ellipse
-from colloc.gaits.path_samples import fourier_through
+from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links, seed_class
+from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links
 from colloc.mechanics.chain import Chain
 from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
@@ -152,7 +151,7 @@ def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
     body, limit = problem.body, problem.joint_limit
     known = [over_links(ellipse(*numbers), Chain(), body, limit) for numbers in _KNOWN]
     waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
-    own = seed_class(problem)
+    own = problem.gait.seeds
     first = [problem.guess, *(laid_into(own, gait, body, limit, problem.smallest_shape_speed) for gait in (*known, *waves))]
     # known gaits and seeds take turns: neither are always better
     seeds = map(partial(latin_hypercube_gait, problem, seed), itertools.count())
@@ -223,17 +222,9 @@ def _best(optima: Sequence[Optimum]) -> Optimum | None:
 
 
 def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
-    """The Fourier series of a gait with every coefficient moved by chance: where the next hop from basin to basin lands."""
-    own, rng = seed_class(problem), np.random.default_rng([1, number])
-    series = fourier_through(gait, own)
+    """What stands for a gait with every coefficient moved by chance: where the next hop from basin to basin lands."""
     size = _HOP_SIZES[number % len(_HOP_SIZES)]
-    falling = size / np.arange(1, series.cos.shape[1] + 1)
-    moved = Fourier(
-        series.mean + size * rng.normal(size=series.mean.shape),
-        series.cos + falling * rng.normal(size=series.cos.shape),
-        series.sin + falling * rng.normal(size=series.sin.shape),
-    )
-    return own.fourier(own.parameters(moved), problem.body.n_joint)
+    return problem.gait.seeds.moved(gait, size, 1, np.random.default_rng([1, number]))
 
 
 def _follow(space: SearchSpace, v: np.ndarray, deltas: list[float], known: list[list[Candidate]]) -> None:

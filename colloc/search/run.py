@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from colloc.gaits.gait_fields import GAITS
+from colloc.gaits import gait_fields
 from colloc.gaits.problem import Problem
 from colloc.reduced.given import Given
 from colloc.results.answer import Answer, SecondOrder, Step
@@ -103,7 +103,7 @@ class Run:
         self._stated = self.problem.to_dict()
         stages = [Answer, Certificate, Check, Effort, Given, Optimum, SecondOrder, Step]
         self._codec = Codec(
-            [*stages, Optimality, Realised, Relaxation, *GAITS],
+            [*stages, Optimality, Realised, Relaxation, *gait_fields.GAITS, *gait_fields.CLASSES],
             {Problem: Own(self._changes, self._with_changes)},
         )
         try:

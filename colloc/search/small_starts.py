@@ -17,7 +17,7 @@ from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import widest
 from colloc.gaits.polygon import Corners
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import laid_into, seed_class
+from colloc.gaits.starts import laid_into
 from colloc.mechanics.law import rate_independent
 from colloc.system.errors import NotConvergedError
 
@@ -51,7 +51,7 @@ def small_loops(problem: Problem) -> list[AnyGait]:
     """
     if problem.froude or not rate_independent(problem.law):
         return []
-    own, loops = seed_class(problem), []
+    own, loops = problem.gait.seeds, []
     for small, shape in _best_small_gaits(problem)[:_SHAPES]:
         size = _SIZE * 2 * np.pi * problem.smallest_shape_speed
         for back in (False, True):
@@ -89,10 +89,10 @@ def _best_small_gaits(problem: Problem) -> list[tuple[SmallGait, np.ndarray]]:
 
 def _drawn_shapes(problem: Problem) -> np.ndarray:
     """Admissible shapes ``(n_joint, n)`` about which a gait of the class may run, without repetition."""
-    body, own, n_joint = problem.body, seed_class(problem), problem.body.n_joint
+    body, own, n_joint = problem.body, problem.gait.seeds, problem.body.n_joint
     drawn = np.random.default_rng(2).choice(_LEVELS, (_DRAWN, n_joint)) * widest(problem.joint_limit)
-    none = np.zeros((n_joint, own.harmonics))
-    means = np.array([own.fourier(own.parameters(Fourier(mean, none, none)), n_joint).mean for mean in drawn])
+    none = np.zeros((n_joint, 1))
+    means = np.array([own.member(own.parameters(Fourier(mean, none, none)), n_joint).mean for mean in drawn])
     # of a shape and its mirror image, the one whose first bend is to the left
     first = np.take_along_axis(means, (means != 0).argmax(axis=1)[:, None], axis=1)
     means = np.unique(np.where(first < 0, -means, means) + 0.0, axis=0)

@@ -7,13 +7,11 @@ from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmoni
 from colloc.gaits.harmonic import shifted
 from colloc.gaits.path_samples import (
     corners_through,
-    fourier_through,
     graded_edges,
     path_length,
-    symmetric_samples,
 )
 from colloc.gaits.starts import prolonged
-from colloc.gaits.symmetry import SYMMETRIES
+from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.numerics.arcs import advance, direction
 from colloc.reduced.spaces import nearest_parameters, transcribed
@@ -109,7 +107,7 @@ def test_harmonics_survive_the_way_through_points(symmetry):
         n_joint, delta_unit = 2, 1.0
         angles, rates = staticmethod(gait.angles), staticmethod(gait.rates)
 
-    back = fourier_through(Opaque(), target)
+    back = target.through(Opaque())
     t = np.linspace(0, 1, 50)
     np.testing.assert_allclose(back.angles(t), gait.angles(t), atol=1e-10)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous, replay
-from colloc.gaits.starts import seed_class
 from colloc.results.distinct_optima import distance
 from colloc.search.explore import candidates
 from colloc.search.small_starts import small_loops
@@ -22,7 +21,7 @@ PROBLEMS = {
 
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
 def test_loops_are_admissible_members_of_the_class_hardly_longer_than_they_must_be(problem):
-    loops, own = small_loops(problem), seed_class(problem)
+    loops, own = small_loops(problem), problem.gait.seeds
     assert 2 <= len(loops) <= 4
     for loop in loops:
         n_joint = problem.body.n_joint

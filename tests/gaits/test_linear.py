@@ -1,0 +1,180 @@
+"""Classes that are linear in their parameters: B-splines and columns of one's own, against Fourier series and differences."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc import Basis, BSpline, Chain, Friction, Harmonic, Problem, ProblemError
+from colloc.gaits.fitted_gait import fitted_gait
+from colloc.gaits.gait_fields import class_from, fields, gait_from
+from colloc.gaits.symmetry import SYMMETRIES
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near
+
+T = np.arange(200) / 200
+PHASES = np.arange(96) / 96
+
+
+def bump(t):
+    return np.exp(2 * np.cos(2 * np.pi * t))
+
+
+FOUR = tuple(lambda t, k=k: bump(t - k / 4) for k in range(4))
+ELLIPSES = [
+    np.stack([np.cos(2 * np.pi * PHASES), -np.cos(2 * np.pi * PHASES)]),
+    np.stack([np.sin(2 * np.pi * PHASES)] * 2),
+    np.stack([np.ones(96), -np.ones(96)]),
+]
+CLASSES = [BSpline(8, symmetry="bilateral"), BSpline(7, 3), Basis(FOUR, "antipodal"), Basis(ELLIPSES)]
+
+
+def member(gait_class, n_joint=2, seed=1):
+    return gait_class.member(np.random.default_rng(seed).normal(size=gait_class.size(n_joint)), n_joint)
+
+
+@pytest.mark.parametrize("gait_class", [BSpline(9, 3), BSpline(8, 4), BSpline(10, 5), Basis(FOUR)])
+def test_derivatives_of_the_functions_are_those_of_differences_and_a_period_closes(gait_class):
+    h = 1e-6
+    slope = (gait_class.functions(T + h) - gait_class.functions(T - h)) / (2 * h)
+    np.testing.assert_allclose(gait_class.functions(T, 1), slope, atol=1e-6 * np.abs(slope).max())
+    np.testing.assert_allclose(gait_class.functions(T + 1.0), gait_class.functions(T), atol=1e-11)
+
+
+def test_b_splines_add_up_to_one():
+    for spline in (BSpline(5, 4), BSpline(11, 3), BSpline(64, 5)):
+        np.testing.assert_allclose(spline.functions(T).sum(axis=0), 1.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("degree", [3, 4, 5])
+def test_a_wave_is_met_at_the_order_of_the_splines(degree):
+    wave = colloc.ellipse(0.2, 1.3, 0.8)
+    off = [np.abs(BSpline(n, degree).through(wave).angles(T) - wave.angles(T)).max() for n in (12, 24)]
+    assert np.log2(off[0] / off[1]) == pytest.approx(degree + 1, abs=0.3)
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+@pytest.mark.parametrize("columns", [None, FOUR])
+def test_members_have_the_symmetry_of_their_class_and_are_found_again(symmetry, columns):
+    gait_class = Basis(columns, symmetry) if columns else BSpline(8, symmetry=symmetry)
+    for n_joint in (2, 3):
+        gait = member(gait_class, n_joint)
+        images = {
+            "none": gait.angles(T),
+            "bilateral": -gait.angles(-T)[::-1],
+            "antipodal": -gait.angles(T + 0.5),
+        }
+        np.testing.assert_allclose(images[symmetry], gait.angles(T), atol=1e-8)
+        v = gait_class.parameters(gait)
+        np.testing.assert_allclose(gait_class.member(v, n_joint).table, gait.table, atol=1e-10)
+        # as anybody's gait: by its angles alone
+        again = gait_class.member(gait_class.parameters(gait.mapped(np.eye(n_joint))), n_joint)
+        np.testing.assert_allclose(again.angles(T), gait.angles(T), atol=1e-4)
+
+
+def test_a_symmetry_halves_the_parameters():
+    assert [BSpline(8, symmetry=s).size(2) for s in SYMMETRIES] == [16, 8, 8]
+    assert [Basis(FOUR, symmetry=s).size(2) for s in SYMMETRIES] == [8, 4, 4]
+
+
+def test_statements_read_back_as_what_they_were():
+    for gait_class in CLASSES:
+        gait = member(gait_class)
+        assert class_from(fields(gait_class)) == gait_class
+        read = gait_from(fields(gait))
+        assert read.basis == gait.basis
+        np.testing.assert_array_equal(read.table, gait.table)
+
+
+@pytest.mark.parametrize("gait_class", CLASSES)
+def test_reduced_gradients_are_those_of_differences(gait_class):
+    problem = Problem(
+        "differences", friction=Friction(2.0, 1.0, 1.0 if gait_class.symmetry == "none" else 1.5), gait=gait_class
+    )
+    space, v = space_near(problem, problem.guess)
+    program, h = ReducedProgram(space, 1e-2), 1e-6
+    along = np.random.default_rng(3).normal(size=v.size)
+    numeric = (program.objective(v + h * along) - program.objective(v - h * along)) / (2 * h)
+    assert program.gradient(v) @ along == pytest.approx(numeric, rel=1e-5, abs=1e-8)
+    rows = (program.rows(v + h * along) - program.rows(v - h * along)) / (2 * h)
+    np.testing.assert_allclose(program.row_slopes(v) @ along, rows, rtol=1e-5, atol=1e-6)
+
+
+def test_columns_that_are_one_harmonic_have_its_optimum():
+    """The search sees other numbers; the set of gaits is the same."""
+    own = colloc.solve(Problem("columns", gait=Basis(ELLIPSES, "bilateral")), starts=4)
+    known = colloc.solve(Problem("harmonic", gait=Harmonic(1, "bilateral")), starts=4)
+    assert own.status == known.status == "solved"
+    assert own.value == pytest.approx(known.value, rel=1e-6)
+
+
+def test_four_primitives_are_solved_kept_read_and_played(tmp_path):
+    found = colloc.solve(Problem("four", gait=Basis(FOUR, "antipodal")), starts=4)
+    assert found.status == "solved"
+    read = colloc.load(colloc.save(found, tmp_path / "four.h5"))
+    assert (read.problem.hash, read.value) == (found.problem.hash, found.value)
+    np.testing.assert_array_equal(read.gait.angles(T), found.gait.angles(T))
+    played = colloc.evaluate(Problem("played"), found.gait)  # fitted anew, by a Fourier series
+    assert played.efficiency == pytest.approx(found.efficiency, rel=1e-4)
+    assert fitted_gait(found.gait, 2).largest < 1e-5
+
+
+def test_what_a_search_of_splines_finds_is_kept_as_it_appears(tmp_path):
+    """Every stage is written as it appears, gaits with their class."""
+    problem = Problem("kept", gait=BSpline(6, symmetry="antipodal"), delta=1e-3)
+    found = colloc.solve(problem, starts=2, output=tmp_path / "kept.h5")
+    assert found.status == "solved"
+    assert colloc.load(tmp_path / "kept.h5").value == found.value
+
+
+@pytest.mark.slow
+def test_many_knots_approach_what_many_harmonics_give():
+    """0.4023 of eight harmonics. More numbers of either kind make sharper features, so the limit is from both sides."""
+    splines = colloc.solve(Problem("splines", gait=BSpline(16, symmetry="bilateral")))
+    waves = colloc.solve(Problem("waves", gait=Harmonic(8, "bilateral")))
+    assert splines.status == waves.status == "solved"
+    assert splines.value == pytest.approx(waves.value, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_splines_with_inertia_are_certified():
+    assert colloc.solve(Problem("paced", gait=BSpline(8, symmetry="antipodal"), froude=1e-3), starts=4).status == "solved"
+
+
+def test_interpolation_states_its_error():
+    """To a factor of 3 where steps are small; of few samples it is too large, as their error has not yet come to fall fast."""
+    for n in (24, 48, 96):
+        basis, t = Basis([bump(np.arange(n) / n)]), np.linspace(0, 1, 5001)
+        true = np.abs(basis.functions(t)[0] - bump(t)).max() / bump(0.0)
+        assert 0.1 * basis.error < true < 3 * basis.error
+
+
+def test_a_file_of_columns_is_read_with_or_without_its_last_line(tmp_path):
+    t = np.linspace(0, 3, 97)
+    rows = np.column_stack([t, bump(t / 3), bump(t / 3 - 0.25)])
+    for number, kept in enumerate((rows, rows[:-1])):
+        path = tmp_path / f"{number}.csv"
+        np.savetxt(path, kept, delimiter=",", header="time,one,two", comments="")
+        np.testing.assert_allclose(Basis(str(path)).functions(T), Basis([rows[:-1, 1], rows[:-1, 2]]).functions(T), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: BSpline(4), "from degree"),
+        (lambda: BSpline(9, symmetry="antipodal"), "even number of knots"),
+        (lambda: BSpline(8, degree=2), "degree must be 3, 4 or 5"),
+        (lambda: Basis([PHASES]), "too rough"),
+        (lambda: Basis([np.ones(48)]), "nothing would move"),
+        (lambda: Basis([bump(PHASES), bump(PHASES[:48])]), "must be alike"),
+        (lambda: Basis([bump(PHASES[:5])]), "at least 24"),
+        (lambda: Basis("nowhere.csv"), "cannot read nowhere.csv"),
+        (lambda: Basis(3), "a sequence of columns"),
+        (lambda: Problem("twice", gait=Basis([bump, bump])), "depend on one another"),
+        (lambda: Problem("one", gait=Basis([lambda t: bump(t - 0.1)], "bilateral")), "no symmetry 'bilateral'"),
+        (lambda: Problem("long", body=Chain((0.25,) * 4), gait=Basis(ELLIPSES)), "angles of 2 joints, and the body has 3"),
+        (lambda: Problem("slope", gait=BSpline(8), grade=0.1), "on a slope"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(made, words):
+    with pytest.raises(ProblemError, match=words):
+        made()
