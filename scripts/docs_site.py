@@ -36,9 +36,9 @@ ORDER = (
     (
         "How to",
         (
-            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "pace", "slopes", "laws", "objectives")),
-            *(f"howto/{name}.md" for name in ("check", "starts", "studies", "cluster", "own_body", "own_gait_class")),
-            "howto/paper.md",
+            *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "pace", "slopes", "laws", "steering")),
+            *(f"howto/{name}.md" for name in ("objectives", "check", "starts", "studies", "cluster")),
+            *(f"howto/{name}.md" for name in ("own_body", "columns", "own_gait_class", "paper")),
             "troubleshooting.md",
         ),
     ),
