@@ -30,6 +30,7 @@ from colloc.collocation.path_equations import (
 from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_geometry
 from colloc.collocation.point_equations import BlockParts, actuator_rows, driven_point, objective_block, period_rows
 from colloc.collocation.program import GaitProgram, Implicit, assembled
+from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.gaits.polygon import Corners
@@ -57,7 +58,7 @@ class PathProgram(GaitProgram):
         edges = np.append(gait.phases[on] + self.geometry.start * np.diff(gait.phases)[on], gait.phases[-1])
         return Mesh(self.mesh.scheme, edges)
 
-    def placed(self, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+    def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
         """Where the instants lie on their pieces of the path."""
         return self.geometry.given(np.clip((times - mesh.edges[:-1]) / mesh.h, 0.0, 1.0))
 

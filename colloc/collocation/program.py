@@ -67,8 +67,8 @@ class GaitProgram:
         """The mesh in phases of a member."""
         return self.mesh
 
-    def placed(self, times: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """What the checks' blocks are given at an instant of every cell of a mesh in phases, ``(n_given, n_cell)``."""
+    def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """What a check's block is given at an instant of every cell of a mesh in phases, ``(n_given, n_cell)``."""
         raise NotImplementedError
 
     def block_parameters(self, parameters: np.ndarray) -> list[np.ndarray]:
@@ -80,7 +80,7 @@ class GaitProgram:
         gait = self.member(parameters)
         mesh, given = self.phase_mesh(gait), {}
         for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks, self.problem.joint_limit), strict=True):
-            given[check.name] = np.vstack([self.placed(times, mesh), held_shares(check, gait, times)])
+            given[check.name] = np.vstack([self.placed(check, times, mesh), held_shares(check, gait, times)])
         blocks = zip(self.names, self.assembly.blocks, strict=True)
         return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]
 

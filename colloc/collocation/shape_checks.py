@@ -1,10 +1,11 @@
-"""CasADi expressions of the bounds on shapes: joint limits, and links that must not cross."""
+"""CasADi expressions of the bounds on shapes and their rates: joint limits, joint speeds, and links that must not cross."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,13 +21,14 @@ _PLACES, _FLAT = 9, 1e-12
 
 @dataclass(frozen=True, eq=False)
 class ShapeCheck:
-    """A scalar function of the shape that admissibility bounds from above (angles also from below).
+    """A scalar function of the shape that admissibility bounds from above (angles also from below), or of the shape's rates.
 
     along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, the weight of the first of two functions of
     which this is the minimum, or -1; of the largest angle on a stretch of a smooth body, where on the body it is. cut: of the
     shape and a share, the tangent plane of that weight, the function itself where it is negative, or the angle at that place.
-    slope: its derivative with respect to the shape. place: which of the body's angles it is, -1 if it is none. row: that
-    angle per shape coordinate, if it is one of them always.
+    slope: its derivative with respect to the shape. row: that
+    angle per shape coordinate, if it is one of them always. place: which of the body's angles it is, -1 if it is none. fixed:
+    its bounds, if these are not the limits of such an angle. derivative: 1 if "shapes" are their rates per period.
     """
 
     name: str
@@ -34,30 +36,41 @@ class ShapeCheck:
     share: Callable[[np.ndarray], np.ndarray]
     cut: ca.Function
     slope: ca.Function
-    place: int = -1
     row: np.ndarray | None = None
+    place: int = -1
+    fixed: tuple[float, float] | None = None
+    derivative: int = 0
 
     @property
-    def is_angle(self) -> bool:
-        return self.place >= 0
+    def both_ways(self) -> bool:
+        """Whether there is a bound from below, too."""
+        return self.fixed is None or np.isfinite(self.fixed[0])
 
     def bounds(self, limit: Limit) -> tuple[float, float]:
         """The least and the largest value allowed, for a limit on the body's angles, or one on each."""
-        own = limit[self.place] if isinstance(limit, tuple) else limit
-        return range_of(own) if self.is_angle else (-np.inf, 0.0)
+        return self.fixed or range_of(limit[self.place] if isinstance(limit, tuple) else limit)
+
+    def of(self, gait: Any, times: np.ndarray) -> np.ndarray:
+        """What of a gait it is a function of, ``(n_joint, n_time)``: its shapes, or their rates."""
+        return np.asarray(gait.rates(times) if self.derivative else gait.angles(times))
+
+    def matrix(self, gait_class: Any, times: np.ndarray, n_joint: int) -> np.ndarray:
+        """The same of a class that is linear in its parameters, ``(n_time, n_joint, n_parameter)``."""
+        matrix = gait_class.rate_matrix if self.derivative else gait_class.angle_matrix
+        return np.asarray(matrix(times, n_joint))
 
     def magnitudes(self, shapes: np.ndarray, limit: Limit) -> np.ndarray:
         """What a bound from above is laid on, ``(n_time,)``: an angle is bounded both ways, by as much from their middle."""
         values = self.along(shapes)
-        return np.abs(values - self.middle(limit)) if self.is_angle else values
+        return np.abs(values - self.middle(limit)) if self.both_ways else values
 
     def middle(self, limit: Limit) -> float:
         """Of an angle's bounds; 0 of other checks."""
-        return 0.5 * sum(self.bounds(limit)) if self.is_angle else 0.0
+        return 0.5 * sum(self.bounds(limit)) if self.both_ways else 0.0
 
     def itself(self, shapes: np.ndarray) -> np.ndarray:
         """The shares at which the cuts are the function itself at shapes ``(n_joint, n_time)``."""
-        return self.share(shapes) if self.is_angle else np.full(shapes.shape[1], -1.0)
+        return self.share(shapes) if self.both_ways else np.full(shapes.shape[1], -1.0)
 
     def group(self, limit: Limit, n_cell: int, n: int) -> Group:
         """The rows that keep it within its bounds in every mesh cell, by the block of its name, for n variables in all."""
@@ -76,11 +89,11 @@ class ShapeCheck:
 
 
 @lru_cache(maxsize=64)
-def shape_checks(body: Body, far: Pairs = ()) -> list[ShapeCheck]:
-    """Functions of the shape that admissibility bounds.
+def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) -> list[ShapeCheck]:
+    """Functions of the shape, or of its rates, that admissibility bounds.
 
     Angles to be kept within the limit of the problem; then functions that must not be positive: for parts that might cross,
-    and for the pairs `far` of parts farther apart.
+    and for the pairs `far` of parts farther apart; then rates over the largest allowed, `speeds` [rad per period] of each joint.
     """
     angles = ca.SX.sym("q", body.n_joint)
     names, stretches = enumerate(body.limit_names), body.stretches
@@ -88,7 +101,9 @@ def shape_checks(body: Body, far: Pairs = ()) -> list[ShapeCheck]:
         checks = [_stretch_check(name, angles, stretch, k) for (k, name), stretch in zip(names, stretches, strict=True)]
     else:
         checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
-    return checks + [_minimum_check(contact, angles) for contact in body.contacts(far)]
+    checks += [_minimum_check(contact, angles) for contact in body.contacts(far)]
+    unit = np.eye(body.n_joint)
+    return checks + [_speed_check(j, angles, unit[j] / most) for j, most in enumerate(speeds)]
 
 
 def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> ShapeCheck:
@@ -98,9 +113,14 @@ def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> Shape
         lambda shapes: row @ shapes,
         lambda shapes: np.full(shapes.shape[1], -1.0),
         *_cut(angles, share, value),
-        place,
         row,
+        place,
     )
+
+
+def _speed_check(joint: int, rates: ca.SX, row: np.ndarray) -> ShapeCheck:
+    """A joint's rate over the largest allowed."""
+    return replace(_angle_check(f"speed of joint {joint + 1}", rates, row, joint), fixed=(-1.0, 1.0), derivative=1)
 
 
 def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> ShapeCheck:
@@ -121,7 +141,7 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
     def along(shapes: np.ndarray) -> np.ndarray:
         return np.asarray((stretch.angles_at(largest(shapes)).T * shapes).sum(axis=0))
 
-    return ShapeCheck(name, along, largest, *_cut(angles, share, ca.mtimes(stretch.angles_at(share), angles)), place)
+    return ShapeCheck(name, along, largest, *_cut(angles, share, ca.mtimes(stretch.angles_at(share), angles)), place=place)
 
 
 def _cut(angles: ca.SX, share: ca.SX, cut: ca.SX) -> tuple[ca.Function, ca.Function]:
@@ -138,4 +158,5 @@ def _minimum_check(contact: Contact, angles: ca.SX) -> ShapeCheck:
         lambda shapes: contact.excess(shapes)[0],
         lambda shapes: contact.share(shapes)[0],
         *_cut(angles, share, cut),
+        fixed=(-np.inf, 0.0),
     )

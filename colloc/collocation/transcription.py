@@ -35,7 +35,7 @@ from colloc.collocation.point_equations import (
     point_function,
 )
 from colloc.collocation.program import GaitProgram, Implicit, assembled
-from colloc.collocation.shape_checks import shape_checks
+from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
@@ -58,13 +58,13 @@ from colloc.numerics.mesh import Mesh
 class SeriesProgram(GaitProgram):
     """The program of a class in whose parameters the angles are linear."""
 
-    def placed(self, times: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """The matrices from parameters to angles at the instants, a column each."""
-        return _angle_columns(self.problem, times)
+    def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """The matrices from parameters to what is checked at the instants, a column each."""
+        return _columns(check, self.problem, times)
 
 
-def _angle_columns(problem: Problem, times: np.ndarray) -> np.ndarray:
-    matrix = problem.gait.angle_matrix(times, problem.body.n_joint)
+def _columns(check: ShapeCheck, problem: Problem, times: np.ndarray) -> np.ndarray:
+    matrix = check.matrix(problem.gait, times, problem.body.n_joint)
     return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
 
 
@@ -76,7 +76,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     """
     mesh = problem_mesh(problem, edges)
     layout = problem_layout(problem, mesh)
-    checks = shape_checks(problem.body, far)
+    checks = shape_checks(problem.body, far, problem.largest_speeds)
     friction = problem.law.in_speeds_of(RADIANS)
     point = point_function(problem.formulation, problem.body, friction, problem.slope, problem.froude * RADIANS**2)
     n_joint = problem.body.n_joint
@@ -90,7 +90,7 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
     for check in checks:
         function = gait_check(check, n_joint, n_parameter)
-        middles = np.vstack([_angle_columns(problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])), np.full(mesh.n, -1.0)])
+        middles = np.vstack([_columns(check, problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])), np.full(mesh.n, -1.0)])
         blocks[check.name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
     blocks["shape speed"] = (
         mean_square(ca.DM(problem.gait.mean_square_rate(n_joint) / RADIANS**2)),

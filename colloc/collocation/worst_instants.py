@@ -1,4 +1,4 @@
-"""Where a gait comes closest to the bounds on its shapes: one instant for every check in every mesh cell.
+"""Where a gait comes closest to the bounds on its shapes and rates: one instant for every check in every mesh cell.
 
 An inequality between nodes is kept by constraining it at these instants; repeated at every solve, this is the exchange
 method for semi-infinite programs. Links that pass each other's ends give peaks with a kink, so the instants are found by
@@ -41,10 +41,14 @@ def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) ->
     Those are the cells in which it is near its bound (`limit` for angles, else 0), and those in which it has a peak.
     """
     fine = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    angles = gait.angles((mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel())
-    found = []
+    times, found = (mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel(), []
+    shapes = {check.derivative: check.of(gait, times) for check in {check.derivative: check for check in checks}.values()}
     for check in checks:
-        highest = check.magnitudes(angles, limit).reshape(mesh.n, -1).max(axis=1) - check.bounds(limit)[1] + check.middle(limit)
+        highest = (
+            check.magnitudes(shapes[check.derivative], limit).reshape(mesh.n, -1).max(axis=1)
+            - check.bounds(limit)[1]
+            + check.middle(limit)
+        )
         around = np.pad(highest, 1, constant_values=-np.inf)
         peak = (highest >= around[:-2]) & (highest >= around[2:])
         cells = np.flatnonzero((highest > -_NEAR) | (peak & (highest > -_FAR)))
@@ -57,7 +61,7 @@ def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray, limit: 
     left, width = mesh.edges[cells], mesh.h[cells]
     for zoom in range(_ZOOMS + 1):
         times = left[:, None] + width[:, None] * fine
-        values = check.magnitudes(gait.angles(times.ravel()), limit).reshape(times.shape)
+        values = check.magnitudes(check.of(gait, times.ravel()), limit).reshape(times.shape)
         best = np.argmax(values, axis=1)
         inner = np.clip(best, 1, _SAMPLES - 1)
         if zoom < _ZOOMS:
@@ -90,9 +94,9 @@ def followed(
     step, held = _STEP * h, np.tile(shares, 3)[None]
 
     def heights(t: np.ndarray) -> np.ndarray:
-        return check.cut(gait.angles(np.concatenate([t - step, t, t + step])), held).full().reshape(3, -1)
+        return check.cut(check.of(gait, np.concatenate([t - step, t, t + step])), held).full().reshape(3, -1)
 
-    sign = np.sign(heights(times)[1] - check.middle(limit)) if check.is_angle else 1.0  # angles are bounded both ways
+    sign = np.sign(heights(times)[1] - check.middle(limit)) if check.both_ways else 1.0
     for _ in range(_STEPS):
         before, here, after = sign * heights(times)
         bend = before - 2 * here + after
@@ -103,14 +107,14 @@ def followed(
 
 def check_values(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
     """A check along a gait, ``(n_time,)``."""
-    return check.along(gait.angles(times))
+    return check.along(check.of(gait, times))
 
 
 def held_shares(check: ShapeCheck, gait: Gait, times: np.ndarray) -> np.ndarray:
     """The share of the first sum to hold in the cut at each of the instants, or that of the check itself, ``(n_time,)``."""
-    shapes = gait.angles(times)
+    shapes = check.of(gait, times)
     shares = check.share(shapes)
-    if check.is_angle:
+    if check.both_ways:
         return shares
     both = (shares > _HELD_SHARE) & (shares < 1 - _HELD_SHARE)
     return np.where(both & (check.along(shapes) > -_HELD_NEAR), shares, check.itself(shapes))

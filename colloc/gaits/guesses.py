@@ -61,6 +61,16 @@ def travelling_wave(body: Body, joint_limit: Limit, waves: float = WAVES, share:
     return unit.grown(size)
 
 
+def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
+    """Of the largest speeds of the joints [rad per period], that a gait moves at; 0 where there are none."""
+    return float((np.abs(gait.rates(_PHASES)).max(axis=1) / np.array(speeds)).max()) if speeds else 0.0
+
+
+def slowed(gait: Any, speeds: tuple[float, ...]) -> Any:
+    """The gait with all angles multiplied by one factor, at most 1, so that no joint is faster than allowed."""
+    return gait.scaled(1 / share) if (share := largest_share(gait, speeds)) > 1 else gait
+
+
 def check_guess(body: Body, gait_class: Any, stated: Any, joint_limit: Limit, smallest_shape_speed: float) -> None:
     """Raise a `ProblemError` for a gait that no search can begin with: of another body, at rest, or inadmissible."""
     if stated.n_joint != body.n_joint:

@@ -9,7 +9,7 @@ import numpy as np
 
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
-from colloc.gaits.guesses import check_guess, travelling_wave
+from colloc.gaits.guesses import check_guess, slowed, travelling_wave
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.inertia import check_paced
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each, one_sided
@@ -92,6 +92,9 @@ class Problem:
     torque_limit, power_limit : float or sequence of float, optional
         The most that the joints' actuators can do, all or each: magnitude of the moment [weight x body length], power
         delivered [weight x body length / period]. With a power limit the pace matters.
+    speed_limit : float or sequence of float, optional
+        The largest speed of the joints at any instant, all or each [rad per period]: that of a motor [rad/s] times the period
+        [s]. The pace matters.
     grade : float
         Tangent of the inclination of the ground; 0 is the level (docs/howto/slopes.md). On a slope "distance" is the climb and
         "work" that of the joints, and where the body points is sought with the gait.
@@ -137,6 +140,7 @@ class Problem:
     at_least: tuple[tuple[Objective, float], ...] = field(default=(), metadata=STATED_IF_SET)
     torque_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
     power_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
+    speed_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
     grade: float = field(default=0.0, metadata=STATED_IF_SET)
     towards: float | None = field(default=None, metadata=STATED_IF_SET)
     froude: float = field(default=0.0, metadata=STATED_IF_SET)
@@ -169,7 +173,7 @@ class Problem:
         if self.guess is None:
             free = self.gait.free
             wave = self.gait.first_guess(travelling_wave(self.body, self.joint_limit)) if free else None
-            self._fill(guess=wave or self.gait.member(np.empty(0), 2))
+            self._fill(guess=slowed(wave, self.largest_speeds) if free else self.gait.member(np.empty(0), 2))
         check_kind("guess", self.guess, gait_fields.GAITS)
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
@@ -228,21 +232,32 @@ class Problem:
             raise ProblemError("nothing is free in a prescribed motion; leave objective and at_least out.")
 
     def _check_actuators(self) -> None:
-        for name in ("torque_limit", "power_limit"):
+        for name in ("torque_limit", "power_limit", "speed_limit"):
             object.__setattr__(self, name, checked_actuator_limit(name, getattr(self, name), self.body.n_joint))
         limits = self.actuator_limits
         asks = "driven_work" if self.uses("driven_work") else "a limit on actuators" if limits.names else ""
         if asks and self.formulation != FULL:
             raise ProblemError(f"{asks} needs the forces on the body's parts: a chain, and the formulation {FULL!r}.")
-        if limits.names and self.gait.mixes:
+        if (limits.names or self.speed_limit) and self.gait.mixes:
             raise ProblemError(
                 "a relaxed gait moves in several directions at once, which no actuator does: leave its limits out."
+            )
+        most = float(np.linalg.norm(of_each(self.speed_limit, self.body.n_joint))) if self.speed_limit else np.inf
+        if most <= (least := 2 * np.pi * self.smallest_shape_speed):
+            raise ProblemError(
+                f"speed_limit leaves no gait: all joints together move at {most:.3g} rad per period at most, and "
+                f"smallest_shape_speed asks for {least:.3g} on average (2 pi {self.smallest_shape_speed:g}). Make that smaller."
             )
 
     @property
     def actuator_limits(self) -> ActuatorLimits:
         """What the actuators can do, joint by joint."""
         return ActuatorLimits(*(of_each(limit, self.body.n_joint) for limit in (self.torque_limit, self.power_limit)))
+
+    @property
+    def largest_speeds(self) -> tuple[float, ...]:
+        """Of the joints at any instant [rad per period], joint by joint; nothing where there is no limit."""
+        return of_each(self.speed_limit, self.body.n_joint)
 
     @property
     def law(self) -> Law:
@@ -267,6 +282,8 @@ class Problem:
         """Why the pace of a gait matters, in words; "" where distance and work belong to its path."""
         if self.power_limit is not None:
             return "the joints' power is limited"
+        if self.speed_limit is not None:
+            return "the joints' speed is limited"
         if self.froude:
             return "what is heavy takes time to move"
         return "" if rate_independent(self.law) else f"work depends on the pace under {self.law.label}"

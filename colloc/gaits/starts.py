@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.guesses import largest_factor
+from colloc.gaits.guesses import largest_factor, largest_share
 from colloc.gaits.limits import Limit
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.problem import Problem
@@ -39,7 +39,9 @@ gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 time
 
 def largest_amplitude(problem: Problem, gait: AnyGait) -> float:
     """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for the straight body."""
-    return largest_factor(problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES))
+    largest = largest_factor(problem.body, problem.joint_limit, gait.angles(np.arange(_PHASES) / _PHASES))
+    share = largest_share(gait, problem.largest_speeds)
+    return min(largest, 1 / share) if share else largest
 
 
 def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:

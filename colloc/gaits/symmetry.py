@@ -119,7 +119,7 @@ def check_symmetric(problem: Any) -> None:
         opposite = [(-high, -low) for low, high in ranges]
         if (BILATERAL in needed and ranges != opposite[::-1]) or (ANTIPODAL in needed and ranges != opposite):
             raise ProblemError(f"gaits of symmetry {symmetry} bend {_ALIKE[symmetry]} alike: give them the same joint_limit.")
-    for name in ("torque_limit", "power_limit"):
+    for name in ("torque_limit", "power_limit", "speed_limit"):
         limit = getattr(problem, name)
         if BILATERAL in needed and np.ndim(limit) and limit != limit[::-1]:
             raise ProblemError(f"gaits of symmetry {symmetry} bend mirrored joints alike: give them the same {name}.")

@@ -33,7 +33,7 @@ class LinearSpace:
     def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
         self.problem, self.far, self.given = problem, far, Given(None, edges, scheme)
         self.mesh = problem_mesh(problem, edges, scheme)
-        self.checks = shape_checks(problem.body, far)
+        self.checks = shape_checks(problem.body, far, problem.largest_speeds)
         gait, n_joint, limit = problem.gait, problem.body.n_joint, problem.joint_limit
         angles, rates = gait.angle_matrix(self.mesh.times, n_joint), gait.rate_matrix(self.mesh.times, n_joint)
         self._matrix = np.concatenate([angles, rates], axis=1)
@@ -77,7 +77,8 @@ class LinearSpace:
         return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
-        """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad]."""
+        """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad, or of
+        a largest speed]."""
         gait, n_joint, limit = self.member(v), self.problem.body.n_joint, self.problem.joint_limit
         self._placed, self._follows, self.watched, low, high, excess = [], None, {}, [], [], -np.inf
         for check, (cells, times) in zip(self.checks, peaks(gait, self.mesh, self.checks, limit), strict=True):
@@ -85,7 +86,7 @@ class LinearSpace:
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
-            values, matrix = check_values(check, gait, times), self.problem.gait.angle_matrix(times, n_joint)
+            values, matrix = check_values(check, gait, times), check.matrix(self.problem.gait, times, n_joint)
             may_move = moving(values, check, limit, times, self.mesh, cells)
             self._placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move))
             excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
@@ -108,7 +109,7 @@ class LinearSpace:
                 where, matrix = (self.mesh.edges[cells], self.mesh.h[cells]), matrix.copy()
                 at = placed.check, placed.shares[which], gait, placed.times[which]
                 worst = followed(*at, cells=where, limit=self.problem.joint_limit)
-                matrix[which] = self.problem.gait.angle_matrix(worst, self.problem.body.n_joint)
+                matrix[which] = placed.check.matrix(self.problem.gait, worst, self.problem.body.n_joint)
             found.append(placed._replace(matrix=matrix))
         return found
 

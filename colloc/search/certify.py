@@ -213,7 +213,7 @@ def _motion(
     problem: Problem, path: Path | MixedPath, fine: Replay, breaks: np.ndarray, tolerance: float, claimed: float | None
 ) -> list[Check]:
     body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
-    angles = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))[0]
+    angles, rates = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))[:2]
     stretched, limit = under_one_limit(angles, problem.joint_limit)
     beyond = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
@@ -223,6 +223,7 @@ def _motion(
         *_rotation(problem, fine),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
         Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
+        *_speeds(problem, rates),
     ]
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
         beside = "way from the centre of mass to where the feet's weights press [body lengths]; reported, not judged"
@@ -239,6 +240,15 @@ def _motion(
         Check("replay error", fine.error, tolerance, "relative: its quadrature and balance; allowed as asked for"),
         Check("work = dissipation", fine.actuator_work / fine.work - 1, WORK, f"work of the joints over {spent}, less 1"),
     ]
+
+
+def _speeds(problem: Problem, rates: np.ndarray) -> list[Check]:
+    """The fastest joint, against what its motor can do."""
+    if not problem.largest_speeds:
+        return []
+    share = np.abs(rates).max(axis=1) / np.array(problem.largest_speeds)
+    excess, fastest = max(float(share.max()) - 1.0, 0.0), int(share.argmax()) + 1
+    return [Check("joint speed", excess, GAP, f"excess over a limit, relative; nearest to its own: joint {fastest}")]
 
 
 def _rotation(problem: Problem, fine: Replay) -> list[Check]:

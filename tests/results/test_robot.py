@@ -103,6 +103,12 @@ def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(thr
     assert facts["shortest_period_paced_by_speed_s"] < facts["shortest_period_s"]
 
 
+def test_motors_too_slow_for_the_pace_are_told_the_limit_to_solve_with(three_link):
+    """5 s a period at 2 and 3 rad/s are 10 and 15 rad per period."""
+    assert "the best gait for these motors has speed_limit=(10, 15)" in str(three_link.robot(1.2, 3, 5, max_speed=[2, 3]))
+    assert "speed_limit" not in str(three_link.robot(1.2, 3, 50, max_speed=[2, 3]))
+
+
 def test_weak_motors_are_told_the_limit_to_solve_with(three_link, robot):
     assert "The torques suffice at any pace" in str(three_link.robot(**SIZE, max_torque=4))
     weak = three_link.robot(**SIZE, max_torque=[4, 1.5])

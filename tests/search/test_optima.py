@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from colloc import Harmonic, Problem, solve
 from colloc.mechanics.balance import instant, total_power
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
@@ -67,3 +68,21 @@ def test_collocation_finds_the_maximum_of_a_grid_sweep(name, around, width, solv
     gait = solution.gait
     np.testing.assert_allclose([abs(gait.mean[0]), gait.cos[0, 0], gait.sin[0, 0]], np.abs(point), atol=0.02)
     assert abs(solution.certificate.efficiency - reference.efficiency) < reference.tolerance
+
+
+def test_with_slow_joints_it_is_the_maximum_over_ellipses_that_are_small_enough():
+    """Joints of one harmonic of amplitude a are at most 2 pi a fast: all that is swept is (A0, a, B1 / A1)."""
+    speed = 12.0
+    solution = solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=speed))
+    centre, width = np.array([0.0, 0.8, 0.8]), np.array([1.5, 0.2, 0.7])
+    while width[0] > 0.01:
+        steps = np.linspace(-1, 1, 7)
+        grid = centre + width * np.stack([a.ravel() for a in np.meshgrid(steps, steps, steps)], axis=1)
+        grid[:, 1] = np.minimum(grid[:, 1], 1.0)
+        a, turn = grid[:, 1] * speed / (2 * np.pi), grid[:, 2]
+        ellipses = np.column_stack([grid[:, 0], a * np.cos(turn), a * np.sin(turn)])
+        value = efficiencies(ellipses, 240)
+        best = int(np.argmax(value))
+        centre, width = grid[best], 0.5 * width
+    assert centre[1] == 1.0
+    assert solution.certificate.efficiency == pytest.approx(efficiencies(ellipses[[best]], 960)[0], rel=1e-4)

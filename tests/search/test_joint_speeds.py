@@ -1,0 +1,109 @@
+"""Joints that are no faster, at any instant, than their motors."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc import BSpline, Chain, FreePath, Friction, Harmonic, ModalBody, Problem, ProblemError, Relaxed, Serpenoid
+from colloc.reduced.program import ReducedProgram
+from colloc.reduced.spaces import space_near
+from colloc.search.solve import solve
+
+T = np.linspace(0, 1, 20001)
+FAR = {"objective": "distance", "friction": Friction(2, 1, 1.5)}
+
+
+def fastest(solution):
+    """Of every joint [rad per period]."""
+    return np.abs(solution.gait.rates(T)).max(axis=1)
+
+
+@pytest.fixture(scope="module")
+def slow():
+    return solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=12), starts=4)
+
+
+def test_an_ellipse_is_as_large_as_the_limit_lets_it(slow):
+    """One harmonic of amplitude a is at most 2 pi a fast: the bound is one on (A1, B1), here the circle of radius 12 / 2 pi."""
+    assert slow.status == "solved"
+    assert np.hypot(slow.gait.cos[0, 0], slow.gait.sin[0, 0]) == pytest.approx(12 / (2 * np.pi), rel=1e-6)
+
+
+def test_a_limit_that_nothing_reaches_changes_nothing():
+    free, wide = (solve(Problem("wide", gait=Harmonic(1, "bilateral"), speed_limit=s), starts=1) for s in (None, 20))
+    assert wide.efficiency == pytest.approx(free.efficiency, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("gait", "limit", "more"),
+    [
+        (Harmonic(2), (9.0, 7.0), FAR),
+        (BSpline(8, symmetry="bilateral"), 8.0, FAR),
+        (Serpenoid(1), 3.0, {"body": Chain((0.2,) * 5), "friction": Friction(3, 1, 1)}),
+        (Harmonic(1, "antipodal"), 10.0, {"froude": 0.05}),
+        (Harmonic(1), 6.0, {"grade": 0.05, "friction": Friction(3, 1, 1.5), "objective": "distance"}),
+    ],
+    ids=["harmonics", "splines", "serpenoid", "inertia", "slope"],
+)
+def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
+    """Also between the points of the mesh, of any class paced by time, and of motions with states."""
+    found = solve(Problem("limited", gait=gait, speed_limit=limit, **more), starts=2)
+    assert found.status == "solved"
+    share = fastest(found) / np.broadcast_to(limit, found.problem.body.n_joint)
+    assert share.max() == pytest.approx(1.0, abs=1e-5)
+
+
+def test_faster_motors_go_farther():
+    """For friction that does not know the pace, a class that may be paced anyhow gains by every limit that binds."""
+    ways = [solve(Problem("far", gait=Harmonic(2), speed_limit=s, **FAR), starts=4).distance for s in (6.0, 8.0, 10.0)]
+    assert ways == sorted(ways)
+    assert ways[2] > 1.2 * ways[0]
+
+
+def test_derivatives_of_the_rows_are_those_of_differences():
+    problem = Problem("rows", gait=Serpenoid(2), body=Chain((0.25,) * 4), friction=Friction(2, 1, 1.5), speed_limit=(5, 6, 7))
+    space, v = space_near(problem, problem.guess)
+    program, h = ReducedProgram(space, 1e-2), 1e-6
+    program.place_rows(v)
+    along = np.random.default_rng(0).normal(size=v.size)
+    steps = (program.rows(v + h * along) - program.rows(v - h * along)) / (2 * h)
+    assert any("speed of joint" in name for name, _ in program.row_names)
+    np.testing.assert_allclose(program.row_slopes(v) @ along, steps, rtol=1e-5, atol=1e-6)
+
+
+def test_a_certificate_fails_a_gait_that_is_too_fast(slow):
+    checked = {c.name: c for c in slow.certificate.checks}
+    assert checked["joint speed"].passed
+    tighter = colloc.evaluate(slow.problem.with_(speed_limit=11.9, guess=None), slow.gait)
+    check = next(c for c in tighter.certificate.checks if c.name == "joint speed")
+    assert check.value == pytest.approx(12 / 11.9 - 1, rel=1e-3)
+    assert not check.passed
+
+
+def test_it_is_kept_in_files(slow, tmp_path):
+    read = colloc.load(colloc.save(slow, tmp_path / "slow.h5"))
+    assert (read.problem.speed_limit, read.problem.hash) == (12.0, slow.problem.hash)
+    assert Problem("free", gait=Harmonic(1)).hash != slow.problem.hash
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ({"gait": FreePath(8.0)}, "leaves the pace open, but the joints' speed is limited"),
+        ({"gait": Relaxed()}, "leave its limits out"),
+        ({"speed_limit": 0.2}, "leaves no gait"),
+        ({"speed_limit": (5.0, 8.0)}, "give them the same speed_limit"),
+        ({"speed_limit": (5.0, 8.0, 5.0)}, "has 3 values"),
+        ({"speed_limit": -1.0}, "positive and finite"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(stated, words):
+    with pytest.raises(ProblemError, match=words):
+        Problem("refused", **({"gait": Harmonic(1, "bilateral"), "speed_limit": 5.0} | stated))
+
+
+@pytest.mark.slow
+def test_smooth_bodies_have_speeds_too():
+    found = solve(Problem("smooth", body=ModalBody(2), gait=Harmonic(1), speed_limit=8.0), starts=2)
+    assert found.status == "solved"
+    assert fastest(found).max() == pytest.approx(8.0, rel=1e-5)
