@@ -93,7 +93,8 @@ def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) ->
     """Functions of the shape, or of its rates, that admissibility bounds.
 
     Angles to be kept within the limit of the problem; then functions that must not be positive: for parts that might cross,
-    and for the pairs `far` of parts farther apart; then rates over the largest allowed, `speeds` [rad per period] of each joint.
+    and for the pairs `far` of parts farther apart; then rates over the largest
+    allowed, `speeds` [rad per period] of each joint.
     """
     angles = ca.SX.sym("q", body.n_joint)
     names, stretches = enumerate(body.limit_names), body.stretches

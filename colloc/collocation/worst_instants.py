@@ -42,13 +42,11 @@ def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) ->
     """
     fine = np.linspace(0.0, 1.0, _SAMPLES + 1)
     times, found = (mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel(), []
-    shapes = {check.derivative: check.of(gait, times) for check in {check.derivative: check for check in checks}.values()}
+    given = {check.derivative: check for check in checks}
+    shapes = {order: check.of(gait, times) for order, check in given.items()}
     for check in checks:
-        highest = (
-            check.magnitudes(shapes[check.derivative], limit).reshape(mesh.n, -1).max(axis=1)
-            - check.bounds(limit)[1]
-            + check.middle(limit)
-        )
+        beyond = check.magnitudes(shapes[check.derivative], limit) - check.bounds(limit)[1] + check.middle(limit)
+        highest = beyond.reshape(mesh.n, -1).max(axis=1)
         around = np.pad(highest, 1, constant_values=-np.inf)
         peak = (highest >= around[:-2]) & (highest >= around[2:])
         cells = np.flatnonzero((highest > -_NEAR) | (peak & (highest > -_FAR)))

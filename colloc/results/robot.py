@@ -264,7 +264,7 @@ class Robot:
             paced = f.get("shortest_period_paced_by_speed_s")
             more = "" if paced is None else f", {paced:.3g} s as colloc export --max-speed paces it"
             said.append(f"Shortest period for these joint speeds: {f['shortest_period_s']:.3g} s at the gait's own pace{more}.")
-            if (shortest := paced or f["shortest_period_s"]) > self.period:
+            if (paced or f["shortest_period_s"]) > self.period:
                 limit = ", ".join(f"{each * self.period:.4g}" for each in f["max_speed_rad_per_s"])
                 said.append(f"That is more than {self.period:g} s: the best gait for these motors has speed_limit=({limit}).")
         if "torque_used" in f:

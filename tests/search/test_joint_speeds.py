@@ -37,7 +37,7 @@ def test_a_limit_that_nothing_reaches_changes_nothing():
 @pytest.mark.parametrize(
     ("gait", "limit", "more"),
     [
-        (Harmonic(2), (9.0, 7.0), FAR),
+        (Harmonic(2, "bilateral"), (8.0, 8.0), FAR),
         (BSpline(8, symmetry="bilateral"), 8.0, FAR),
         (Serpenoid(1), 3.0, {"body": Chain((0.2,) * 5), "friction": Friction(3, 1, 1)}),
         (Harmonic(1, "antipodal"), 10.0, {"froude": 0.05}),
@@ -47,7 +47,7 @@ def test_a_limit_that_nothing_reaches_changes_nothing():
 )
 def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
     """Also between the points of the mesh, of any class paced by time, and of motions with states."""
-    found = solve(Problem("limited", gait=gait, speed_limit=limit, **more), starts=2)
+    found = solve(Problem("limited", gait=gait, speed_limit=limit, **more), starts=1)
     assert found.status == "solved"
     share = fastest(found) / np.broadcast_to(limit, found.problem.body.n_joint)
     assert share.max() == pytest.approx(1.0, abs=1e-5)
@@ -55,7 +55,10 @@ def test_the_fastest_instants_are_as_fast_as_allowed(gait, limit, more):
 
 def test_faster_motors_go_farther():
     """For friction that does not know the pace, a class that may be paced anyhow gains by every limit that binds."""
-    ways = [solve(Problem("far", gait=Harmonic(2), speed_limit=s, **FAR), starts=4).distance for s in (6.0, 8.0, 10.0)]
+    ways = [
+        solve(Problem("far", gait=Harmonic(2, "bilateral"), speed_limit=s, delta=1e-3, **FAR), starts=1).distance
+        for s in (6.0, 8.0, 10.0)
+    ]
     assert ways == sorted(ways)
     assert ways[2] > 1.2 * ways[0]
 
