@@ -37,6 +37,7 @@ PLAIN = {
     "closure": "The body ends a cycle in the shape in which it began.",
     "net rotation": "It ends the cycle pointing the same way, so that it crawls straight on.",
     "joint limits": "No joint bends further than it may, at any instant.",
+    "joint speed": "No joint turns faster than it may, at any instant.",
     "tangent angle": "The body bends no further from its own direction than it may, so that it cannot cross itself.",
     "self-contact": "No part of the body passes through another, at any instant.",
     "stability": "After a push the body comes back to this motion, period by period.",
