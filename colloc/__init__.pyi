@@ -17,6 +17,7 @@ from colloc.laws.elliptic import Elliptic as Elliptic
 from colloc.laws.viscous import Viscous as Viscous
 from colloc.laws.power_law import PowerLaw as PowerLaw
 from colloc.laws.own_law import OwnLaw as OwnLaw
+from colloc.laws.fitted_friction import fitted_friction as fitted_friction, FittedFriction as FittedFriction
 from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.bspline import BSpline as BSpline

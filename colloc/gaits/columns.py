@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from scipy.interpolate import make_interp_spline
 from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.linear import LinearClass
 from colloc.system.arguments import named_arguments
+from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
 Column: TypeAlias = Any
@@ -177,21 +177,7 @@ def _sampled(column: Column | Callable[[np.ndarray], np.ndarray]) -> Any:
 
 def _read(path: Path) -> list[np.ndarray]:
     """The columns of a file but the first, which is time at even steps of a period; the last line may be the first again."""
-    try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and not line.startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProblemError(f"cannot read {path} as text: {getattr(error, 'strerror', None) or error}.") from None
-    rows = list(csv.reader(lines))
-    try:
-        float(rows[0][0])
-    except (IndexError, ValueError):
-        rows = rows[1:]  # names
-    try:
-        table = np.array(rows, dtype=float)
-    except ValueError:
-        raise ProblemError(f"{path} must hold as many numbers in every line: a time, then a value of each column.") from None
-    if table.ndim != 2 or table.shape[1] < 2 or len(table) < 3:
-        raise ProblemError(f"{path} must hold a column of times, then one or more of values.")
+    _, table = csv_table(path, _FEWEST)
     steps = np.diff(table[:, 0])
     if steps.min() <= 0 or np.ptp(steps) > _EVEN * steps.mean():
         raise ProblemError(f"{path}: the times in the first column must rise by even steps.")

@@ -7,7 +7,6 @@ its coefficients.
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ import numpy as np
 
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
+from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
@@ -28,6 +28,8 @@ _NEAR, _FAR = 0.01, 5.0
 """The last sample is the first one again within so many typical steps; a path is not closed that jumps by so many."""
 _LARGEST = 2 * np.pi
 """An angle beyond it is taken for one in degrees."""
+_FEWEST = 3
+"""Samples of a gait."""
 _OTHERS = "_per_s", "_n_m", "_w"
 """Ends of names of columns that are no angles."""
 
@@ -129,8 +131,8 @@ def _numbers(name: str, given: object) -> np.ndarray:
         raise ProblemError(
             f"{name} must be joint angles, a number for each joint and time, not {type(given).__name__}."
         ) from None
-    if angles.ndim != 2 or angles.shape[1] < 3:
-        raise ProblemError(f"{name} must have a row for each joint and a column for each of at least 3 times.")
+    if angles.ndim != 2 or angles.shape[1] < _FEWEST:
+        raise ProblemError(f"{name} must have a row for each joint and a column for each of at least {_FEWEST} times.")
     if not np.isfinite(angles).all():
         joint, k = np.argwhere(~np.isfinite(angles))[0]
         raise ProblemError(f"{name} has no finite angle of joint {joint + 1} at sample {k + 1}.")
@@ -139,37 +141,18 @@ def _numbers(name: str, given: object) -> np.ndarray:
 
 def _read(path: Path, n_joint: int) -> tuple[np.ndarray, np.ndarray, bool]:
     """Times, angles ``(n_joint, n_time)``, and whether the names of the columns say degrees."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProblemError(f"cannot read {path} as text: {getattr(error, 'strerror', None) or error}.") from None
-    rows = list(csv.reader(line for line in text.splitlines() if line.strip() and not line.startswith("#")))
-    names = [name.strip().lower() for name in rows[0]] if rows and not _are_numbers(rows[0]) else []
-    rows = rows[bool(names) :]
-    if len(rows) < 3:
-        raise ProblemError(f"{path} holds {len(rows)} samples: a gait needs at least 3, a line each.")
-    width = len(names or rows[0])
-    for k, row in enumerate(rows, 1):
-        if len(row) != width or not _are_numbers(row):
-            raise ProblemError(f"{path}, sample {k}: {','.join(row)[:60]!r} is not {width} finite numbers.")
+    names, table = csv_table(path, _FEWEST)
+    values, width = table.T, table.shape[1]
     kept = [j for j in range(1, width) if not (names and names[j].endswith(_OTHERS))]
     if len(kept) != n_joint:
         raise ProblemError(
             f"{path} has {len(kept)} column{'s' * (len(kept) != 1)} of angles, and the body has {n_joint} joints: write a "
             "column of times, then one for each joint."
         )
-    values = np.array(rows, dtype=float).T
     falls = np.flatnonzero(np.diff(values[0]) <= 0)
     if falls.size:
         raise ProblemError(f"{path}: the times in the first column do not rise after sample {falls[0] + 1}.")
     return values[0], values[kept], bool(names) and all(names[j].endswith("_deg") for j in kept)
-
-
-def _are_numbers(row: list[str]) -> bool:
-    try:
-        return bool(np.isfinite([float(value) for value in row]).all())
-    except ValueError:
-        return False
 
 
 def _phases(name: str, time: np.ndarray, angles: np.ndarray, period: float | None) -> np.ndarray:

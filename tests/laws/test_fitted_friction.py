@@ -1,0 +1,112 @@
+"""Laws of friction through measured coefficients."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc import Friction, Harmonic, OwnLaw, Problem, ProblemError, fitted_friction
+
+SPEED = np.geomspace(0.01, 2.0, 25)
+
+
+def stribeck(dry, more, v_s, drag=0.0):
+    return dry + more * np.exp(-SPEED / v_s) + drag * SPEED
+
+
+def table(*columns):
+    return np.column_stack([SPEED, *columns])
+
+
+def forces(law, speed, angle):
+    vs, vn = (np.atleast_2d(speed * f(angle)) for f in (np.cos, np.sin))
+    return np.array(law.density(vs, vn, 1e-12 + 0 * vs))[:, 0]
+
+
+def test_a_law_is_found_again_from_its_coefficients():
+    stated = OwnLaw(
+        "-where(vs > 0, 0.3 + 0.2*exp(-speed/0.2), 0.5 + 0.1*speed)*vs/speed", "-(0.8 + 0.3*exp(-speed/0.2))*vn/speed"
+    )
+    found = fitted_friction(table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2), stribeck(0.5, 0.0, 1.0, 0.1)))
+    assert found.largest < 1e-5
+    for angle in np.linspace(0.1, 6.2, 9):
+        np.testing.assert_allclose(forces(found.law, SPEED, angle), forces(stated, SPEED, angle), atol=2e-5)
+
+
+def test_samples_without_a_trend_are_dry_friction():
+    noise = 0.02 * np.random.default_rng(4).normal(size=(3, 25))
+    found = fitted_friction(table(0.5 + noise[0], 0.9 + noise[1], 0.7 + noise[2]))
+    assert isinstance(found.law, Friction)
+    np.testing.assert_allclose([found.law.mu_f, found.law.mu_t, found.law.mu_b], [0.5, 0.9, 0.7], atol=0.015)
+    assert found.rms == pytest.approx(0.02, rel=0.3)
+    assert fitted_friction(table(stribeck(0.5, 0, 1), stribeck(0.9, 0, 1))).law == Friction(mu_t=0.9, mu_f=0.5, mu_b=0.5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_is_smoothed(seed):
+    noise = 0.02 * np.random.default_rng(seed).normal(size=25)
+    true = stribeck(0.4, 0.4, 0.15)
+    found = fitted_friction(table(true + noise, true + noise)).law
+    assert np.sqrt(np.mean((-forces(found, SPEED, 0.0)[0] - true) ** 2)) < 0.6 * 0.02
+
+
+def test_metres_and_seconds_are_the_same_law():
+    """A robot of 0.5 m that takes 4 s: one body length per period is 0.125 m/s."""
+    own = fitted_friction(table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2))).law
+    scaled = table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2)) * [0.125, 1, 1]
+    metres = fitted_friction(scaled, length=0.5, period=4.0).law
+    np.testing.assert_allclose(forces(metres, SPEED, 0.7), forces(own, SPEED, 0.7), rtol=1e-4)
+
+
+def test_it_is_a_law_like_any_other(tmp_path):
+    """NumPy, CasADi, compiled kernel, certificate and file, from a file of samples."""
+    path = tmp_path / "floor.csv"
+    values = table(stribeck(0.7, -0.2, 0.5), stribeck(1.4, -0.4, 0.5))
+    np.savetxt(path, values[:, [0, 2, 1]], delimiter=",", header="speed,sideways,forward", comments="")
+    law = fitted_friction(path).law
+    problem = Problem("measured", friction=law, gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-3)
+    found = colloc.solve(problem, starts=1)
+    assert found.status == "solved"
+    stated = OwnLaw("-(0.7 - 0.2*exp(-speed/0.5))*vs/speed", "-(1.4 - 0.4*exp(-speed/0.5))*vn/speed")
+    known = colloc.replay(problem.body, stated, found.gait, problem.delta)
+    assert found.efficiency == pytest.approx(known.efficiency, rel=1e-4)
+    assert colloc.load(colloc.save(found, tmp_path / "m.h5")).problem.friction == law
+
+
+def test_it_opposes_every_motion_whatever_the_samples():
+    """`OwnLaw` itself refuses a law that gives energy; so no fit may come to one."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        rough = table(*(rng.uniform(0.4, 0.6, (3, 1)) + 0.05 * rng.normal(size=(3, 25))).clip(0.01))
+        law = fitted_friction(rough).law
+        assert law.smallest > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("speed,along,across\n0.1,0.5,0.5\n0.2,-0.1,0.5\n0.3,0.5,0.5\n", "sample 2: the coefficient along is -0.1"),
+        ("speed,along\n0.1,0.5\n0.2,0.5\n0.3,0.4\n", "no column 'across': its columns are speed, along"),
+        ("0.1,0.5\n0.2,0.5\n0.3,0.4\n", "has 2 columns: write the speed"),
+        ("speed,along,across\n0.1,0.5,x\n0.2,0.1,0.5\n0.3,0.5,0.5\n", "sample 1: '0.1,0.5,x' is not 3 finite numbers"),
+        ("speed,along,across\n0.1,0.5,0.5\n", "holds 1 samples: at least 3"),
+        ("speed,along,across\n-0.1,0.5,0.5\n0.2,0.1,0.5\n0.3,0.5,0.5\n", "speed -0.1 is negative"),
+        ("speed,along,across\n0,0.5,0.5\n0,0.1,0.5\n0,0.5,0.5\n", "all speeds are 0"),
+        ("\n".join(f"{k},{0.2 + 0.8 * (k % 2)},0.5" for k in range(1, 12)), "no smooth curve is near"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused_in_a_sentence(text, words, tmp_path):
+    path = tmp_path / "floor.csv"
+    path.write_text(text)
+    with pytest.raises(ProblemError, match=words):
+        fitted_friction(path)
+
+
+def test_arguments_that_cannot_be_are_refused_in_a_sentence(tmp_path):
+    with pytest.raises(ProblemError, match=r"cannot read .*nowhere.csv"):
+        fitted_friction(tmp_path / "nowhere.csv")
+    with pytest.raises(ProblemError, match="a row for each of at least 3 speeds"):
+        fitted_friction(np.ones((3, 2)))
+    with pytest.raises(ProblemError, match="take both"):
+        fitted_friction(table(SPEED, SPEED), length=1.0)
+    with pytest.raises(ProblemError, match="length"):
+        fitted_friction(table(SPEED, SPEED), length=-1.0, period=2.0)
