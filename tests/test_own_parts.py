@@ -42,30 +42,15 @@ def test_a_body_of_your_own_is_solved_certified_kept_and_read(monkeypatch, tmp_p
     read = load(save(found, tmp_path / "belts.h5"))
     assert (read.problem.body, read.problem.hash) == (body, found.problem.hash)
     # the joints follow the belts, and move as those of the chain do
-    joints = body.belts @ found.sample([0.3]).angles
+    joints = body.joint_angles(found.sample([0.3]).angles)
     np.testing.assert_allclose(body.outline(found.sample([0.3]).angles), Chain((0.2,) * 5).outline(joints), atol=1e-14)
-
-
-def test_slopes_of_the_own_body_are_those_of_finite_differences(monkeypatch):
-    body, friction, h = run("own_body.md", monkeypatch).BeltSnake(gear=0.5), Friction(2.0, 1.0, 1.5), 1e-6
-    y = np.array([0.7, -0.4, 1.0, 2.0])[:, None]
-
-    def motion(y):
-        solved = body.solve(friction, y[:2], y[2:], 1e-2, tolerance=1e-13)
-        now = body.motion(friction, y[:2], y[2:], 1e-2, solved)
-        return solved, np.concatenate([now.z, now.centre, now.power[None]])
-
-    slopes = body.slopes(friction, y[:2], y[2:], 1e-2, motion(y)[0])
-    for j, step in enumerate(h * np.eye(4)[:, :, None]):
-        numeric = (motion(y + step)[1] - motion(y - step)[1]) / (2 * h)
-        np.testing.assert_allclose(slopes[:, j], numeric, atol=1e-6)
 
 
 @pytest.mark.slow
 def test_four_motors_do_better_than_two(monkeypatch):
     own = run("own_body.md", monkeypatch)
     gait = own.found.gait
-    guess = Fourier(*(own.problem.body.belts @ part for part in (gait.mean, gait.cos, gait.sin)))
+    guess = Fourier(*(np.array(own.problem.body.gears) @ part for part in (gait.mean, gait.cos, gait.sin)))
     free = solve(own.problem.with_(body=Chain((0.2,) * 5), guess=guess), 1)
     assert free.status == "solved"
     assert free.efficiency > own.found.efficiency

@@ -29,6 +29,7 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.feet import FeetLaw, Foot
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
@@ -46,7 +47,7 @@ AnyClass: TypeAlias = Any
 KIND = "kind"
 GAITS: tuple[type, ...] = (Fourier, ArcPath, Combination, Corners, Mixture, Phases, PointedSeries, SerpenoidSeries)
 CLASSES: tuple[type, ...] = (Harmonic, BSpline, Basis, FreePath, Polygon, Relaxed, Prescribed, Serpenoid)
-BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
+BODIES: list[type] = [Chain, Coupled, ModalBody, CrawlerBody, Concertina, Wave]
 """Bodies that files can hold; a body of your own is added to the list."""
 PARTS: tuple[type, ...] = (Foot, FeetLaw)
 """What bodies and laws hold."""
@@ -79,7 +80,7 @@ def _revived(value: Any) -> Any:
     """A part of a body, a law or a gait, such as a foot, from what `fields` made of it; anything else as it is."""
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
         return tuple(_revived(part) for part in value)
-    return _from((*LAWS, *PARTS, *CLASSES), value) if isinstance(value, dict) and KIND in value else value
+    return _from((*LAWS, *PARTS, *CLASSES, *BODIES), value) if isinstance(value, dict) and KIND in value else value
 
 
 def _from(kinds: Sequence[type], given: dict[str, Any]) -> Any:

@@ -12,13 +12,14 @@ is the balance of forces. Links are as heavy as they press on the floor, evenly 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from colloc.mechanics.balance import balance_jacobian
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.coupled import Coupled, JointPath
 from colloc.mechanics.law import Law
 from colloc.mechanics.links import LinkVelocity, Posture
 from colloc.numerics.arrays import Array, namespace
@@ -155,9 +156,10 @@ def checked_mass(body: Body) -> Chain:
     return body
 
 
-def checked_inertia(body: Body, gait: Path) -> Chain:
-    """The body, if it can play the gait with inertia; else a `ProblemError` that says why not."""
-    chain = checked_mass(body)
+def checked_inertia(body: Body, gait: Callable[..., Any]) -> tuple[Chain, JointPath]:
+    """The chain and its joint angles and rates, if the body can play the gait with inertia; else a `ProblemError` that says why
+    not."""
+    chain, joints = (body.chain, body.joint_path(gait)) if isinstance(body, Coupled) else (checked_mass(body), gait)
     if len(gait(np.zeros(1))) != 2:
         raise ProblemError("a relaxed gait changes direction in no time at all, so it cannot be played with inertia.")
-    return chain
+    return chain, joints

@@ -92,7 +92,7 @@ def slow_enough(
 
     Parameters
     ----------
-    body : Chain
+    body : Chain or Coupled
         Its links are as heavy as they press on the floor, evenly along their lengths.
     friction : Law
     gait : callable
@@ -121,12 +121,12 @@ def slow_enough(
     check_finite(positive=True, loss=loss, delta=delta)
     if loss > 0.5:
         raise ProblemError(f"loss must be at most 0.5, not {loss!r}.")
-    chain, accurate = checked_inertia(body, gait), _ACCURACY
+    (chain, joints), accurate = checked_inertia(body, gait), _ACCURACY
     law = chain.law(friction)
     if not rate_independent(law):
         raise ProblemError(f"under {law.label} the pace is part of every gait: how slow is slow enough has no one answer.")
     return _refined(
-        chain, law, gait, breaks, lambda on_mesh: _froude(on_mesh, law, delta, loss), lambda froude: accurate * froude
+        chain, law, joints, breaks, lambda on_mesh: _froude(on_mesh, law, delta, loss), lambda froude: accurate * froude
     )
 
 
@@ -151,7 +151,7 @@ def inertial_loss(
     0.39
     """
     check_finite(positive=True, froude=froude, delta=delta)
-    chain = checked_inertia(body, gait)
+    chain, joints = checked_inertia(body, gait)
 
     coarser: tuple[np.ndarray, Played] | None = None
 
@@ -161,7 +161,7 @@ def inertial_loss(
         coarser = on_mesh.times, on_mesh.played(delta, froude, near)
         return 1.0 - coarser[1].efficiency / on_mesh.played(delta).efficiency
 
-    return _refined(chain, chain.law(friction), gait, breaks, lost, lambda _: _LOSS_ACCURACY)
+    return _refined(chain, chain.law(friction), joints, breaks, lost, lambda _: _LOSS_ACCURACY)
 
 
 def _refined(

@@ -251,9 +251,10 @@ class Robot:
             "             torque [N m]      speed [rad/s]     power [W]",
             "             peak     r.m.s.   peak     r.m.s.   peak",
         ]
+        coordinate = self.solution.problem.body.coordinate
         names = ("peak_torque_N_m", "rms_torque_N_m", "peak_speed_rad_per_s", "rms_speed_rad_per_s", "peak_joint_power_W")
         for j, row in enumerate(zip(*(f[name] for name in names), strict=True), 1):
-            found.append(f"  joint {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip())
+            found.append(f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip())
         return [*found, "", *(f"  {sentence}" for sentence in self.sentences())]
 
     def sentences(self) -> list[str]:

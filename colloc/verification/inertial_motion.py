@@ -174,7 +174,7 @@ def inertial_motion(
 
     Parameters
     ----------
-    body : Chain
+    body : Chain or Coupled
         Its links are as heavy as they press on the floor, evenly along their lengths.
     friction : Law
     gait : callable
@@ -206,8 +206,8 @@ def inertial_motion(
     (0.136, True)
     """
     check_finite(positive=True, froude=froude, delta=delta)
-    chain, at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
-    played = GaitWithInertia(chain, friction, gait, delta, froude=float(froude), breaks=at)
+    (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
+    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at)
     start, slopes = played.closed(played.slow_momenta())
     length, length_error = whole_length(gait)
     aim, before = _FIRST * tolerance, None

@@ -40,8 +40,9 @@ def inertial_replay(
     """
     ran = inertial_motion(body, friction, gait, delta, froude, tolerance=tolerance, breaks=breaks, objective=objective)
     phases = ran.phases % 1.0
-    (angles, rates), chain = gait(phases), checked_inertia(body, gait)
-    played = GaitWithInertia(chain, friction, gait, delta, froude=froude, breaks=tuple(sorted(float(t) for t in breaks)))
+    chain, joints = checked_inertia(body, gait)
+    angles, rates = joints(phases)
+    played = GaitWithInertia(chain, friction, joints, delta, froude=froude, breaks=tuple(sorted(float(t) for t in breaks)))
     from_rest = ran.states[:3, 0]
     with suppress(NotConvergedError):  # Newton's method need not lead to any from there
         from_rest = played.closed(np.zeros(3))[0]
@@ -49,7 +50,7 @@ def inertial_replay(
     ends = ran.states[:, -1], played.run(from_rest, tolerance).states[:, -1] if several else ran.states[:, -1]
     z = tail_velocity(chain, angles, rates, ran.states[:3])
     energy = froude * kinetic_energy(chain, angles, rates, z)[0]
-    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
+    (x, y), (gx, gy) = chain.outline(angles), chain.centre(angles)
     here, there = ({"distance": float(np.hypot(*end[4:6])), "work": float(end[6]), "rotation": float(end[3])} for end in ends)
     return Replay(
         values=ran.values,
