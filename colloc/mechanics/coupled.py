@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.balance_results import BalanceSolution
-from colloc.mechanics.bodies import Pairs
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import Contact
 from colloc.mechanics.law import Law
@@ -83,6 +82,8 @@ class Coupled:
     stuck: tuple[tuple[int, float], ...] = field(default=())
 
     coordinate, quantity = "motor", "motor angle"
+    formulations, usual, looks_for_all_velocities = Chain.formulations, Chain.usual, Chain.looks_for_all_velocities
+    schedule, panels, stretches = Chain.schedule, Chain.panels, Chain.stretches
 
     def __post_init__(self) -> None:
         if type(self.chain) is not Chain:
@@ -101,10 +102,8 @@ class Coupled:
         if self.chain.crossing_depth(self._rest).any():
             raise ProblemError("links cross where joints are stuck.")
 
-    n_force, force_names, formulations = map(_of_chain, ("n_force", "force_names", "formulations"))
-    usual, schedule, panels, stretches = map(_of_chain, ("usual", "schedule", "panels", "stretches"))
-    looks_for_all_velocities, drawn_width, hinges = map(_of_chain, ("looks_for_all_velocities", "drawn_width", "hinges"))
-    law, largest_forces = map(_of_chain, ("law", "largest_forces"))
+    n_force, force_names, law, largest_forces = map(_of_chain, ("n_force", "force_names", "law", "largest_forces"))
+    drawn_width, hinges, far_pairs = map(_of_chain, ("drawn_width", "hinges", "far_pairs"))
 
     sliding, with_forces, forces, solve = map(_under_friction, ("sliding", "with_forces", "forces", "solve"))
     motion, replayed, all_velocities = map(_under_friction, ("motion", "replayed", "all_velocities"))
@@ -188,10 +187,6 @@ class Coupled:
 
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
         return np.abs(self.limited @ angles).max(axis=0)
-
-    @property
-    def far_pairs(self) -> Pairs:
-        return self.chain.far_pairs
 
     def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
         return [contact.after(self.joint_angles) for contact in self.chain.contacts(far)]
