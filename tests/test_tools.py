@@ -19,7 +19,7 @@ from scripts.friction_plane import best_over
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("scripts", "scripts/paper", "scripts/models", "benchmarks")
 MODULES = sorted(path for folder in FOLDERS for path in (ROOT / folder).glob("*.py") if path.stat().st_size)
-OPTIONAL = {"docs_site": "mkdocs"}
+OPTIONAL = {"docs_site": "mkdocs", "play_in_mujoco": "mujoco"}
 """Modules that need more than the tests do."""
 EXAMPLES = ("continue_delta", "continue_epsilon")
 """A dozen lines without a function, to be read."""

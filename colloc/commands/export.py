@@ -1,4 +1,4 @@
-"""Command line: the gait of a result as joint angles over time, for a robot: CSV or JSON.
+"""Command line: the gait of a result as joint angles over time, for a robot: CSV or JSON; or the robot as MJCF or URDF.
 
 Exit codes: 0 written, 2 bad file or option.
 """
@@ -33,6 +33,8 @@ number of samples, and the sample after the last is the first one again.
   colloc export results/three_link.h5 --max-speed 2.0 --rate 100          as fast as 2 rad/s allow
   colloc export results/three_link.h5 --max-speed 2.0 1.0 --format json   a limit for each joint
   colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3    with torques [N m] and powers [W]
+  colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3 --format mjcf    the robot for MuJoCo (.xml)
+  colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3 --format urdf    the robot for other simulators
 
 CSV: '#' lines about the result, then time_s, joint_1_rad, ..., joint_1_rad_per_s, ... (mode_1_rad, ... of a smooth body) and,
 with --length and --mass, joint_1_N_m, ..., joint_1_W, ... Joint angles count from tail to head; each is a link's direction less
@@ -47,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--max-speed", type=float, nargs="+", metavar="V", help="joint speed limit(s) [rad/s], one or one each")
     add_robot(parser)
     parser.add_argument("--periods", type=int, default=1, metavar="N", help="repeat the period N times (default: 1)")
-    parser.add_argument("--format", choices=("csv", "json"), default=None, help="default: by the suffix of --output, else csv")
+    parser.add_argument("--format", choices=("csv", "json", "mjcf", "urdf"), default=None, help="default: --output's, else csv")
     parser.add_argument("--output", metavar="PATH", help="folder or file (default: beside the result)")
     add_printing(parser)
     return parser
@@ -62,10 +64,16 @@ def _export(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
     check_trusted(solution, options.result)
-    path = output_path(options.output, source.with_suffix(f".{output_kind(options, ('csv', 'json'))}"))
+    options.format = "xml" if options.format == "mjcf" else options.format
+    kind = output_kind(options, ("csv", "json", "xml", "urdf"))
+    path = output_path(options.output, source.with_suffix(f".{kind}"))
     settings = {"period": options.period, "max_speed": options.max_speed, "rate": options.rate, "periods": options.periods}
     settings |= robot_options(options)
     facts = solution.export(path, **settings)
+    if kind in ("xml", "urdf"):
+        said = f"saved {path}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; its joint angles: --format csv"
+        tell(options, {**facts, "file": str(path)}, [said])
+        return OK
     samples = facts["samples_per_period"] * options.periods
     fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])
     lines = [

@@ -1,4 +1,5 @@
-"""A gait's shape coordinates over time as a file for a robot: comma-separated values or JSON, with what a reader has to know.
+"""A gait's shape coordinates over time as a file for a robot: comma-separated values or JSON, with what a reader has to know;
+and the robot itself as a model for simulators.
 
 Where the pace of a gait matters (viscous drag, power limits), its own pace is kept, and limits on the speeds make the period
 longer: so the numbers of the result hold for what is written.
@@ -17,12 +18,13 @@ import numpy as np
 from colloc.gaits.gait_fields import fields
 from colloc.mechanics.inertia import GRAVITY
 from colloc.results.robot import Robot
+from colloc.results.robot_model import FORMATS
 from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.system.replaced_file import replaced_file
 from colloc.verification.trajectory import Trajectory, timed
 
-KINDS = ".csv", ".json"
+KINDS = ".csv", ".json", *FORMATS
 
 
 def write_export(
@@ -43,7 +45,8 @@ def write_export(
     ----------
     solution : Solution
     path : Path
-        Ends in ``.csv`` or ``.json``.
+        Ends in ``.csv`` or ``.json``; or in ``.xml`` or ``.urdf`` for the robot as a model of MuJoCo (MJCF) or a URDF
+        (`colloc.results.robot_model`), which takes `period`, `length` and `mass`.
     period : float, optional
         Seconds a period takes, rounded up to a whole number of samples; by default the shortest that `max_speed` allows.
     max_speed : float or (n_joint,), optional
@@ -75,6 +78,10 @@ def write_export(
         raise ProblemError(f"{path} should end in {' or '.join(KINDS)}.")
     if not solution.problem.gait.free:
         raise ProblemError(f"{solution.problem.name} is a prescribed motion of a smooth body: it has no joints to export.")
+    if path.suffix in FORMATS:
+        if period is None or length is None or mass is None:
+            raise ProblemError("a model for simulators needs the period [s], the length [m] and the mass [kg] of the robot.")
+        return _written_model(Robot(solution, length, mass, period, gravity), path)
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     trajectory = timed(solution.gait, rate, period, limits, keep_pace=bool(solution.problem.paced_by))
     facts, series = _about(solution, trajectory, rate, limits), {"rad": trajectory.angles, "rad_per_s": trajectory.speeds}
@@ -90,6 +97,14 @@ def write_export(
     with replaced_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
     return facts
+
+
+def _written_model(robot: Robot, path: Path) -> dict[str, Any]:
+    """Write the robot as a model for simulators."""
+    text, size = FORMATS[path.suffix](robot), {"length_m": robot.length, "mass_kg": robot.mass, "period_s": robot.period}
+    with replaced_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+    return {name: robot.facts[name] for name in ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")} | size
 
 
 def _about(solution: Solution, trajectory: Trajectory, rate: float, limits: np.ndarray | None) -> dict[str, Any]:

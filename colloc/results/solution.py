@@ -262,8 +262,9 @@ class Solution:
         return bound("report")(self, Path(path), robot=robot)
 
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-        """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`: ``solution.export("mine.csv",
-        period=4)``; returns what the file says about them. Options as for `colloc.pictures.export.write_export`."""
+        """Write joint angles over time for a robot, as CSV or JSON by the ending of `path`, ``solution.export("mine.csv",
+        period=4)``, or the robot as a model for simulators (``.xml``, ``.urdf``); returns what the file says. Options as for
+        `colloc.pictures.export.write_export`."""
         return bound("export")(self, Path(path), **options)
 
     def robot(self, length: float, mass: float, period: float, **options: Any) -> Any:

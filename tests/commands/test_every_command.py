@@ -96,7 +96,7 @@ def test_what_is_wrong_is_named_without_words_of_programmers(place, capsys):
     for words, message in (
         ("solve problem.py --mesh x", "--mesh must be a whole number, not 'x'"),
         ("solve problem.py --delta x", "--delta must be a number, not 'x'"),
-        ("export good.h5 --format x", "--format must be one of 'csv', 'json', not 'x'"),
+        ("export good.h5 --format x", "--format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'"),
         ("open good.h5", "good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it"),
     ):
         assert colloc(words.split()) == 2
