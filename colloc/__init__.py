@@ -46,6 +46,7 @@ bind(
         "report": "colloc.pictures.report_page:write_report",
         "robot": "colloc.results.robot:Robot",
         "plot_robot": "colloc.pictures.robot_figure:robot_figure",
+        "sensitivity": "colloc.search.sensitivity:sensitivity",
         "export": "colloc.pictures.export:write_export",
         "plot_steering": "colloc.pictures.steering_figure:steering_figure",
         "plot_front": "colloc.pictures.front_figure:front_figure",

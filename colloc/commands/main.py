@@ -25,6 +25,7 @@ SUBCOMMANDS = {
     "animate": ("animate", "the motion as GIF or MP4"),
     "export": ("export", "joint angles over time for a robot, as CSV or JSON"),
     "robot": ("robot", "speed, power and torques of a result on a robot of so many metres and kilograms"),
+    "sensitivity": ("sensitivity", "what a wrong floor costs: how the best value changes with friction, lengths, feet, limits"),
     "completion": ("completion", "what the Tab key needs to complete all this in bash"),
 }
 """Name to module of this package with a ``main(arguments)`` that returns an exit code, and what it does."""

@@ -282,6 +282,20 @@ class Solution:
         """
         return bound("robot")(self, length, mass, period, **options)
 
+    def sensitivity(self, resolve: bool = False) -> Any:
+        """A `colloc.search.sensitivity.Sensitivity`: by how much the best value changes with every number of the problem.
+
+        With `resolve` also what the best gait gets where each is a tenth smaller and larger, and what this one gets there.
+
+        Examples
+        --------
+        >>> import colloc
+        >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+        >>> round(colloc.solve(problem, starts=1).sensitivity()["friction sideways"].slope, 3)
+        -0.061
+        """
+        return bound("sensitivity")(self, resolve)
+
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a result file's group motion."""
         about = {"name": self.problem.name, "status": self.status, "efficiency": self.measured.efficiency}

@@ -71,6 +71,7 @@ REFUSED = {
     + [f"problem.py --{option}" for option in ("turn 200", "turn x", "turn nan", "starts 0", "output x.txt")],
     "pareto": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
     + [f"problem.py --{option}" for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")],
+    "sensitivity": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --no-such"],
     "completion": ["--no-such", "x"],
 }
 
@@ -107,6 +108,17 @@ def test_a_new_problem_file_is_told_as_json(tmp_path, capsys):
     assert colloc(["init", str(tmp_path / "mine.py"), "--links", "4", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told == {"status": "written", "file": str(tmp_path / "mine.py"), "links": 4}
+
+
+def test_a_sensitivity_is_told_as_a_table_and_as_json(place, capsys):
+    assert colloc(["sensitivity", "good.h5"]) == 0
+    table = capsys.readouterr().out
+    assert colloc(["sensitivity", "good.h5", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    for effect in told["effects"]:
+        assert effect["name"] in table
+        if abs(effect["slope"]) > 1e-6:
+            assert f"{effect['slope']:+.5f}" in table
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")

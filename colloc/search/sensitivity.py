@@ -1,0 +1,367 @@
+r"""What a wrong floor, or a robot built otherwise, costs: by how much the best value changes with every number of a problem.
+
+At an optimum the derivative of the best value is that of the Lagrangian ``L = f + sum_i lambda_i (g_i - b_i)`` with gait and
+multipliers held fixed (envelope theorem): the gait need not be sought again. So it is what the collocated motion of the *same*
+gait says, balanced anew, and what the rows that hold it back say times their multipliers. L is differentiated in the number by
+central differences of relative step 1e-5, which its Newton solves to 1e-11 allow, on the mesh of the answer.
+
+Whoever wants more than first order has the gait sought again from where it is (`resolve`); what that gains over the gait as it
+stands is of second order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.parameters import Parameter, parameters
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import NONE
+from colloc.numerics.sqp import stationarity
+from colloc.reduced.program import ReducedProgram, SearchSpace
+from colloc.reduced.spaces import space_about, space_near, space_of
+from colloc.results.answer import EVALUATED, Answer
+from colloc.results.checks import UNCERTIFIED
+from colloc.results.solution import Solution
+from colloc.search.choose import solution_of
+from colloc.search.converge import NEXT_RADIUS, converged
+from colloc.search.optimum import FINE, ROUGH
+from colloc.search.solve import finished
+from colloc.system.errors import ProblemError
+from colloc.verification.replay import Replay
+from colloc.verification.replayer import replayer
+
+CHANGE = 0.1
+"""Of a number, that tables speak of: a tenth more and less."""
+_STEP = 1e-5
+"""Of differences, relative. With delta = 1e-4 the motion bends over relative changes of that order; measured on three problems,
+steps from 1e-4 to 1e-7 agree to 1e-7."""
+_NEAR = 0.1
+"""How far a parameter may go as the gait settles on another mesh [rad]."""
+_NOTHING = 1e-9
+"""Relative slope that counts as none."""
+_STATIONARY = 1e-4
+"""Largest gradient of the Lagrangian, over the value, at which there are multipliers."""
+_EXCESS, _TURNS = 1e-5, 1e-4
+"""By how much a gait may exceed its limits [rad, or relative], and turn in a period [rad], and still be one of the problem."""
+
+
+@dataclass(frozen=True)
+class Again:
+    """What is best where a number differs, and what the gait on file does there.
+
+    Attributes
+    ----------
+    change : float
+        Of the number.
+    value, error : float
+        Of the best gait there, sought from the gait on file and certified; NaN if it is not certified.
+    status : str
+    kept, kept_error : float
+        Of the gait on file, replayed there.
+    breaks : str
+        What the gait on file does not keep there; empty if it is one of that problem's gaits.
+    """
+
+    change: float
+    value: float
+    error: float
+    status: str
+    kept: float
+    kept_error: float
+    breaks: str
+
+    @property
+    def behind(self) -> float:
+        """By how much the gait on file falls behind the best one there; it may be ahead where it breaks something."""
+        return self.value - self.kept
+
+    def facts(self) -> dict[str, Any]:
+        """As plain numbers; None for what there is not."""
+        numbers = {name: getattr(self, name) for name in ("change", "value", "error", "kept", "kept_error", "behind")}
+        return {name: float(x) if np.isfinite(x) else None for name, x in numbers.items()} | {
+            "status": self.status,
+            "breaks": self.breaks,
+        }
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What one number of a problem does to the best value.
+
+    Attributes
+    ----------
+    name : str
+    now : float
+        The number.
+    relative : bool
+        Whether changes are parts of the number (0.1: a tenth more), or parts of a link, for places of feet.
+    slope : float
+        Derivative of the best value along that change. Where the number can only become smaller, that to this side.
+    error : float
+        What halving the mesh and doubling the step of the differences change of it.
+    sides : tuple of int
+        Whether the number can be smaller (-1) and larger (1).
+    again : tuple of Again
+        Empty unless asked for.
+    """
+
+    name: str
+    now: float
+    relative: bool
+    slope: float
+    error: float
+    sides: tuple[int, ...] = (-1, 1)
+    again: tuple[Again, ...] = ()
+
+    def facts(self) -> dict[str, Any]:
+        """As plain numbers."""
+        own = {name: getattr(self, name) for name in ("name", "now", "relative", "slope", "error", "sides")}
+        return own | {"again": [each.facts() for each in self.again]}
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """By how much the best value of a problem changes with its numbers.
+
+    Attributes
+    ----------
+    name : str
+        Of the problem.
+    objective : str
+        In short.
+    value, error : float
+        As certified.
+    effects : tuple of Effect
+    """
+
+    name: str
+    objective: str
+    value: float
+    error: float
+    effects: tuple[Effect, ...]
+
+    def __repr__(self) -> str:
+        return f"<Sensitivity of {self.name} to {len(self.effects)} numbers>"
+
+    def __getitem__(self, name: str) -> Effect:
+        found = next((effect for effect in self.effects if effect.name == name), None)
+        if found is None:
+            raise KeyError(f"{name!r}: there is {', '.join(effect.name for effect in self.effects)}")
+        return found
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def facts(self) -> dict[str, Any]:
+        """All of it as plain numbers (JSON)."""
+        own = {name: getattr(self, name) for name in ("name", "objective", "value", "error")}
+        return own | {"effects": [effect.facts() for effect in self.effects]}
+
+    def lines(self) -> list[str]:
+        """For a terminal."""
+        seen = [effect for effect in self.effects if not abs(effect.slope) <= _NOTHING * abs(self.value)]
+        width = max((len(effect.name) for effect in seen), default=0)
+        lines = [
+            f"{self.name}: {self.objective} = {self.value:.6f} +- {self.error:.0e}; the best gait's elsewhere, to first order:",
+            f"  {'':<{width}}  {'now':>8s}  {'10 % less':>9s}  {'10 % more':>9s}  slope",
+        ]
+        for effect in seen:
+            at = {side: f"{self.value + side * CHANGE * effect.slope:9.4f}" for side in effect.sides}
+            less, more = (at.get(side, f"{'-':>9s}") for side in (-1, 1))
+            unit = "" if effect.relative else "  (a tenth of its link)"
+            slope = f"{effect.slope:+.5f} +- {effect.error:.0e}"
+            lines.append(f"  {effect.name:<{width}}  {effect.now:8.4g}  {less}  {more}  {slope}{unit}")
+        if without := [effect.name for effect in self.effects if effect not in seen]:
+            lines.append(f"  no effect to first order: {', '.join(without)}")
+        if any(effect.again for effect in self.effects):
+            lines += self._again(width)
+        return lines
+
+    def _again(self, width: int) -> list[str]:
+        head = f"{'change':>7s}  {'first order':>11s}  {'best there':>10s}  {'on file':>8s}  behind by"
+        lines = ["", f"  {'':<{width}}  {head}"]
+        for effect in self.effects:
+            for each in effect.again:
+                change = f"{100 * each.change:+.3g} %" if effect.relative else f"{each.change:+.3g}"
+                first, best = self.value + each.change * effect.slope, f"{each.value:10.4f}"
+                behind = f"{each.behind:9.1e}"
+                if not np.isfinite(each.value):
+                    best, behind = f"{'-':>10s}", f"  {each.status}"
+                row = f"{change:>7s}  {first:11.4f}  {best}  {each.kept:8.4f}  {behind}  {each.breaks}".rstrip()
+                lines.append(f"  {effect.name:<{width}}  {row}")
+        return lines
+
+
+def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANGE) -> Sensitivity:
+    """By how much the best value changes with every number of the problem (`colloc.gaits.parameters`).
+
+    Parameters
+    ----------
+    solution : Solution
+        Solved.
+    resolve : bool
+        Whether to seek the gait again, from where it is, with each number that matters a little smaller and larger, and to
+        replay the gait on file there. Takes about a second or two for each.
+    change : float
+        How much smaller and larger, then.
+
+    Returns
+    -------
+    Sensitivity
+
+    Raises
+    ------
+    ProblemError
+        If the gait is no optimum: it was given, or the solve did not end well, or it is a relaxed one.
+
+    Examples
+    --------
+    Forces are proportional to friction, so half as much of it costs half as much:
+
+    >>> import colloc
+    >>> solution = colloc.solve(colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2), starts=1)
+    >>> found = solution.sensitivity()
+    >>> slopes = [found[f"friction {way}"].slope for way in ("sideways", "forwards", "backwards")]
+    >>> bool(abs(sum(slopes) / solution.value + 1) < 1e-4)
+    True
+    """
+    _check_is_optimum(solution)
+    answer, certificate, effects = solution.answer, solution.certificate, []
+    own = _on_its_mesh(answer)
+    finer = _on_halved_mesh(answer, own)
+    for parameter in parameters(answer.problem):
+        slope = _slope(finer, parameter)
+        error = abs(_slope(own, parameter) - slope) + abs(_slope(finer, parameter, 2 * _STEP) - slope)
+        effect = Effect(parameter.name, parameter.value, parameter.relative, slope, error, tuple(_beside(parameter, _STEP)))
+        if resolve and abs(slope) > _NOTHING * abs(solution.value):
+            beside = _beside(parameter, change)
+            again = tuple(_again(solution, problem, side * change) for side, problem in beside.items())
+            effect = replace(effect, again=again)
+        effects.append(effect)
+    return Sensitivity(
+        solution.problem.name, solution.problem.objective.short, certificate.value, certificate.value_error, tuple(effects)
+    )
+
+
+def _check_is_optimum(solution: Solution) -> None:
+    if solution.answer.program == EVALUATED or not solution.problem.gait.free:
+        raise ProblemError("the gait was given: only of an optimum is it known how the best value changes.")
+    if solution.problem.gait.mixes:
+        raise ProblemError("a relaxed gait has no sensitivity here: solve the problem for a Polygon or a FreePath.")
+    if not solution.success:
+        raise ProblemError(f"only an optimum has a sensitivity, and this solve ended as: {solution.status}.")
+
+
+@dataclass(frozen=True, eq=False)
+class _Lagrangian:
+    """The Lagrangian of the reduced program on one mesh at its optimum, as a function of the problem.
+
+    Attributes
+    ----------
+    space : SearchSpace
+        The class of gaits on its mesh, for the problem as it was solved.
+    v : (n,)
+        The gait.
+    on_rows : dict
+        Multipliers by names of rows, positive at upper bounds.
+    on_bounds : (n,)
+        Multipliers of the parameters' bounds.
+    """
+
+    space: SearchSpace
+    v: np.ndarray
+    on_rows: dict[tuple[str, int], float]
+    on_bounds: np.ndarray
+
+    def __call__(self, problem: Problem) -> float:
+        """Its value, in the units of the stated objective, with the rows at the worst instants of the gait."""
+        near, edges, scheme = self.space.given
+        program = ReducedProgram(space_of(problem, near, edges, scheme, self.space.far), problem.delta)
+        program.place_rows(self.v)
+        at = {name: k for k, name in enumerate(program.row_names)}
+        if missing := self.on_rows.keys() - at.keys():
+            what = f"the bound {min(missing)[0]!r}, which holds the gait back, vanishes beside it"
+            raise ProblemError(f"the gait has no sensitivity: {what}.")
+        rows, which = program.rows(self.v), [at[name] for name in self.on_rows]
+        left = _beyond(rows[which], program.row_lower[which], program.row_upper[which], np.array([*self.on_rows.values()]))
+        left += _beyond(self.v, program.lower, program.upper, self.on_bounds)
+        return program.stated(program.objective(self.v)) + program.stated(1.0) * left
+
+
+def _beyond(values: np.ndarray, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray) -> float:
+    """Multipliers times how far values are beyond the bounds that they belong to."""
+    bounds = np.select([multipliers > 0, multipliers < 0], [high, low], values)
+    return float(multipliers @ (values - bounds))
+
+
+def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> _Lagrangian:
+    program = ReducedProgram(space, delta)
+    program.place_rows(v)
+    found = stationarity(program, v)
+    if not found.kkt_error <= _STATIONARY * abs(program.objective(v)):
+        why = f"the gradient of the Lagrangian does not vanish ({found.kkt_error:.0e})"
+        raise ProblemError(f"the gait has no sensitivity: {why}, as where it rests on a kink.")
+    named = zip(program.row_names, found.on_rows, strict=True)
+    on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
+    return _Lagrangian(space, v, on_rows, found.on_bounds)
+
+
+def _on_its_mesh(answer: Answer) -> _Lagrangian:
+    space, v = space_near(answer.problem, answer.gait, answer.edges, answer.scheme)
+    return _lagrangian(space.with_far(answer.problem.body.far_pairs), v, answer.delta)
+
+
+def _on_halved_mesh(answer: Answer, own: _Lagrangian) -> _Lagrangian:
+    """With every interval halved, and the gait optimal there: multipliers go with their mesh."""
+    edges = np.sort(np.concatenate([answer.edges, 0.5 * (answer.edges[1:] + answer.edges[:-1])]))
+    space = own.space.remeshed(answer.gait, edges, answer.scheme)
+    found = converged(space, space.parameters(answer.gait), answer.delta, _NEAR, FINE)
+    return _lagrangian(found.space, found.v, answer.delta)
+
+
+def _beside(parameter: Parameter, step: float) -> dict[int, Problem]:
+    """The problems with a number a little smaller (-1) and larger (1), as far as there are such."""
+    found = {}
+    for side in (-1, 1):
+        with suppress(ProblemError):
+            found[side] = parameter.changed(side * step)
+    return found
+
+
+def _slope(value: Callable[[Problem], float], parameter: Parameter, step: float = _STEP) -> float:
+    """Derivative along a change of a number; where it can change to one side only, to that side."""
+    sides = _beside(parameter, step)
+    if len(sides) == 2:
+        return (value(sides[1]) - value(sides[-1])) / (2 * step)
+    ((side, beside),) = sides.items()
+    here, farther = value(parameter.changed(0.0)), value(parameter.changed(2 * side * step))
+    return side * (4 * value(beside) - 3 * here - farther) / (2 * step)
+
+
+def _again(solution: Solution, problem: Problem, change: float) -> Again:
+    """What is best where a number differs, and what the gait on file does there."""
+    gait, delta = solution.answer.gait, problem.delta
+    space, v = space_about(problem, gait)
+    found = solution_of(problem, finished(converged(space, v, delta, NEXT_RADIUS, ROUGH)))
+    best = found.certificate if found.success else UNCERTIFIED
+    at = problem.body, problem.law, gait, delta * gait.delta_unit
+    kept = replayer(problem)(*at, breaks=gait.corner_phases, objective=problem.objective)
+    breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
+    return Again(change, best.value, best.value_error, found.status, kept.value, kept.error * abs(kept.value), breaks)
+
+
+def _broken(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
+    """What a gait does not keep of a problem, in words."""
+    if excess > _EXCESS:
+        yield f"{excess:.2g} beyond its limits"
+    turned = kept.rotation - (problem.rotation or 0.0)
+    if problem.rotation is not None and problem.gait.closing_symmetry == NONE and abs(turned) > _TURNS:
+        yield f"turns {np.degrees(turned):+.2g}° too far a period"
+    for aim, least in problem.at_least:
+        if aim(kept.values) < least * (1 - _EXCESS):
+            yield f"{aim.name} {aim(kept.values):.4g}, not {least:.4g}"

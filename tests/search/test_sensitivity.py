@@ -1,0 +1,161 @@
+"""What a wrong floor costs: derivatives of best values obey identities, and are those of optima that are sought again."""
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc.gaits.parameters import parameters
+from colloc.search.sensitivity import sensitivity
+
+WAYS = ("sideways", "forwards", "backwards")
+
+
+@pytest.fixture(scope="module")
+def found(three_link):
+    return three_link.sensitivity()
+
+
+def test_as_much_more_friction_all_round_costs_as_much(three_link, found):
+    """Forces are proportional to the coefficients, which the velocities do not notice: sum of mu dV/dmu = -V."""
+    total = sum(found[f"friction {way}"].slope for way in WAYS)
+    assert total == pytest.approx(-three_link.value, rel=2e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "others"), [("three_link_feet", ()), ("three_link_fast", ("Froude number",)), ("three_link_uphill", ("grade",))]
+)
+def test_so_it_is_on_feet_and_where_gravity_and_inertia_are_as_much_stronger(name, others, solved):
+    solution = solved(name)[0]
+    found = solution.sensitivity()
+    total = sum(found[each].slope for each in (*(f"friction {way}" for way in WAYS), *others))
+    assert total == pytest.approx(-solution.value, rel=1e-4)
+
+
+def test_a_longer_middle_is_shorter_ends(found):
+    """A part more of both ends, a third each, takes two parts of the middle."""
+    assert found["length of links 1 and 3"].slope == pytest.approx(-2 * found["length of link 2"].slope, rel=1e-6)
+
+
+def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
+    assert found["smallest shape speed"].slope == 0
+    assert np.abs(three_link.gait.angles(np.linspace(0, 1, 2001))).max() == pytest.approx(np.pi, abs=1e-4)
+    assert found["joint limit"].slope > 10 * found["joint limit"].error
+
+
+def differences(solution, parameter, step):
+    """Derivative of the certified best value by sought gaits, with the step and half of it, and its error; one-sided where the
+    number cannot grow."""
+    some = sensitivity(solution, resolve=True, change=step)[parameter].again
+    half = sensitivity(solution, resolve=True, change=step / 2)[parameter].again
+    assert all(each.status == "solved" for each in (*some, *half))
+    error = 4 * max(each.error for each in (*some, *half)) / step
+    if len(some) == 2:
+        wide, narrow = ((more.value - less.value) / (more.change - less.change) for less, more in (some, half))
+        return (4 * narrow - wide) / 3, error + abs(narrow - wide) / 3
+    (wide,), (narrow,) = some, half
+    slopes = [(each.value - solution.value) / each.change for each in (wide, narrow)]
+    return 2 * slopes[1] - slopes[0], 2 * error + abs(slopes[1] - slopes[0]) / 3
+
+
+@pytest.fixture
+def of(monkeypatch):
+    """A function that lets a sensitivity ask for some numbers of a problem only."""
+
+    def only(*names):
+        some = lambda problem: [each for each in parameters(problem) if each.name in names]  # noqa: E731
+        monkeypatch.setattr("colloc.search.sensitivity.parameters", some)
+
+    return only
+
+
+@pytest.mark.parametrize("name", ["friction sideways", "length of link 2"])
+def test_slopes_are_those_of_gaits_that_are_sought_again(name, three_link, found, of):
+    of(name)
+    slope, error = differences(three_link, name, 0.01)
+    assert error < 0.01 * abs(slope)
+    assert abs(found[name].slope - slope) <= found[name].error + error
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("problem", ["three_link", "three_link_folded", "three_link_feet", "three_link_uphill"])
+def test_all_slopes_are_those_of_gaits_that_are_sought_again(problem, solved, of):
+    """Also where the net rotation, the way across a slope, or a joint limit carries a multiplier."""
+    solution = solved(problem)[0]
+    effects = [effect for effect in solution.sensitivity().effects if effect.slope and effect.name != "delta"]
+    for effect in effects:
+        of(effect.name)
+        slope, error = differences(solution, effect.name, 0.01)
+        assert abs(effect.slope - slope) <= effect.error + error, effect.name
+    assert len(effects) >= 6
+
+
+def test_the_gait_on_file_falls_behind_to_second_order(three_link, of):
+    of("length of link 2")
+    behind = []
+    for change in (0.005, 0.01):
+        again = sensitivity(three_link, resolve=True, change=change)["length of link 2"].again
+        assert not any(each.breaks for each in again)
+        behind.append(sum(each.behind for each in again))
+    assert behind[1] / behind[0] == pytest.approx(4, rel=0.1)
+
+
+def test_a_gait_that_exceeds_a_limit_or_turns_says_so(three_link, of):
+    of("joint limit")
+    (less,) = three_link.sensitivity(resolve=True)["joint limit"].again
+    assert "beyond its limits" in less.breaks
+    assert less.value < three_link.value
+
+
+def test_feet_that_have_to_be_alike_move_together():
+    feet = (colloc.Foot(0, 0.2), colloc.Foot(1), colloc.Foot(2, 0.8))
+    problem = colloc.Problem("x", body=colloc.Chain(feet=feet), gait=colloc.Harmonic(1, "bilateral"))
+    stated = {each.name: each for each in parameters(problem)}
+    assert "place of foot 2" not in stated  # the middle of the body
+    moved = stated["place of feet 1 and 3"].changed(0.1).body.feet
+    assert [foot.place for foot in moved] == pytest.approx([0.3, 0.5, 0.7])
+    heavier = stated["weight of foot 2"].changed(0.3).body.feet
+    assert [foot.weight for foot in heavier] == pytest.approx([17 / 60, 26 / 60, 17 / 60])
+
+
+def test_feet_beside_each_other_move_together():
+    feet = (colloc.Foot(0, 0.2, offset=0.1), colloc.Foot(0, 0.2, offset=-0.1), colloc.Foot(1, 0.6))
+    problem = colloc.Problem("x", body=colloc.Chain((0.5, 0.5), feet=feet), friction=colloc.Friction(mu_b=3))
+    moved = next(each for each in parameters(problem) if each.name == "place of feet 1 and 2").changed(0.1).body.feet
+    assert [foot.place for foot in moved] == pytest.approx([0.3, 0.3, 0.6])
+
+
+def test_wheels_have_numbers_of_their_own():
+    body = colloc.Chain(feet=tuple(colloc.Wheel(k, rolling=0.05) for k in range(3)))
+    names = [each.name for each in parameters(colloc.Problem("x", body=body))]
+    assert names[:3] == [f"friction {way} of feet 1, 2 and 3" for way in WAYS]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"joint_limit": ((-1, 2), 1.5), "speed_limit": 12.0},
+        {"at_least": {"distance": 0.1}, "torque_limit": (0.1, 0.2)},
+        {"body": colloc.Chain(weights=(0.3, 0.3, 0.4), width=0.02), "grade": 0.1},
+        {"friction": colloc.PowerLaw(0.3), "gait": colloc.Harmonic(2)},
+        {"gait": colloc.FreePath(8.0)},
+    ],
+)
+def test_every_number_can_change_and_nothing_else_does(changes):
+    problem = colloc.Problem("x", **changes)
+    for each in parameters(problem):
+        same, less = each.changed(0.0), each.changed(-0.01)
+        assert same.with_(guess=problem.guess).hash == problem.hash, each.name
+        assert less.hash != same.hash, each.name
+
+
+def test_what_is_no_optimum_is_refused(three_link, tmp_path):
+    given = colloc.evaluate(three_link.problem, three_link.gait)
+    with pytest.raises(colloc.ProblemError, match="the gait was given"):
+        given.sensitivity()
+    rough = colloc.solve(three_link.problem.with_(delta=1e-4), starts=1, seconds=1e-3)
+    with pytest.raises(colloc.ProblemError, match="this solve ended as: interrupted"):
+        rough.sensitivity()
+    with pytest.raises(KeyError, match="there is friction sideways"):
+        three_link.sensitivity()["colour"]
