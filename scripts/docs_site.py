@@ -37,7 +37,7 @@ ORDER = (
         "How to",
         (
             *(f"howto/{name}.md" for name in ("scripts", "report", "robot", "motors", "pace", "slopes", "laws", "steering")),
-            *(f"howto/{name}.md" for name in ("objectives", "check", "starts", "studies", "cluster")),
+            *(f"howto/{name}.md" for name in ("objectives", "check", "sensitivity", "starts", "studies", "cluster")),
             *(f"howto/{name}.md" for name in ("own_body", "columns", "own_gait_class", "paper")),
             "troubleshooting.md",
         ),

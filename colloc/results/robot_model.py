@@ -168,7 +168,7 @@ def _height(robot: Robot) -> float:
 
 
 def _inertia(robot: Robot, length: float, mass: float) -> tuple[float, float, float]:
-    """About the link's own axes [kg m^2]: about the vertical and the one across it that of a rod, as in colloc; about its length
+    """About the link's own axes [kg m^2]: about the vertical and across it that of a rod, as in colloc; about its length
     that of the box."""
     upright = mass * length**2 / 12
     return mass * (_width(robot) ** 2 + _height(robot) ** 2) / 12, upright, upright

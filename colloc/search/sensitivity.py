@@ -50,7 +50,7 @@ _EXCESS, _TURNS = 1e-5, 1e-4
 """By how much a gait may exceed its limits [rad, or relative], and turn in a period [rad], and still be one of the problem."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Again:
     """What is best where a number differs, and what the gait on file does there.
 
@@ -89,7 +89,7 @@ class Again:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Effect:
     """What one number of a problem does to the best value.
 
@@ -124,7 +124,7 @@ class Effect:
         return own | {"again": [each.facts() for each in self.again]}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sensitivity:
     """By how much the best value of a problem changes with its numbers.
 
