@@ -17,17 +17,21 @@ from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures.motion_frames import Frames, frames
 from colloc.pictures.publication import COLUMN, Panel, draw_mesh, mesh_errors, panels
 from colloc.pictures.robot_figure import robot_panels
 from colloc.pictures.style import INK, styled
-from colloc.results.robot import Robot
+from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.replaced_file import replaced_file
 
 _MOST_PLANES = 6
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """The page may run its own script and nothing else: it can fetch nothing, whatever the file held."""
+_ANY_FLOOR = 0.5
+"""Friction of a floor, over the stated one, for which a period is told."""
 PLAIN = {
     "KKT error": "To first order, no small change of the gait within its class is better.",
     "second order": "To second order none is either: the gait is a best one, and no saddle between better ones.",
@@ -115,6 +119,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             certificate=solution.certificate,
             solved=solution.status == SOLVED,
             headline=_headline(solution),
+            pace=_pace(solution),
             gap=gap.strip(),
             reference=_comparison(solution, reference),
             relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
@@ -155,6 +160,21 @@ def _headline(solution: Solution) -> str:
     turns = f" and {solution.turning}" if solution.turning else ""
     moves = f"moves {measured.distance:.2g} body lengths a cycle{turns}"
     return f"{moves}; {measured.efficiency:.2g} body lengths per unit of work{other}"
+
+
+def _pace(solution: Solution) -> str:
+    """How slow is slow enough, where that is known."""
+    if solution.problem.froude:
+        return ""  # the answer is for its own pace
+    try:
+        froude = solution.slow_enough(SLOW_ENOUGH)
+    except (ProblemError, NotConvergedError):
+        return ""
+    period = math.sqrt(1 / (GRAVITY * _ANY_FLOOR * froude))
+    return (
+        f"inertia changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of {froude:.2g}: a robot of 1 m on a "
+        f"floor with {_ANY_FLOOR:g} of this friction, from {period:.2g} s a period"
+    )
 
 
 def _comparison(solution: Solution, reference: Reference | None) -> str:

@@ -162,6 +162,10 @@ def test_every_check_of_a_certificate_is_put_in_plain_words(page, three_link):
     assert set(re.findall(r'Check\(\s*"([^"]+)"', source)) | limits == set(PLAIN)
 
 
+def test_the_page_says_how_slow_is_slow_enough(page, three_link):
+    assert f"up to a Froude number L/(gT²) of {three_link.slow_enough(0.01):.2g}: a robot of 1 m" in unescape(page)
+
+
 def test_pictures_take_colour_and_font_from_the_page_and_do_not_style_it(page):
     assert page.count("<style") == 1
     assert "currentColor" in page
