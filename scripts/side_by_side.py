@@ -18,7 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import colloc
-from colloc.pictures.motion_frames import holding, lab_feet, lab_outline
+from colloc.pictures.motion_frames import lab_feet, lab_outline
 from colloc.pictures.movie import write_gif
 from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
 from colloc.results.solution import Solution
@@ -66,7 +66,7 @@ def crawl(solution: Solution) -> Crawl:
     motion = solution.sample(phases(solution, np.linspace(0.0, least * WORK, PICTURES)))
     pose = motion.angles, motion.theta, motion.tail
     label, share = FILES.get(problem.name, problem.gait.describe()), least * solution.efficiency
-    return Crawl(label, share, lab_outline(body, *pose), motion.centre, lab_feet(body, *pose), holding(solution, motion))
+    return Crawl(label, share, lab_outline(body, *pose), motion.centre, lab_feet(body, *pose), solution.holding(motion))
 
 
 def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:

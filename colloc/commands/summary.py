@@ -90,6 +90,9 @@ def _besides(solution: Solution) -> list[str]:
         lines.append(
             f"  played slowly   {solution.played_slowly:.6f} ({problem.objective.short} of the same gait without inertia)"
         )
+    if (held := solution.share_held).size:
+        shares = ", ".join(f"{100 * share:.0f}" for share in held)
+        lines.append(f"  feet hold       {shares} % of the period, from the tail")
     if problem.rotation != 0:
         lines.append(f"  net rotation    {found.rotation:.6f} rad: {solution.turning}")
     return lines
@@ -136,6 +139,7 @@ def summary_dict(solution: Solution, path: Path | None, reference: Reference | N
         "starts": solution.starts,
         "shrunk": None if solution.shrunk is None else solution.shrunk.value,
         "relaxed": _relaxed_dict(solution),
+        "feet_hold": solution.share_held.tolist() if certificate.replayed else [],
         "others": [
             {"value": a.value, "delta": a.delta, "starts": a.starts, "on_speed_floor": a.on_speed_floor}
             for a in solution.others

@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.gaits.limits import Limit, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
-from colloc.pictures.motion_frames import holding, lab_feet, lab_outline
+from colloc.pictures.motion_frames import lab_feet, lab_outline
 from colloc.pictures.style import BLUE, GREY, INK, ORANGE, PHASE, SERIES, VERMILION, snapshot_colours
 from colloc.results.solution import Solution
 
@@ -36,7 +36,7 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     motion = solution.sample(t)
     x, y = lab_outline(solution.problem.body, motion.angles, motion.theta, motion.tail)
     feet = lab_feet(solution.problem.body, motion.angles, motion.theta, motion.tail)
-    held, rise = holding(solution, motion), float(np.ptp(y))
+    held, rise = solution.holding(motion), float(np.ptp(y))
     higher = max(1, round(_SEEN / rise)) if 0 < rise < _FLAT else 1
     y = higher * y
     width = np.ptp(x, axis=0)
@@ -106,7 +106,7 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     periods = max(1, int(np.ceil(needed))) if apart else 1
     fine = solution.sample(np.linspace(0.0, periods, 600 * periods + 1))
     ends = lab_outline(solution.problem.body, fine.angles, fine.theta, fine.tail)
-    feet, held = lab_feet(solution.problem.body, fine.angles, fine.theta, fine.tail), holding(solution, fine)
+    feet, held = lab_feet(solution.problem.body, fine.angles, fine.theta, fine.tail), solution.holding(fine)
     for path, colour, name in ((ends[:, 0], BLUE, "tail"), (ends[:, -1], ORANGE, "head"), (fine.centre, VERMILION, "centre")):
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:

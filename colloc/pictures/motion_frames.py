@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics.bodies import ARROWS, Body
-from colloc.results.motion import RigidMotion, SampledMotion, turned
+from colloc.results.motion import RigidMotion, turned
 from colloc.results.solution import Solution
 
-_HOLDS = 3.0
-"""Speed of a foot, in delta, up to which it holds: below friction is less than 95 % of what it can be."""
 _ARROW = 0.12
 """Length [body lengths] of the arrow of the largest friction."""
 
@@ -57,14 +55,6 @@ def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray
     return tail[:, None] + turned(body.foot_places(angles), theta)
 
 
-def holding(solution: Solution, motion: SampledMotion) -> np.ndarray:
-    """Which feet of a body hold at instants of its motion, ``(n_foot, n_time)``; no rows where it has none."""
-    body = solution.problem.body
-    if not body.foot_places(motion.angles).size:
-        return np.zeros((0, motion.t.size), dtype=bool)
-    return body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * solution.delta_per_period
-
-
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
     """Sample a solution's motion at `count` instants, both ends of the period included, and the friction that acts on it at
     about so many arrows along the body; `periods` are shown in a row."""
@@ -81,6 +71,6 @@ def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: 
         motion.centre,
         motion.tail[:, None] + turned(places, motion.theta),
         turned(forces, motion.theta),
-        holding(solution, motion),
+        solution.holding(motion),
         tuple(period.repeated(k) for k in range(periods)),
     )

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     import xarray
 
 SOLVED, NOT_CONVERGED, CERTIFICATE_FAILED, INTERRUPTED = "solved", "not converged", "certificate failed", "interrupted"
+_HOLDS, _INSTANTS = 3.0, np.arange(2000) / 2000
+"""Speed of a foot, in delta, up to which it holds: below friction is less than 95 % of what it can be; phases to count at."""
 _MOST_OTHERS = 4
 """Of the gaits that a search met besides, so many are told."""
 
@@ -240,6 +242,20 @@ class Solution:
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers, period after period: `CollocatedMotion.sample`."""
         return self.motion.sample(t)
+
+    def holding(self, motion: SampledMotion) -> np.ndarray:
+        """Which feet of the body hold at instants of its motion, slower than 3 delta, ``(n_foot, n_time)``; no rows for a body
+        that has none."""
+        body = self.problem.body
+        if not body.foot_places(motion.angles).size:
+            return np.zeros((0, motion.t.size), dtype=bool)
+        return body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * self.delta_per_period
+
+    @property
+    def share_held(self) -> np.ndarray:
+        """Of a period, for which each foot holds, ``(n_foot,)``, from the tail."""
+        stands = self.problem.body.foot_places(self.gait.angles(_INSTANTS[:1])).size
+        return self.holding(self.sample(_INSTANTS)).mean(axis=1) if stands else np.empty(0)
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""

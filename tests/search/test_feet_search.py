@@ -11,6 +11,7 @@ from colloc import Chain, Elliptic, Foot, Friction, Harmonic, Problem, ProblemEr
 from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.main import main as colloc
+from colloc.commands.summary import summary_lines
 from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames
@@ -156,3 +157,13 @@ def test_init_writes_a_problem_on_feet(tmp_path, capsys):
     assert read_problem_file(tmp_path / "mine.py").problem.body == Chain((0.25,) * 4, feet=2)
     assert colloc(["init", str(tmp_path / "other.py"), "--feet", "99"]) == 2
     assert "0 (a line) to 20" in capsys.readouterr().err
+
+
+def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, three_link):
+    """The outer feet hold in turns, for a good part of the period each; a body that lies has none."""
+    shares = on_feet.share_held
+    np.testing.assert_allclose(shares, frames(on_feet, 1001).holding[:, :-1].mean(axis=1), atol=3e-3)
+    assert 0.25 < shares[[0, 2]].min() < shares[[0, 2]].max() < 0.5
+    assert any("feet hold" in line for line in summary_lines(on_feet, None))
+    assert three_link.share_held.size == 0
+    assert not any("feet hold" in line for line in summary_lines(three_link, None))
