@@ -68,19 +68,22 @@ def time_limit(seconds: float) -> Iterator[None]:
     here = None if _in_main_thread() else threading.get_ident()
     timer = threading.Timer(seconds, _again if here is None else lambda: _raise_in(here, KeyboardInterrupt))
     timer.daemon = True
-    timer.start()
     try:
-        yield
+        try:
+            timer.start()  # where it is over at once, this is where it comes
+            yield
+        finally:
+            try:
+                timer.cancel()
+                if timer.is_alive():
+                    timer.join()
+            except KeyboardInterrupt:
+                # Sent to a thread whose block had just ended. It has to come: CPython 3.11 looks for a withdrawn one for ever,
+                # and a profiler or debugger that is switched on later stands still at the first function.
+                if here is None:
+                    raise
     finally:
         _DEADLINE.reset(token)
-        try:
-            timer.cancel()
-            timer.join()
-        except KeyboardInterrupt:
-            # Sent to a thread whose block had just ended. It has to come: CPython 3.11 looks for a withdrawn one for ever,
-            # and a profiler or debugger that is switched on later stands still at the first function.
-            if here is None:
-                raise
 
 
 def _raise_in(thread: int, error: type[BaseException]) -> None:

@@ -142,6 +142,21 @@ def test_a_time_limit_ends_a_block_as_ctrl_c_does():
         assert not interrupted()
 
 
+def test_a_time_limit_that_is_over_before_its_block_begins_leaves_nothing_behind(monkeypatch):
+    """On a busy machine a millisecond is over within the start of the timer; what runs later must not be taken for too late."""
+    start = threading.Timer.start
+
+    def slow(timer):
+        start(timer)
+        time.sleep(0.1)
+
+    monkeypatch.setattr(threading.Timer, "start", slow)
+    with pytest.raises(KeyboardInterrupt), interruptible(polled=False), time_limit(0.01):
+        pytest.fail("the block was entered")
+    heeded()
+    assert not interrupted()
+
+
 def test_in_another_thread_a_time_limit_ends_what_asks_for_it():
     ended = []
 
