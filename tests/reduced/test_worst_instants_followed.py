@@ -20,7 +20,7 @@ BODIES = {"none": Chain((0.3, 0.2, 0.15, 0.35)), "bilateral": Chain((0.3, 0.2, 0
 def placed(request):
     """A space with its checks placed for a gait that touches its limit, and a gait near it whose worst instants are others."""
     free = Problem("follow", body=BODIES[request.param], gait=Harmonic(3, request.param))
-    gait = latin_hypercube_gait(free, 0, 7)
+    gait = latin_hypercube_gait(free, 0, 2)
     limit = float(np.abs(gait.angles(np.linspace(0, 1, 1000))).max())
     space, v = space_near(free.with_(joint_limit=limit + 1e-4, guess=gait), gait)
     space.move_checks(v)
