@@ -266,8 +266,8 @@ class Harmonic(LinearClass):
         return self.fourier(self.parameters(drawn), gait.n_joint)
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """The parameter vector of the class member nearest to `gait`, after shifting its start phase, if that is free, as
-        little as it takes: so the mirror image of a gait is its negative."""
+        """The parameter vector of the class member nearest to `gait`, after shifting its start phase, if that is free, as little
+        as it takes: so the mirror image of a gait is its negative."""
         gait = gait.resized(self.harmonics)
         if self.symmetry != "bilateral":
             cos, sin = gait.cos[0, 0], gait.sin[0, 0]

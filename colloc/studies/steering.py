@@ -1,9 +1,9 @@
 """Gaits that steer: the best of a problem for every turn of a period that is asked for, from sharp right to sharp left.
 
 The straight gait comes first, of the problem's own class. The others are sought in the class without symmetry, for no
-symmetric gait turns, each from its neighbour outwards; a turn to the right from the mirror image of that to the left, where
-that is sought too. Joint angles between those of two neighbours turn by about as much as lies between, so that a controller
-can interpolate.
+symmetric gait turns, each from its neighbour outwards; a turn to the right from the mirror image of that to the left, where that
+is sought too. Joint angles between those of two neighbours turn by about as much as
+lies between, so that a controller can interpolate.
 """
 
 from __future__ import annotations
