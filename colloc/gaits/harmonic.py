@@ -266,12 +266,10 @@ class Harmonic(LinearClass):
         return self.fourier(self.parameters(drawn), gait.n_joint)
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """The parameter vector of the class member nearest to `gait`, after shifting its start phase, if that is free, as little
-        as it takes: so the mirror image of a gait is its negative."""
+        """The parameter vector of the class member nearest to `gait`, after shifting its start phase if that is free."""
         gait = gait.resized(self.harmonics)
         if self.symmetry != "bilateral":
-            cos, sin = gait.cos[0, 0], gait.sin[0, 0]
-            gait = shifted(gait, np.arctan2(np.copysign(sin, sin * cos), abs(cos)) / (2 * np.pi))
+            gait = shifted(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
         return self.nearest(gait)
 
     def nearest(self, gait: Fourier) -> np.ndarray:

@@ -1,8 +1,7 @@
 """Gaits that steer: the best of a problem for every turn of a period that is asked for, from sharp right to sharp left.
 
 The straight gait comes first, of the problem's own class. The others are sought in the class without symmetry, for no
-symmetric gait turns, each from its neighbour outwards; a turn to the right from the mirror image of that to the left, where that
-is sought too. Joint angles between those of two neighbours turn by about as much as
+symmetric gait turns, each from its neighbour outwards. Joint angles between those of two neighbours turn by about as much as
 lies between, so that a controller can interpolate.
 """
 
@@ -15,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.limits import one_sided
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.results.solution import Solution
@@ -136,9 +134,7 @@ def steer(
         raise ProblemError(f"the straight gait is not certified, so there is nothing to steer: {straight.message}")
     wide = {"gait": replace(problem.gait, symmetry=NONE), "delta_start": problem.delta}
     for side in ([turn for turn in wanted if turn > 0], [turn for turn in reversed(wanted) if turn < 0]):
-        near = straight.gait
+        near = straight
         for turn in side:
-            mirrored = -turn in found and not one_sided(problem.joint_limit)
-            guess = found[-turn].gait.scaled(-1.0) if mirrored else near
-            near = put(turn, solve(problem.with_(rotation=turn, guess=guess, **wide), 1)).gait
+            near = put(turn, solve(problem.with_(rotation=turn, guess=near.gait, **wide), 1))
     return Steering(problem, tuple(wanted), tuple(found[turn] for turn in wanted))

@@ -30,13 +30,6 @@ def test_half_way_between_two_turns_lies_about_half_of_the_turn(family):
     assert found.rotation == pytest.approx(TURNS[1:].mean(), rel=0.05)
 
 
-def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left():
-    right, left = steer(PROBLEM.with_(delta=1e-3), [-0.2, 0.2], starts=1).points
-    t = np.linspace(0, 1, 50)
-    np.testing.assert_allclose(right.gait.angles(t), -left.gait.angles(t), atol=2e-4)
-    assert (right.value, right.arc.chord) == pytest.approx((left.value, left.arc.chord), rel=PROBLEM.mesh_tolerance)
-
-
 def test_the_table_holds_the_joint_angles_of_every_gait(family):
     table = family.table(phases=8)
     for angles, point in zip(table["joint_angles_rad"], family.points, strict=True):
