@@ -79,7 +79,6 @@ class Played:
         # a body length, mass and period of 1; weight is 1 / Fr
         self.model = mujoco.MjModel.from_xml_string(mjcf(solution.robot(1.0, 1.0, 1.0), planar=True))
         self.data = mujoco.MjData(self.model)
-        self.model.dof_armature[:] = 0.0
         body = checked_mass(problem.body)
         self.points = [_Points.of_foot(problem, body, foot) for foot in body.standing_on] or _Points.of_lines(problem, body)
 

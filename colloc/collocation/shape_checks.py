@@ -26,9 +26,9 @@ class ShapeCheck:
     along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, the weight of the first of two functions of
     which this is the minimum, or -1; of the largest angle on a stretch of a smooth body, where on the body it is. cut: of the
     shape and a share, the tangent plane of that weight, the function itself where it is negative, or the angle at that place.
-    slope: its derivative with respect to the shape. row: that
-    angle per shape coordinate, if it is one of them always. place: which of the body's angles it is, -1 if it is none. fixed:
-    its bounds, if these are not the limits of such an angle. derivative: 1 if "shapes" are their rates per period.
+    slope: its derivative with respect to the shape. row: it per shape coordinate, if it is linear. place: which of the body's
+    angles it is, -1 if it is none. fixed: its bounds, if these are not the limits of such an angle. derivative: 1 if "shapes"
+    are their rates per period.
     """
 
     name: str
@@ -94,7 +94,7 @@ def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) ->
 
     Angles to be kept within the limit of the problem; then functions that must not be positive: for parts that might cross,
     and for the pairs `far` of parts farther apart; then rates over the largest
-    allowed, `speeds` [rad per period] of each joint.
+    allowed, `speeds` [rad per period] of each shape coordinate.
     """
     angles = ca.SX.sym("q", body.n_joint)
     names, stretches = enumerate(body.limit_names), body.stretches
@@ -104,7 +104,8 @@ def shape_checks(body: Body, far: Pairs = (), speeds: tuple[float, ...] = ()) ->
         checks = [_angle_check(name, angles, row, k) for (k, name), row in zip(names, body.limited, strict=True)]
     checks += [_minimum_check(contact, angles) for contact in body.contacts(far)]
     unit = np.eye(body.n_joint)
-    return checks + [_speed_check(j, angles, unit[j] / most) for j, most in enumerate(speeds)]
+    named = [(f"speed of {body.coordinate} {j + 1}", most) for j, most in enumerate(speeds)]
+    return checks + [_speed_check(name, angles, unit[j] / most) for j, (name, most) in enumerate(named)]
 
 
 def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> ShapeCheck:
@@ -119,9 +120,9 @@ def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> Shape
     )
 
 
-def _speed_check(joint: int, rates: ca.SX, row: np.ndarray) -> ShapeCheck:
-    """A joint's rate over the largest allowed."""
-    return replace(_angle_check(f"speed of joint {joint + 1}", rates, row, joint), fixed=(-1.0, 1.0), derivative=1)
+def _speed_check(name: str, rates: ca.SX, row: np.ndarray) -> ShapeCheck:
+    """The rate of a shape coordinate over the largest allowed."""
+    return replace(_angle_check(name, rates, row, -1), fixed=(-1.0, 1.0), derivative=1)
 
 
 def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> ShapeCheck:

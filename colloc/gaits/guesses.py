@@ -66,9 +66,18 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
     return float((np.abs(gait.rates(_PHASES)).max(axis=1) / np.array(speeds)).max()) if speeds else 0.0
 
 
-def slowed(gait: Any, speeds: tuple[float, ...]) -> Any:
-    """The gait with all angles multiplied by one factor, at most 1, so that no joint is faster than allowed."""
-    return gait.scaled(1 / share) if (share := largest_share(gait, speeds)) > 1 else gait
+def slowed(gait: Any, speeds: tuple[float, ...], smallest_shape_speed: float) -> Any:
+    """The gait with all angles multiplied by one factor, at most 1, so that no joint is faster than allowed. `ProblemError` if
+    it then hardly moves."""
+    if (share := largest_share(gait, speeds)) <= 1:
+        return gait
+    slow = gait.scaled(1 / share)
+    if slow.shape_speed < smallest_shape_speed:
+        raise ProblemError(
+            f"with speed_limit the usual first gait has a root-mean-square shape speed of {slow.shape_speed:.2g}, less than "
+            f"smallest_shape_speed = {smallest_shape_speed:g}: make that smaller, or give a guess."
+        )
+    return slow
 
 
 def check_guess(body: Body, gait_class: Any, stated: Any, joint_limit: Limit, smallest_shape_speed: float) -> None:

@@ -13,9 +13,10 @@ from typing import Any
 
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, BOTH
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.coupled import Coupled
 from colloc.mechanics.feet import Foot
 from colloc.mechanics.law import Law
-from colloc.mechanics.links import Links
 
 _COEFFICIENTS = {
     "mu_t": "friction sideways",
@@ -108,16 +109,31 @@ def _with_friction(problem: Problem, field: str, by: float) -> Problem:
 
 def _with_friction_of_feet(problem: Problem, law: Law, field: str, by: float) -> Problem:
     feet = [replace(foot, friction=_scaled(law, field, by)) if foot.friction == law else foot for foot in _feet(problem)]
-    return _with(problem, body=replace(problem.body, feet=tuple(feet)))  # type: ignore[type-var]
+    return _with_chain(problem, feet=tuple(feet))
+
+
+def _chain(problem: Problem) -> Chain | None:
+    """The chain that the body is, or that its motors move; None for smooth ones."""
+    body = problem.body
+    return body.chain if isinstance(body, Coupled) else body if isinstance(body, Chain) else None
+
+
+def _with_chain(problem: Problem, **changes: Any) -> Problem:
+    """The problem with some fields of that chain changed."""
+    chain = _chain(problem)
+    assert chain is not None  # whoever asks has looked
+    chain = replace(chain, **changes)
+    return _with(problem, body=replace(problem.body, chain=chain) if isinstance(problem.body, Coupled) else chain)
 
 
 def _feet(problem: Problem) -> tuple[Foot, ...]:
-    return getattr(problem.body, "standing_on", ())
+    chain = _chain(problem)
+    return chain.standing_on if chain else ()
 
 
 def _of_body(problem: Problem) -> Iterator[Parameter]:
-    body = problem.body
-    if not isinstance(body, Links):
+    body = _chain(problem)
+    if body is None:
         return
     mirrored = problem.gait.symmetry in (BILATERAL, BOTH)
     for field, words in (("lengths", "length"), ("weights", "weight")):
@@ -127,7 +143,7 @@ def _of_body(problem: Problem) -> Iterator[Parameter]:
                 name = f"{words} of {_counted('link', links)}"
                 yield Parameter(name, own[links[0]], partial(_with_shares, problem, field, links))
     if body.width:
-        yield Parameter("width", body.width, lambda by: _with(problem, body=_scaled(body, "width", by)))
+        yield Parameter("width", body.width, lambda by: _with_chain(problem, width=body.width * (1 + by)))
     feet = body.standing_on
     for group in _feet_alike(feet, body.n_link, mirrored):
         which = _counted("foot", sorted(group))
@@ -161,8 +177,7 @@ def _changed_shares(shares: Sequence[float], which: Sequence[int], by: float) ->
 
 
 def _with_shares(problem: Problem, field: str, which: list[int], by: float) -> Problem:
-    shares = _changed_shares(getattr(problem.body, field), which, by)
-    return _with(problem, body=replace(problem.body, **{field: shares}))  # type: ignore[type-var]
+    return _with_chain(problem, **{field: _changed_shares(getattr(_chain(problem), field), which, by)})
 
 
 def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dict[int, float]]:
@@ -185,14 +200,14 @@ def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dic
 
 def _with_places(problem: Problem, group: dict[int, float], by: float) -> Problem:
     feet = [replace(foot, place=foot.place + by * group.get(k, 0.0)) for k, foot in enumerate(_feet(problem))]
-    return _with(problem, body=replace(problem.body, feet=tuple(feet)))  # type: ignore[type-var]
+    return _with_chain(problem, feet=tuple(feet))
 
 
 def _with_weights(problem: Problem, group: dict[int, float], by: float) -> Problem:
     feet = _feet(problem)
     weights = _changed_shares([foot.weight or 0.0 for foot in feet], list(group), by)
     borne = tuple(replace(foot, weight=weight) for foot, weight in zip(feet, weights, strict=True))
-    return _with(problem, body=replace(problem.body, feet=borne))  # type: ignore[type-var]
+    return _with_chain(problem, feet=borne)
 
 
 def _of_limits(problem: Problem) -> Iterator[Parameter]:

@@ -173,7 +173,8 @@ class Problem:
         if self.guess is None:
             free = self.gait.free
             wave = self.gait.first_guess(travelling_wave(self.body, self.joint_limit)) if free else None
-            self._fill(guess=slowed(wave, self.largest_speeds) if free else self.gait.member(np.empty(0), 2))
+            start = slowed(wave, self.largest_speeds, self.smallest_shape_speed) if free else self.gait.member(np.empty(0), 2)
+            self._fill(guess=start)
         check_kind("guess", self.guess, gait_fields.GAITS)
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
@@ -228,8 +229,8 @@ class Problem:
             raise ProblemError(
                 f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class without symmetry."
             )
-        if not self.gait.free and (self.objective != EFFICIENCY or self.at_least):
-            raise ProblemError("nothing is free in a prescribed motion; leave objective and at_least out.")
+        if not self.gait.free and (self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None):
+            raise ProblemError("nothing is free in a prescribed motion; leave objective, at_least and speed_limit out.")
 
     def _check_actuators(self) -> None:
         for name in ("torque_limit", "power_limit", "speed_limit"):

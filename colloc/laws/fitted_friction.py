@@ -6,7 +6,7 @@ Along, across and backwards alike, each coefficient is a Stribeck curve of the s
 
 dry friction, what is lost or gained of it within the speed v_S, and drag. No c is negative: so friction takes energy at every
 speed (non-negative least squares). Of the curves of one to three terms the one is taken that the samples are worth, by Bayes'
-information criterion; v_S is one for all directions.
+information criterion, with more samples left than numbers by two at least; v_S is one for all directions.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def fitted_friction(
     speed, coefficients = values[:, 0], values[:, 1:].T
     _check(name, speed, coefficients)
     v_s = _stribeck_speed(speed, coefficients)
-    fits = [_fitted(speed, mu, v_s) for mu in coefficients]
+    fits = [_fitted(speed, mu, v_s)[1] for mu in coefficients]
     off = np.array([_basis(speed, v_s) @ fit for fit in fits]) - coefficients
     largest = float(np.abs(off).max())
     if largest > _ROUGH * coefficients.max():
@@ -194,9 +194,15 @@ def _basis(speed: np.ndarray, v_s: float) -> np.ndarray:
     return np.stack([np.ones_like(speed), falls, 1 - falls, speed], axis=1)
 
 
-def _fitted(speed: np.ndarray, mu: np.ndarray, v_s: float) -> np.ndarray:
-    """Coefficients of the terms ``(4,)`` that the samples are worth."""
-    return min((_of_terms(speed, mu, v_s, terms) for terms in _SETS), key=lambda found: found[0])[1]
+def _fitted(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float, np.ndarray]:
+    """The best criterion of fits, and the coefficients of the terms ``(4,)`` that the samples are worth."""
+    tried = [terms for terms in _SETS if _numbers(terms) < mu.size - 1]
+    return min((_of_terms(speed, mu, v_s, terms) for terms in tried), key=lambda found: found[0])
+
+
+def _numbers(terms: tuple[int, ...]) -> int:
+    """That a curve of some terms has: their coefficients, and v_S."""
+    return len(terms) + (1 in terms or 2 in terms)
 
 
 def _of_terms(speed: np.ndarray, mu: np.ndarray, v_s: float, terms: tuple[int, ...]) -> tuple[float, np.ndarray]:
@@ -206,15 +212,14 @@ def _of_terms(speed: np.ndarray, mu: np.ndarray, v_s: float, terms: tuple[int, .
     found[list(terms)], rest = nnls(basis / size, mu)
     found[list(terms)] /= size
     square = max(rest**2 / mu.size, (_EXACT * mu.max()) ** 2)
-    numbers = len(terms) + (1 in terms or 2 in terms)
-    return mu.size * np.log(square) + numbers * np.log(mu.size), found
+    return mu.size * np.log(square) + _numbers(terms) * np.log(mu.size), found
 
 
 def _stribeck_speed(speed: np.ndarray, coefficients: np.ndarray) -> float:
     """The speed v_S with which the fits of all directions are best."""
 
     def score(log_speed: float) -> float:
-        return sum(min(_of_terms(speed, mu, np.exp(log_speed), terms)[0] for terms in _SETS) for mu in coefficients)
+        return sum(_fitted(speed, mu, np.exp(log_speed))[0] for mu in coefficients)
 
     tried = np.log(np.geomspace(speed[speed > 0].min() / _BEYOND, speed.max() * _BEYOND, _SCAN))
     best = tried[np.argmin([score(s) for s in tried])]

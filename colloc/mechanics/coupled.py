@@ -91,7 +91,8 @@ class Coupled:
         count = self.chain.n_joint
         object.__setattr__(self, "stuck", _checked_stuck(self.stuck, count))
         broken = {joint for joint, _ in self.stuck}
-        gears = self.gears if len(self.gears) else np.delete(np.eye(count), sorted(broken), axis=1)
+        own_motors = self.gears == () if isinstance(self.gears, tuple) else False
+        gears = np.delete(np.eye(count), sorted(broken), axis=1) if own_motors else self.gears
         object.__setattr__(self, "gears", _checked_gears(gears, count))
         for joint, row in enumerate(self.gears):
             if any(row) == (joint in broken):
@@ -205,8 +206,10 @@ class Coupled:
 
 
 def _checked_stuck(stuck: Mapping[int, float] | Sequence[Sequence[float]], count: int) -> tuple[tuple[int, float], ...]:
-    pairs = stuck.items() if isinstance(stuck, Mapping) else stuck
-    found = sorted((joint, angle) for joint, angle in pairs)
+    try:
+        found = [(joint, angle) for joint, angle in (stuck.items() if isinstance(stuck, Mapping) else stuck)]
+    except (TypeError, ValueError):
+        raise ProblemError(f"stuck gives joints and their angles, as {{1: 0.4}}, not {stuck!r}.") from None
     for joint, angle in found:
         if not is_whole(joint, 0, count - 1):
             raise ProblemError(f"stuck names joint {joint!r}: the chain has joints 0 to {count - 1}, from the tail.")
@@ -216,7 +219,7 @@ def _checked_stuck(stuck: Mapping[int, float] | Sequence[Sequence[float]], count
         raise ProblemError("stuck names a joint twice.")
     if len(found) == count:
         raise ProblemError("all joints are stuck: nothing would move.")
-    return tuple((int(joint), float(angle)) for joint, angle in found)
+    return tuple(sorted((int(joint), float(angle)) for joint, angle in found))
 
 
 def _checked_gears(gears: Any, count: int) -> tuple[tuple[float, ...], ...]:

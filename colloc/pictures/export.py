@@ -81,6 +81,8 @@ def write_export(
     if path.suffix in FORMATS:
         if period is None or length is None or mass is None:
             raise ProblemError("a model for simulators needs the period [s], the length [m] and the mass [kg] of the robot.")
+        if max_speed is not None:
+            raise ProblemError("a model for simulators holds no motion: leave max_speed out, and write the angles as CSV.")
         return _written_model(Robot(solution, length, mass, period, gravity), path)
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     trajectory = timed(solution.gait, rate, period, limits, keep_pace=bool(solution.problem.paced_by))

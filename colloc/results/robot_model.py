@@ -1,9 +1,9 @@
 """The robot of a result for simulators: MJCF (MuJoCo) and URDF, in metres, kilograms and seconds.
 
 Links are uniform rods of the problem's lengths and weights, drawn as boxes; joints are hinges about the vertical. Links of no
-width are drawn `_THIN` wide. What touches the floor is the whole link, or a small sphere at each foot; a simulator's own
-contacts know one coefficient of friction, the mean of the problem's, so its floor is not colloc's where friction has a
-direction (`scripts.play_in_mujoco` applies the law itself).
+width are drawn `_THIN` wide. What touches the floor is the whole link, or a small sphere at each foot. A simulator's own
+contacts know one coefficient of friction, here the geometric mean of the smallest and the largest: where friction has a
+direction, its floor is another than colloc's (`scripts.play_in_mujoco` applies the law itself).
 """
 
 from __future__ import annotations
@@ -93,8 +93,7 @@ def mjcf(robot: Robot, *, planar: bool = False) -> str:
         at = f"{length:.9g} 0 0"
     servos = SubElement(root, "actuator")
     for j, peak in enumerate(peaks, 1):
-        force = f"{-_STIFF * peak:.9g} {_STIFF * peak:.9g}"
-        gain = {"kp": f"{_STIFF * peak:.9g}", "dampratio": "1", "forcerange": force}
+        gain = {"kp": f"{_STIFF * peak:.9g}", "dampratio": "1"}
         SubElement(servos, "position", gain, name=f"motor_{j}", joint=f"joint_{j}")
     first = robot.solution.gait.angles(np.zeros(1))[:, 0]
     angles = " ".join(f"{angle:.9g}" for angle in first)

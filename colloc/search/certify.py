@@ -247,8 +247,8 @@ def _speeds(problem: Problem, rates: np.ndarray) -> list[Check]:
     if not problem.largest_speeds:
         return []
     share = np.abs(rates).max(axis=1) / np.array(problem.largest_speeds)
-    excess, fastest = max(float(share.max()) - 1.0, 0.0), int(share.argmax()) + 1
-    return [Check("joint speed", excess, GAP, f"excess over a limit, relative; nearest to its own: joint {fastest}")]
+    excess, fastest = max(float(share.max()) - 1.0, 0.0), f"{problem.body.coordinate} {int(share.argmax()) + 1}"
+    return [Check("joint speed", excess, GAP, f"excess over a limit, relative; nearest to its own: {fastest}")]
 
 
 def _rotation(problem: Problem, fine: Replay) -> list[Check]:

@@ -41,6 +41,14 @@ def test_samples_without_a_trend_are_dry_friction():
     assert fitted_friction(table(stribeck(0.5, 0, 1), stribeck(0.9, 0, 1))).law == Friction(mu_t=0.9, mu_f=0.5, mu_b=0.5)
 
 
+def test_a_few_samples_are_not_read_as_more_than_a_number_or_two():
+    """Any three numbers lie on a curve of three terms; noise would have become a law that vanishes at rest."""
+    for along in ((0.5, 0.52, 0.53), (0.5, 0.52, 0.51)):
+        law = fitted_friction(np.column_stack([[0.1, 0.2, 0.3], along, along])).law
+        assert isinstance(law, Friction)
+        assert (law.mu_f, law.mu_t) == pytest.approx((np.mean(along), np.mean(along)))
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_is_smoothed(seed):
     noise = 0.02 * np.random.default_rng(seed).normal(size=25)

@@ -105,6 +105,14 @@ def test_torque_and_power_are_those_of_the_motors(broken):
     assert sheet.facts["slow_enough_period_s"] > 0
 
 
+def test_its_sensitivity_is_to_the_chain_that_it_moves(broken):
+    """Forces are proportional to friction: its slopes add up to minus the value."""
+    found = broken.sensitivity()
+    slopes = [found[f"friction {way}"].slope for way in ("sideways", "forwards", "backwards")]
+    assert sum(slopes) == pytest.approx(-broken.value, rel=1e-3)
+    assert found["length of link 4"].slope != 0
+
+
 def test_it_is_kept_in_files_with_what_it_stands_on(tmp_path, broken):
     feet = (Foot(link=0), Foot(link=1), Foot(link=2))
     for body in (BELTS, BROKEN, Coupled(Chain((0.3, 0.4, 0.3), feet=feet), stuck={0: 0.1})):
@@ -126,6 +134,10 @@ def test_it_is_kept_in_files_with_what_it_stands_on(tmp_path, broken):
         ({"gears": ((1, 0), (0, 1), (1, 1)), "stuck": {2: 0.0}}, "is stuck, and hangs on a motor"),
         ({"gears": ((1, 1), (1, 1), (1, 1))}, "two motors do the same"),
         ({"gears": "belts"}, "a row of numbers for each joint"),
+        ({"gears": 3}, "a row of numbers for each joint"),
+        ({"stuck": 5}, "stuck gives joints and their angles"),
+        ({"stuck": [1, 2]}, "stuck gives joints and their angles"),
+        ({"stuck": [(1, 0.1), (1, 0.2)]}, "names a joint twice"),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(stated, words):

@@ -74,6 +74,8 @@ def test_the_command_writes_both_and_says_what_is_missing(three_link, tmp_path, 
     assert "a robot of 1.2 m and 3 kg" in capsys.readouterr().out
     assert main([source, "--format", "urdf"]) == 2
     assert "needs the period [s], the length [m] and the mass [kg]" in capsys.readouterr().err
+    assert main([source, *size, "--format", "urdf", "--max-speed", "2"]) == 2
+    assert "holds no motion: leave max_speed out" in capsys.readouterr().err
 
 
 def test_bodies_without_a_motor_in_every_joint_are_refused_in_a_sentence():

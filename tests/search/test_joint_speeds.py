@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import BSpline, Chain, FreePath, Friction, Harmonic, ModalBody, Problem, ProblemError, Relaxed, Serpenoid
+from colloc import BSpline, Chain, FreePath, Friction, Harmonic, ModalBody, Problem, ProblemError, Relaxed, Serpenoid, Wave
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.spaces import space_near
 from colloc.search.solve import solve
@@ -93,6 +93,8 @@ def test_it_is_kept_in_files(slow, tmp_path):
         ({"gait": FreePath(8.0)}, "leaves the pace open, but the joints' speed is limited"),
         ({"gait": Relaxed()}, "leave its limits out"),
         ({"speed_limit": 0.2}, "leaves no gait"),
+        ({"speed_limit": 0.5}, "with speed_limit the usual first gait"),
+        ({"body": Wave(), "gait": None}, "nothing is free in a prescribed motion"),
         ({"speed_limit": (5.0, 8.0)}, "give them the same speed_limit"),
         ({"speed_limit": (5.0, 8.0, 5.0)}, "has 3 values"),
         ({"speed_limit": -1.0}, "positive and finite"),
