@@ -159,7 +159,7 @@ def with_contacts(solution: Solution, froude: float, film: Path | None = None) -
     mujoco.mj_resetDataKeyframe(model, data, 0)
     renderer, frames = (mujoco.Renderer(model, *SIZE) if film else None), []
     camera = mujoco.MjvCamera()
-    camera.lookat[:], camera.distance, camera.elevation, camera.azimuth = (0.2, 0.0, 0.0), 1.4, -55.0, 90.0
+    camera.distance, camera.elevation, camera.azimuth = 1.4, -55.0, 90.0
     start, work = np.zeros(3), 0.0
     for k in range(TURNS * steps):
         if k == (TURNS - 1) * steps:
@@ -168,6 +168,7 @@ def with_contacts(solution: Solution, froude: float, film: Path | None = None) -
         mujoco.mj_step(model, data)
         work += float(data.qfrc_actuator @ data.qvel) * model.opt.timestep
         if renderer and k % max(1, steps // FRAMES) == 0:
+            camera.lookat[:] = data.subtree_com[1]
             renderer.update_scene(data, camera)
             frames.append(renderer.render())
     if film:

@@ -172,7 +172,7 @@ def _pace(solution: Solution) -> str:
         return ""
     period = math.sqrt(1 / (GRAVITY * _ANY_FLOOR * froude))
     return (
-        f"inertia changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of {froude:.2g}: a robot of 1 m on a "
+        f"changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of {froude:.2g}: a robot of 1 m on a "
         f"floor with {_ANY_FLOOR:g} of this friction, from {period:.2g} s a period"
     )
 
