@@ -72,6 +72,9 @@ def test_what_is_the_same_from_both_ends_has_both_symmetries(symmetry):
 def test_symmetries_that_gears_or_stuck_joints_break_are_refused():
     uneven = Coupled(Chain((0.2,) * 5), gears=((1, 0), (0.5, 0), (0, 1), (0, 1)))
     assert (uneven.symmetries, BROKEN.symmetries) == (("none", "antipodal"), ("none",))
+    assert not uneven.symmetric
+    assert not BROKEN.symmetric  # though its gears are
+    assert BELTS.symmetric
     with pytest.raises(ProblemError, match="may have the symmetry none"):
         Problem("no", body=BROKEN, gait=Harmonic(1, "antipodal"))
 
