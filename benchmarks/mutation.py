@@ -44,7 +44,7 @@ _NEEDED = "casadi clarabel filelock h5py jinja2 matplotlib.pyplot mpmath rich.pr
 _LEFT_BEHIND = shutil.ignore_patterns(".*_cache", ".git", ".venv", ".hypothesis", "__pycache__", "reach-*.json")
 """What the copy does without."""
 _COMPILED = ("cc", "-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
-_OWN_LAW = "from colloc import OwnLaw; print(OwnLaw('-vs/speed', '-vn/speed*(1 + exp(-speed))').kernel_source)"
+_OWN_LAW = "from colloc import OwnLaw; print(OwnLaw('-vs/speed', '-vn/speed*(1 + exp(-speed))').kernel.own_law)"
 
 
 @cache

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from colloc.laws.link_quadrature import ByQuadrature
-from colloc.mechanics.friction import regularised_speed
-from colloc.mechanics.law import Matrix
-from colloc.numerics.arrays import Array
-from colloc.numerics.expression import Dual, Formula, formula
+from colloc.laws.formula_law import DELTAS, FormulaLaw, same, samples
 from colloc.system.arguments import check_positive, named_arguments
 from colloc.system.errors import ProblemError
 
-VARIABLES = ("vs", "vn", "speed", "delta")
-_DIRECTIONS, _SPEEDS, _DELTAS = 48, np.geomspace(1e-4, 1e2, 13), (1e-6, 1e-2)
-_SAME, _LEAST = 1e-10, 1e-12
 _BESIDE, _JUMP = 1e-9, 1e-6
 """Distance in delta, and change of the force over the largest, by which a jump is told from a slope of 1/delta."""
 
 
 @named_arguments
 @dataclass(frozen=True)
-class OwnLaw(ByQuadrature):
+class OwnLaw(FormulaLaw):
     """Friction per length as formulas of the velocity of sliding; a `colloc.mechanics.law.Law`.
 
     Parameters
@@ -58,12 +50,9 @@ class OwnLaw(ByQuadrature):
     unit: float = 1.0
     speed_unit: float = 1.0
 
-    associated = False
-    """Samples cannot tell whether a formula is the gradient of a convex function: several motions are reckoned with."""
-
     def __post_init__(self) -> None:
         check_positive(self, "unit", "speed_unit", of="friction.")
-        vs, vn, delta = _samples()
+        vs, vn, delta = samples()
         with np.errstate(all="ignore"):  # what is not finite is refused
             fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
         if not (np.isfinite(fs).all() and np.isfinite(fn).all()):
@@ -76,17 +65,17 @@ class OwnLaw(ByQuadrature):
                 "not oppose the motion, so friction would give energy to the body; look at the signs."
             )
         zero = np.zeros((1, 1))
-        if np.abs(self.density(zero, zero, zero + _DELTAS[0])).max() > 0:
+        if np.abs(self.density(zero, zero, zero + DELTAS[0])).max() > 0:
             raise ProblemError("friction: a formula does not vanish at rest (vs = vn = 0).")
         left = self.density(vs, -vn, delta)
-        if not (_same(left[0], fs) and _same(left[1], -fn)):
+        if not (same(left[0], fs) and same(left[1], -fn)):
             raise ProblemError("friction: the law differs between left and right (vn and -vn), which the symmetries exclude.")
 
         self._check_continuity()
 
     def _check_continuity(self) -> None:
         """A force that jumps has no balance where it does."""
-        vs, vn, delta = _samples()
+        vs, vn, delta = samples()
         for what, across in (("vs", (1.0, 0.0)), ("vn", (0.0, 1.0))):
             at, step = (vs * across[1], vn * across[0]), _BESIDE * delta
             sides = [self.density(at[0] + sign * across[0] * step, at[1] + sign * across[1] * step, delta) for sign in (1, -1)]
@@ -97,42 +86,6 @@ class OwnLaw(ByQuadrature):
     @property
     def formulas(self) -> tuple[str, ...]:
         return self.tangential, self.normal
-
-    @property
-    def _read(self) -> tuple[Formula, ...]:
-        return tuple(formula(text, VARIABLES) for text in self.formulas)
-
-    @cached_property
-    def degree(self) -> float | None:
-        vs, vn, delta = _samples()
-        before, after = (np.hypot(*self.density(t * vs, t * vn, t * delta)) for t in (1.0, 2.0))
-        degrees = np.log2(after / before)
-        found = float(np.round(degrees.mean(), 9)) + 0.0
-        return found if np.abs(degrees - found).max() < _SAME else None
-
-    @cached_property
-    def reversible(self) -> bool:
-        vs, vn, delta = _samples()
-        forward, backward = self.density(vs, vn, delta), self.density(-vs, -vn, delta)
-        return all(_same(-b, f) for f, b in zip(forward, backward, strict=True))
-
-    @cached_property
-    def regularised(self) -> bool:
-        return any(name in each.names for each in self._read for name in ("speed", "delta"))
-
-    @cached_property
-    def _at_unit_speed(self) -> tuple[np.ndarray, np.ndarray]:
-        angle = np.linspace(0, 2 * np.pi, 721)[None]
-        fs, fn = self.density(np.cos(angle), np.sin(angle), np.array([[1e-9]]))
-        return -(fs * np.cos(angle) + fn * np.sin(angle)), np.hypot(fs, fn)
-
-    @property
-    def smallest(self) -> float:
-        return float(self._at_unit_speed[0].min())
-
-    @property
-    def largest(self) -> float:
-        return float(self._at_unit_speed[1].max())
 
     @property
     def label(self) -> str:
@@ -147,43 +100,3 @@ class OwnLaw(ByQuadrature):
 
     def in_speeds_of(self, unit: float) -> OwnLaw:
         return replace(self, speed_unit=self.speed_unit * unit)
-
-    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
-        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta + 0.0 * vs))
-        at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta}
-        fs, fn = (each(at) / self.unit for each in self._read)
-        return fs, fn
-
-    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta))
-        zero = 0.0 * (vs + vn)
-        r = regularised_speed(vs, vn, delta)
-        at = {
-            "vs": Dual(vs, (1.0 + zero, zero)),
-            "vn": Dual(vn, (zero, 1.0 + zero)),
-            "speed": Dual(r, (vs / r, vn / r)),
-            "delta": Dual(delta + zero, (zero, zero)),
-        }
-        rows = [each.differentiated(at).slopes for each in self._read]
-        return tuple(tuple(zero - self.speed_unit / self.unit * slope for slope in row) for row in rows)
-
-    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        """The trace of the Jacobian in every direction: no less than the secant of a law that grows with the speed."""
-        (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
-        zero = 0.0 * ss
-        trace = regularised_speed(ss + nn, zero, _LEAST + zero)  # positive for any law
-        return (trace, zero), (zero, trace)
-
-    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
-        raise NotImplementedError("only associated laws have a potential")
-
-
-def _samples() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Velocities in all directions, over many speeds and two deltas, ``(1, n)`` each."""
-    angle = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
-    speed, angle, delta = (a.reshape(1, -1) for a in np.meshgrid(_SPEEDS, angle, _DELTAS))
-    return speed * np.cos(angle), speed * np.sin(angle), delta
-
-
-def _same(a: Array, b: Array) -> bool:
-    return bool(np.allclose(a, b, rtol=_SAME, atol=0.0))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from colloc.laws.link_quadrature import ByQuadrature
+from colloc.laws.formula_law import FormulaLaw
 from colloc.mechanics.friction import Coefficients, regularised_speed
 from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
@@ -18,7 +18,7 @@ from colloc.system.errors import ProblemError
 
 @named_arguments
 @dataclass(frozen=True)
-class PowerLaw(Coefficients, ByQuadrature):
+class PowerLaw(Coefficients, FormulaLaw):
     """Friction that grows like a power of the speed; a `colloc.mechanics.law.Law`.
 
     Parameters
@@ -58,8 +58,6 @@ class PowerLaw(Coefficients, ByQuadrature):
         """Of the compiled kernel, which is one for all laws whose coefficients have the same ratios."""
         return 1.0 / self.mu_t
 
-    speed_unit = 1.0
-
     @property
     def formulas(self) -> tuple[str, ...]:
         forward, backward = (f"{mu / self.mu_t:.14g}" for mu in (self.mu_f, self.mu_b))
@@ -82,26 +80,8 @@ class PowerLaw(Coefficients, ByQuadrature):
     def in_speeds_of(self, unit: float) -> PowerLaw:
         return self.in_units_of(unit**-self.power)
 
-    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
-        growth = regularised_speed(vs, vn, delta) ** (self.power - 1.0)
-        return -self.tangential(vs) * vs * growth, -self.mu_t * vn * growth
-
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        growth = regularised_speed(vs, vn, delta) ** (self.power - 1.0)
-        # above degree 1 the force outgrows its secant
-        growth = growth * max(1.0, self.power)
+        """The law's own; above degree 1, where the force outgrows it, so many times that."""
+        growth = max(1.0, self.power) * regularised_speed(vs, vn, delta) ** (self.power - 1.0)
         zero = 0.0 * growth
         return (self.tangential(vs) * growth, zero), (zero, self.mu_t * growth)
-
-    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        r = regularised_speed(vs, vn, delta)
-        es, en, ed, growth, p = vs / r, vn / r, delta / r, r ** (self.power - 1.0), self.power
-        along, across = self.tangential(vs) * growth, self.mu_t * growth
-        oblique = (p - 1.0) * es * en
-        return (
-            (along * (p * es * es + en * en + ed * ed), along * oblique),
-            (across * oblique, across * (es * es + p * en * en + ed * ed)),
-        )
-
-    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
-        return self.mu_t / (self.power + 1.0) * regularised_speed(vs, vn, delta) ** (self.power + 1.0)

@@ -8,12 +8,10 @@ chain of three links under this law.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
-import numpy as np
-
-from colloc.mechanics.law import Matrix
-from colloc.mechanics.link_friction import LinkForce
+from colloc.mechanics.law import KernelLaw, Matrix
+from colloc.mechanics.line_integrals import LineIntegrals, line_integrals
+from colloc.mechanics.link_friction import LinkForce, power
 from colloc.numerics.arrays import Array
 from colloc.system.arguments import check_positive, named_arguments
 
@@ -42,8 +40,7 @@ class Viscous:
     degree = 1.0
     reversible = associated = True
     regularised = False
-    kernel_numbers: ClassVar[tuple[float, ...]] = ()
-    kernel_source = ""
+    kernel = KernelLaw()
 
     def __post_init__(self) -> None:
         check_positive(self, "normal", "tangential", of="friction.")
@@ -81,29 +78,20 @@ class Viscous:
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         return 0.5 * (self.tangential * vs * vs + self.normal * vn * vn)
 
-    def link_force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
-        return LinkForce(-self.tangential * length * vs, -self.normal * length * vn, -self.normal * length**3 / 12 * w)
 
-    def link_jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        zero = 0.0 * vs
-        return (
-            (self.tangential * length + zero, zero, zero),
-            (zero, self.normal * length + zero, zero),
-            (zero, zero, self.normal * length**3 / 12 + zero),
-        )
+@line_integrals.register(Viscous)
+class ClosedForm(LineIntegrals):
+    """Of drag on links."""
 
-    link_secant = link_jacobian
+    def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        zero, along, across = 0.0 * vs, self.law.tangential * length, self.law.normal * length
+        return (along + zero, zero, zero), (zero, across + zero, zero), (zero, zero, across * length**2 / 12 + zero)
 
-    def link_potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        return 0.5 * length * (self.tangential * vs * vs + self.normal * (vn * vn + length**2 / 12 * w * w))
+    secant = jacobian
 
-    def scaled_laws(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
-        own = self.link_force(vs, vn, w, length, delta)
-        return [
-            (force.tangential - own.tangential) / length,
-            (force.normal - own.normal) / length,
-            (force.couple - own.couple) * (6 / length**2),
-        ]
+    def force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+        (along, *_), (_, across, _), (*_, turning) = self.jacobian(vs, vn, w, length, delta)
+        return LinkForce(-along * vs, -across * vn, -turning * w)
 
-    def largest_link_forces(self, length: np.ndarray) -> np.ndarray:
-        return np.full((3 * length.size, 1), np.inf)
+    def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+        return 0.5 * power(vs, vn, w, self.force(vs, vn, w, length, delta))

@@ -106,7 +106,7 @@ class Chain(Links):
         return Sliding(net_force(now.posture, now.force), centre, total_power(now.velocity, now.force))
 
     def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
-        """Laws scaled like velocities (see `colloc.mechanics.law.Law.scaled_laws`)."""
+        """Laws scaled like velocities (see `colloc.mechanics.line_integrals.LineIntegrals.scaled_laws`)."""
         posture, contact = self.posture(angles), self.contact
         velocity, force = self.velocity(posture, rates, z), contact.on_links(forces)
         laws = contact.laws(friction, velocity, forces, delta)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any, NoReturn
 
 import numpy as np
 
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.law import Law, Matrix
+from colloc.mechanics.law import KernelLaw, Law, Matrix
+from colloc.mechanics.line_integrals import line_integrals
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
@@ -188,10 +189,6 @@ def read_alike_from_both_ends(feet: tuple[Foot, ...], n_link: int) -> bool:
     return _same_set(feet, [foot.from_head(n_link) for foot in feet])
 
 
-def _at_points_only(*_: Any) -> Any:
-    raise ProblemError("feet have laws of friction of their own: this one is none for a body that lies on its links.")
-
-
 @dataclass(frozen=True)
 class FeetLaw:
     """The laws of friction of feet that do not all have the same, foot by foot, as one; a `colloc.mechanics.law.Law` at points.
@@ -204,11 +201,7 @@ class FeetLaw:
     def __post_init__(self) -> None:
         object.__setattr__(self, "laws", tuple(self.laws))
 
-    kernel_numbers: ClassVar[tuple[float, ...]] = ()
-    kernel_source = ""
-    link_force = link_jacobian = link_secant = link_potential = scaled_laws = largest_link_forces = staticmethod(
-        _at_points_only
-    )
+    kernel = KernelLaw()
 
     @property
     def degree(self) -> float | None:
@@ -270,3 +263,8 @@ class FeetLaw:
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         rows = self._rows(lambda law, s, n: law.density_potential(s, n, delta), vs, vn)
         return namespace(vs, vn, delta).stack(rows)
+
+
+@line_integrals.register
+def _at_points_only(law: FeetLaw) -> NoReturn:
+    raise ProblemError("feet have laws of friction of their own: this one is none for a body that lies on its links.")

@@ -1,8 +1,8 @@
 """What touches the floor: a chain's links along their whole length, or feet at points of them.
 
 A contact turns the velocities of links into the friction on them, with derivatives, and says which forces a full program has
-for variables. The line integrates a law of friction in closed form, the law's own (`colloc.mechanics.law`); feet ask the law at
-a point: with the velocity of a foot of weight p on its link,
+for variables. The line integrates a law of friction, in closed form if there is one (`colloc.mechanics.line_integrals`); feet
+ask it at a point: with the velocity of a foot of weight p on its link,
 
     v = R (vs - h w, vn + a w),     force on the link R' f,  couple a f_n - h f_s,     f = p density(v),
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from colloc.mechanics.feet import FeetLaw, Foot
 from colloc.mechanics.law import KernelLaw, Law, Matrix
+from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 
@@ -142,20 +143,20 @@ class LineContact:
         return friction
 
     def force(self, friction: Law, velocity: LinkVelocities, delta: Array) -> LinkForce:
-        own = friction.link_force(velocity.vs, velocity.vn, velocity.w, self._length, delta)
+        own = line_integrals(friction).force(velocity.vs, velocity.vn, velocity.w, self._length, delta)
         return LinkForce(*(self._pressure * part for part in own))
 
     def _pressed(self, blocks: Matrix) -> Matrix:
         return tuple(tuple(self._pressure * a for a in row) for row in blocks)
 
     def stiffness(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        return self._pressed(friction.link_jacobian(velocity.vs, velocity.vn, velocity.w, self._length, delta))
+        return self._pressed(line_integrals(friction).jacobian(velocity.vs, velocity.vn, velocity.w, self._length, delta))
 
     def secant(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        return self._pressed(friction.link_secant(velocity.vs, velocity.vn, velocity.w, self._length, delta))
+        return self._pressed(line_integrals(friction).secant(velocity.vs, velocity.vn, velocity.w, self._length, delta))
 
     def potential(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        return self._pressure * friction.link_potential(velocity.vs, velocity.vn, velocity.w, self._length, delta)
+        return self._pressure * line_integrals(friction).potential(velocity.vs, velocity.vn, velocity.w, self._length, delta)
 
     def forces(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
         return namespace(velocity.vs).stack(list(self.force(friction, velocity, delta)))
@@ -166,10 +167,10 @@ class LineContact:
 
     def laws(self, friction: Law, velocity: LinkVelocities, forces: Array, delta: Array) -> list[Array]:
         own = LinkForce(*(part / self._pressure for part in self.on_links(forces)))
-        return friction.scaled_laws(velocity.vs, velocity.vn, velocity.w, self._length, delta, own)
+        return line_integrals(friction).scaled_laws(velocity.vs, velocity.vn, velocity.w, self._length, delta, own)
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        return friction.largest_link_forces(self._length) * np.tile(self._pressure, (3, 1))
+        return line_integrals(friction).largest_forces(self._length) * np.tile(self._pressure, (3, 1))
 
     def slowest(self, velocity: LinkVelocities) -> np.ndarray:
         return np.abs(velocity.vs) + np.abs(velocity.vn) + 0.5 * self._length * np.abs(velocity.w)
@@ -182,8 +183,7 @@ class LineContact:
         return np.hypot(velocity.vs, beyond)
 
     def kernel_law(self, friction: Law) -> KernelLaw:
-        source = friction.kernel_source
-        return KernelLaw(friction.kernel_numbers, ("OWN_LAW",) if source else (), source)
+        return friction.kernel
 
     def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
         """Of the midpoints of the links."""
@@ -315,15 +315,15 @@ class PointContact:
         return self._of_kernel[friction]
 
     def _in_the_kernel(self, law: Law) -> KernelLaw:
-        own, source = self._each(law), law.kernel_source
-        if any(not each.kernel_numbers or each.kernel_source != source for each in own):
-            return KernelLaw(())
-        numbers = [each.kernel_numbers[:5] for each in own]
+        own, stated = [each.kernel for each in self._each(law)], law.kernel
+        if any(not each.numbers or each.own_law != stated.own_law for each in own):
+            return KernelLaw()
+        numbers = [each.numbers[:5] for each in own]
         degree, unit, speed_unit = numbers[0][1:4]  # of a law that is stated as formulas
         first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
         feet = np.hstack([self.along, self.offset, self.cos, self.sin, self.weight, numbers])
         head = len(self._scatter), law.largest, float(law.associated), degree, unit, speed_unit
-        return KernelLaw((*head, *first, *feet.ravel()), ("FEET", "OWN_LAW") if source else ("FEET",), source)
+        return KernelLaw((*head, *first, *feet.ravel()), ("FEET", *stated.defines), stated.own_law)
 
     def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
         return FOOT, np.hypot(*self.velocities(velocity))

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.mechanics import link_friction
-from colloc.mechanics.law import Matrix
+from colloc.mechanics.law import KernelLaw, Matrix
+from colloc.mechanics.line_integrals import LineIntegrals, line_integrals
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import check_positive, named_arguments
@@ -76,16 +77,15 @@ class Friction(Coefficients):
 
     degree = 0.0
     regularised = True
-    kernel_source = ""
 
     def __post_init__(self) -> None:
         check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
 
     @property
-    def kernel_numbers(self) -> tuple[float, ...]:
+    def kernel(self) -> KernelLaw:
         """Coefficients, stretches of the tangential velocity forwards and backwards, and whether there is a potential."""
         stretches = [float(self.stretch(np.array(side))) for side in (1.0, -1.0)]
-        return self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)
+        return KernelLaw((self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)))
 
     @property
     def label(self) -> str:
@@ -129,24 +129,29 @@ class Friction(Coefficients):
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         return self.mu_t * regularised_speed(self.stretch(vs) * vs, vn, delta)
 
-    def link_force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
-        return link_friction.link_force(vs, vn, w, length, delta, self)
 
-    def link_jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        return link_friction.link_force_jacobian(vs, vn, w, length, delta, self)
+@line_integrals.register(Friction)
+class ClosedForm(LineIntegrals):
+    """Of Coulomb's law on links, and of those that stretch it."""
 
-    def link_secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        return link_friction.link_secant(vs, vn, w, length, delta, self)
+    def force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+        return link_friction.link_force(vs, vn, w, length, delta, self.law)
 
-    def link_potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        return self.mu_t * link_friction.link_dissipation(self.stretch(vs) * vs, vn, w, length, delta)
+    def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return link_friction.link_force_jacobian(vs, vn, w, length, delta, self.law)
+
+    def secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        return link_friction.link_secant(vs, vn, w, length, delta, self.law)
+
+    def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+        return self.law.mu_t * link_friction.link_dissipation(self.law.stretch(vs) * vs, vn, w, length, delta)
 
     def scaled_laws(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
-        return link_friction.scaled_laws(vs, vn, w, length, delta, self, force)
+        return link_friction.scaled_laws(vs, vn, w, length, delta, self.law, force)
 
-    def largest_link_forces(self, length: np.ndarray) -> np.ndarray:
-        tangential = max(self.mu_f, self.mu_b) * length
-        return np.concatenate([tangential, self.mu_t * length, self.mu_t * length**2 / 4])
+    def largest_forces(self, length: np.ndarray) -> np.ndarray:
+        tangential = max(self.law.mu_f, self.law.mu_b) * length
+        return np.concatenate([tangential, self.law.mu_t * length, self.law.mu_t * length**2 / 4])
 
 
 def regularised_speed(vs: Array, vn: Array, delta: Array) -> Array:

@@ -1,22 +1,30 @@
-"""What a law of friction has to answer for: the force on a point, and on a straight link, at a velocity; and its traits.
+"""What a law of friction has to answer for: the force on a point that slides, and its traits.
 
 `colloc.mechanics.friction.Friction` is Coulomb's law, the usual one; the package `colloc.laws` has others (docs/howto/laws.md).
-Everything else, from the balance to the report, asks only these questions. Velocities are those along and across the body at a
-point; of a link (vs, vn, w), its midpoint's and its rotation rate. All arrays are two-dimensional, ``(n_part, n_time)``, NumPy
-or CasADi; forces are per length.
+Everything else, from the balance to the report, asks only these questions; what touches the floor integrates
+(`colloc.mechanics.floor_contact`). Velocities are those along and across the body at a point. All arrays are two-dimensional,
+``(n_part, n_time)``, NumPy or CasADi; forces are per length.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-
-from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array
 
 Matrix = tuple[tuple[Any, ...], ...]
 """2 x 2 of a point or 3 x 3 of a link, of arrays."""
+
+
+class KernelLaw(NamedTuple):
+    """The law of what touches the floor as the compiled kernel takes it."""
+
+    numbers: tuple[float, ...] = ()
+    """Empty where it does not know the law."""
+    defines: tuple[str, ...] = ()
+    """What the kernel is compiled with; nothing for the usual one."""
+    own_law: str = ""
+    """C of the law (own_law.h); empty where the kernel has it in closed form."""
 
 
 @runtime_checkable
@@ -63,7 +71,6 @@ class Law(Protocol):
     def in_speeds_of(self, unit: float) -> Law:
         """The law as a function of velocities (and delta) in units of `unit`."""
 
-    # at a point
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         """Tangential and normal force per length."""
 
@@ -77,44 +84,9 @@ class Law(Protocol):
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         """The function whose gradient is minus the force; of associated laws only."""
 
-    # on a link
-    def link_force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
-        """Force and couple on links of given lengths ``(n_link, 1)``."""
-
-    def link_jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        """Minus its derivative with respect to (vs, vn, w)."""
-
-    def link_secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        """`density_secant`, integrated."""
-
-    def link_potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        """`density_potential`, integrated; of associated laws only."""
-
-    def scaled_laws(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
-        """What vanishes where given forces on links obey the law, three arrays scaled like velocities: constraints of a full
-        program, so they must be mild where the force is nearly a step."""
-
-    def largest_link_forces(self, length: np.ndarray) -> np.ndarray:
-        """Bounds on force, normal force and couple of links ``(n_link, 1)`` at any speed, ``(3 n_link, 1)``; or infinity."""
-
     @property
-    def kernel_numbers(self) -> tuple[float, ...]:
-        """The law as the compiled kernel takes it; empty where it does not know the law."""
-
-    @property
-    def kernel_source(self) -> str:
-        """C that the kernel is compiled with (own_law.h); empty where it has the law in closed form."""
-
-
-class KernelLaw(NamedTuple):
-    """The law of what touches the floor as the compiled kernel takes it."""
-
-    numbers: tuple[float, ...]
-    """Empty where it does not know the law."""
-    defines: tuple[str, ...] = ()
-    """What the kernel is compiled with; nothing for the usual one."""
-    own_law: str = ""
-    """C of the law (own_law.h)."""
+    def kernel(self) -> KernelLaw:
+        """The law as the compiled kernel takes it."""
 
 
 def rate_independent(law: Law) -> bool:

@@ -14,8 +14,9 @@ from colloc.laws.power_law import PowerLaw
 from colloc.laws.viscous import Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.friction import ClosedForm, Friction
 from colloc.mechanics.law import Law
+from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.smooth.modal_body import ModalBody
 
@@ -70,7 +71,7 @@ def test_the_secant_of_a_power_law_is_no_less_than_its_slope(power):
 @each
 def test_forces_on_links_are_integrals_of_the_force_on_points(law):
     velocity = moving_links(3, 4)
-    force = law.link_force(*velocity, LENGTHS, 1e-3)
+    force = line_integrals(law).force(*velocity, LENGTHS, 1e-3)
     for link, t in np.ndindex(3, 4):
         vs, vn, w = velocity[:, link, t]
         half = 0.5 * LENGTHS[link, 0]
@@ -91,7 +92,11 @@ def test_jacobians_are_the_derivatives(law):
     velocity, step = moving_links(4), 1e-6
     for matrix, force, v in (
         (law.density_jacobian(*velocity[:2], 0.05), lambda v: law.density(*v, 0.05), velocity[:2]),
-        (law.link_jacobian(*velocity, LENGTHS, 0.05), lambda v: law.link_force(*v, LENGTHS, 0.05), velocity),
+        (
+            line_integrals(law).jacobian(*velocity, LENGTHS, 0.05),
+            lambda v: line_integrals(law).force(*v, LENGTHS, 0.05),
+            velocity,
+        ),
     ):
         for j, shift in enumerate(step * np.eye(len(v))[:, :, None, None] * np.abs(v).max(axis=0)):
             numeric = (np.array(force(v - shift)) - np.array(force(v + shift))) / (2 * np.abs(shift[j]))
@@ -104,9 +109,11 @@ def test_numpy_and_casadi_evaluate_one_statement(law):
     velocity = moving_links(5, 1)
     given = [ca.DM(v) for v in velocity]
     names = [ca.SX.sym(name, 3) for name in ("vs", "vn", "w")]
-    force = ca.Function("force", names, list(law.link_force(*names, LENGTHS, 1e-3)))(*given)
-    np.testing.assert_allclose([f.full() for f in force], law.link_force(*velocity, LENGTHS, 1e-3), rtol=1e-11, atol=1e-13)
-    held = law.scaled_laws(*names, LENGTHS, 1e-3, law.link_force(*names, LENGTHS, 1e-3))
+    force = ca.Function("force", names, list(line_integrals(law).force(*names, LENGTHS, 1e-3)))(*given)
+    np.testing.assert_allclose(
+        [f.full() for f in force], line_integrals(law).force(*velocity, LENGTHS, 1e-3), rtol=1e-11, atol=1e-13
+    )
+    held = line_integrals(law).scaled_laws(*names, LENGTHS, 1e-3, line_integrals(law).force(*names, LENGTHS, 1e-3))
     assert np.abs(np.array([f.full() for f in ca.Function("held", names, held)(*given)])).max() < 1e-9
 
 
@@ -149,13 +156,13 @@ def test_slopes_of_the_motion_are_those_of_finite_differences(law):
 def test_an_associated_law_is_the_gradient_of_a_convex_function(law):
     velocity, h = moving_links(8), 1e-6
     jacobian = np.array(
-        [[np.broadcast_to(e, velocity[0].shape) for e in row] for row in law.link_jacobian(*velocity, LENGTHS, 0.1)]
+        [[np.broadcast_to(e, velocity[0].shape) for e in row] for row in line_integrals(law).jacobian(*velocity, LENGTHS, 0.1)]
     )
     np.testing.assert_allclose(jacobian, jacobian.swapaxes(0, 1), atol=1e-12 * np.abs(jacobian).max())
     assert np.linalg.eigvalsh(np.moveaxis(jacobian, (0, 1), (-2, -1))).min() > 0
-    force = law.link_force(*velocity, LENGTHS, 0.1)
+    force = line_integrals(law).force(*velocity, LENGTHS, 0.1)
     for j, shift in enumerate(h * np.eye(3)[:, :, None, None] * np.abs(velocity).max(axis=0)):
-        ahead, behind = (law.link_potential(*(velocity + sign * shift), LENGTHS, 0.1) for sign in (1, -1))
+        ahead, behind = (line_integrals(law).potential(*(velocity + sign * shift), LENGTHS, 0.1) for sign in (1, -1))
         np.testing.assert_allclose((ahead - behind) / (2 * np.abs(shift[j])), -force[j], atol=1e-6 * np.abs(force[j]).max())
 
 
@@ -236,8 +243,9 @@ def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
         by_numpy = body.solve(law, angles, rates, 1e-4).require()
     np.testing.assert_allclose(by_numpy.z, expected, rtol=1e-12)
     if native_kernel() is not None:
-        for name in ("link_force", "link_jacobian", "link_secant", "link_potential", "density"):
-            monkeypatch.delattr(Friction, name)
+        for name in ("force", "jacobian", "secant", "potential"):
+            monkeypatch.delattr(ClosedForm, name)
+        monkeypatch.delattr(Friction, "density")
         compiled = body.solve(law, angles, rates, 1e-4).require()
         np.testing.assert_allclose(compiled.z, expected, rtol=1e-12)
         assert body.slopes(law, angles, rates, 1e-4, compiled).shape == (6, 4, 2)

@@ -19,6 +19,7 @@ from colloc.mechanics.contact import (
     tangent_of_minimum,
 )
 from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.line_integrals import line_integrals
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from tests.hard.cases import HARD
@@ -66,11 +67,12 @@ def laws_of_friction():
     length, found = np.array([[0.2], [0.5], [0.3]]), []
     for law in (Friction(), UNEQUAL, Elliptic(1.7, 1.0, 1.3), PowerLaw(0.5, 2.0, 1.0), Viscous(1.7, 1.0)):
         found += [getattr(law, name)(vs, vn, 0.1) for name in ("density", "density_secant", "density_jacobian")]
-        found += [getattr(law, name)(vs, vn, w, length, 0.1) for name in ("link_force", "link_jacobian", "link_secant")]
+        on_links = line_integrals(law)
+        found += [integral(vs, vn, w, length, 0.1) for integral in (on_links.force, on_links.jacobian, on_links.secant)]
         if law.associated:
-            found += [law.density_potential(vs, vn, 0.1), law.link_potential(vs, vn, w, length, 0.1)]
+            found += [law.density_potential(vs, vn, 0.1), on_links.potential(vs, vn, w, length, 0.1)]
         found += [law.smallest, law.largest, law.degree, law.regularised, law.reversible, law.label, law.describe()]
-        found += [law.largest_link_forces(length), law.kernel_numbers, law.in_units_of(2.0), law.in_speeds_of(2.0)]
+        found += [on_links.largest_forces(length), law.kernel.numbers, law.in_units_of(2.0), law.in_speeds_of(2.0)]
     return found
 
 

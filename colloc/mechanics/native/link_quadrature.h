@@ -1,4 +1,4 @@
-/* Friction on one link by quadrature, for laws without closed forms: what colloc/laws/link_quadrature.py states for arrays, and
+/* Friction on one link by quadrature, for laws without closed forms: what colloc/mechanics/line_integrals.py states for arrays, and
    explains. The law itself is in own_law.h, which colloc/laws/c_formula.py writes: `density`, `density_slopes`, `potential`. */
 
 #pragma once
@@ -35,7 +35,7 @@ typedef struct {
     double fs, fn, couple;
 } Sliding;
 
-/* Of `kernel_numbers` in colloc/laws/link_quadrature.py. */
+/* Of `kernel` in colloc/laws/formula_law.py. */
 static Law law_of(const double number[6])
 {
     Law law = {number[0], number[1], number[2], number[3], number[4] != 0, number[5] != 0};

@@ -1,4 +1,7 @@
-r"""Friction on a straight link by quadrature: for laws whose integrals have no closed form.
+r"""Friction on a straight link, integrated along it from what a law says of a point.
+
+`line_integrals(law)` is by quadrature, unless the module of a law registers its integrals in closed form, as those of Coulomb's
+law and of drag do.
 
 Along a link the tangential velocity vs is constant and the normal one ``y = vn + w sigma``; a dry law changes within
 ``a = sqrt(vs^2 + delta^2)`` of y = 0. So Gauss nodes are laid in tau, ``y = a sinh(tau)``, where that is a stretch of unit
@@ -14,12 +17,12 @@ panels that meet at y = 0, or at the end nearest to it: a law may have a kink th
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.laws.c_formula import own_law_header
-from colloc.mechanics.law import Law, Matrix
+from colloc.mechanics.law import Matrix
 from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 
@@ -77,55 +80,54 @@ def _gathered(values: Array) -> Array:
     return values.sum(axis=0) if getattr(values, "ndim", 2) > 2 else values
 
 
-class ByQuadrature:
-    """What a law says of links, from what it says of a point."""
+class LineIntegrals:
+    """What a law says of links. Velocities are those along and across them at their midpoints and their rotation rates,
+    ``(n_link, n_time)``, lengths ``(n_link, 1)``; NumPy and CasADi.
+    """
 
-    @property
-    def formulas(self) -> tuple[str, ...]:
-        """Force along and across, and the potential if there is one, which the law's `unit` divides; velocities are multiplied
-        by its `speed_unit` before."""
-        raise NotImplementedError
+    def __init__(self, law: Any) -> None:
+        self.law = law
 
-    @property
-    def kernel_source(self) -> str:
-        return own_law_header(*self.formulas)
-
-    @property
-    def kernel_numbers(self: Any) -> tuple[float, ...]:
-        """Largest force, degree, units of force and speed, and whether there is a potential, and a reversal."""
-        degree = np.nan if self.degree is None else self.degree
-        return self.largest, degree, self.unit, self.speed_unit, float(self.associated), float(self.reversible)
-
-    def link_force(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+    def force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+        """Force and couple on links."""
         tangential = normal = couple = 0.0 * (vs + vn + w)
         for sigma, y, weight in link_nodes(vs, vn, w, length, delta):
-            fs, fn = self.density(vs, y, delta)
+            fs, fn = self.law.density(vs, y, delta)
             tangential, normal = tangential + _gathered(weight * fs), normal + _gathered(weight * fn)
             couple = couple + _gathered(weight * sigma * fn)
         return LinkForce(tangential, normal, couple)
 
-    def link_jacobian(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        return _on_links([(n, self.density_jacobian(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
+    def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        """Minus its derivative with respect to (vs, vn, w)."""
+        return _on_links([(n, self.law.density_jacobian(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
 
-    def link_secant(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        return _on_links([(n, self.density_secant(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
+    def secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        """`colloc.mechanics.law.Law.density_secant`, integrated."""
+        return _on_links([(n, self.law.density_secant(vs, n.y, delta)) for n in link_nodes(vs, vn, w, length, delta)])
 
-    def link_potential(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+    def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+        """`colloc.mechanics.law.Law.density_potential`, integrated; of associated laws only."""
         nodes = link_nodes(vs, vn, w, length, delta)
-        return sum(_gathered(weight * self.density_potential(vs, y, delta)) for _, y, weight in nodes)
+        return sum(_gathered(weight * self.law.density_potential(vs, y, delta)) for _, y, weight in nodes)
 
-    def scaled_laws(self: Law, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
-        """Differences over the secants of the link: velocities."""
-        own = self.link_force(vs, vn, w, length, delta)
-        secant = self.link_secant(vs, vn, w, length, delta)
+    def scaled_laws(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce) -> list[Array]:
+        """What vanishes where given forces on links obey the law, three arrays scaled like velocities: constraints of a full
+        program, so they must be mild where the force is nearly a step. Here differences over the secants."""
+        own = self.force(vs, vn, w, length, delta)
+        secant = self.secant(vs, vn, w, length, delta)
         return [
             (force.tangential - own.tangential) / secant[0][0],
             (force.normal - own.normal) / secant[1][1],
             (force.couple - own.couple) / secant[1][1] * (6 / length),
         ]
 
-    def largest_link_forces(self, length: np.ndarray) -> np.ndarray:
+    def largest_forces(self, length: np.ndarray) -> np.ndarray:
+        """Bounds on force, normal force and couple of links at any speed, ``(3 n_link, 1)``; or infinity."""
         return np.full((3 * length.size, 1), np.inf)
+
+
+line_integrals = singledispatch(LineIntegrals)
+"""The `LineIntegrals` of a law."""
 
 
 def _on_links(densities: list[tuple[Node, Matrix]]) -> Matrix:
