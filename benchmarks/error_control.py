@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, certify, ellipse
+from colloc.gaits.control_problem import control_problem
 from colloc.results.solution import Solution
 from colloc.search.explore import begin_at
 from colloc.search.solve import confirmed
@@ -103,7 +104,7 @@ def outcome(problem: Problem) -> dict:
     if not solution.answer.optimal or solution.answer.delta != problem.delta:
         return {"optimal": False, "message": solution.message}
     gait, delta = solution.gait, problem.delta
-    error = mesh_error(problem, solution.mesh, gait, delta, max(problem.mesh_tolerance, 1e-6))
+    error = mesh_error(control_problem(problem), solution.mesh, gait, delta, max(problem.mesh_tolerance, 1e-6))
     fine = replay(problem.body, problem.friction, gait, delta, tolerance=1e-9, most_instants=51200)
     seconds = time.process_time() - begin
     finer = problem.with_(

@@ -18,6 +18,7 @@ import numpy as np
 
 from benchmarks.tables import markdown_table
 from colloc import Chain, Harmonic, Problem
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.style import BLUE, GREEN, ORANGE, save, styled, subplots
 
@@ -49,7 +50,7 @@ def measured(intervals: int, links: int, harmonics: int) -> dict[str, float]:
     before = peak_megabytes()
     problem = problem_of(intervals, links, harmonics)
     begin = time.process_time()
-    solver = Solver(transcribe(problem), {"max_iter": 15})
+    solver = Solver(transcribe(control_problem(problem)), {"max_iter": 15})
     built = time.process_time() - begin
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.01)
     begin = time.perf_counter()

@@ -18,6 +18,7 @@ from benchmarks.tables import cpu_seconds, markdown_table
 from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.balance import instant, total_power
 from colloc.pictures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, save, styled, subplots
@@ -50,7 +51,7 @@ def adaptive_efficiency(gait: Fourier, delta: float, tolerance: float = 1e-11) -
 def collocated(name: str, intervals: int, delta: float) -> tuple[float, int, float]:
     """d/W, points, and processor seconds of solving the balance at all points of a uniform mesh on half a period."""
     problem = Problem("scheme", GAIT, gait=Harmonic(1, "bilateral"), scheme=name, intervals=intervals, delta=delta)
-    transcription = transcribe(problem)
+    transcription = transcribe(control_problem(problem))
     parameters = problem.gait.parameters(GAIT)
     x = feasible_point(transcription, parameters, delta)
     layout = transcription.layout

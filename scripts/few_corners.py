@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture, Relaxed
 from colloc.reduced.mixture_space import MixtureSpace
@@ -95,7 +96,7 @@ def few_corners(problem: Problem, gait: Mixture, corners: int, report: Callable[
 def _optimised(problem: Problem, like: Mixture, loops: list[np.ndarray], sense: int) -> tuple[list[np.ndarray], Optimum]:
     """The polygon with all its corners free; its loops and itself."""
     start = _polygon(loops, like, sense)
-    space = MixtureSpace(problem, len(start.durations))
+    space = MixtureSpace(control_problem(problem), len(start.durations))
     found = converged(space, space.parameters(start), problem.delta, NEXT_RADIUS, replace(ROUGH, rounds=_ROUNDS))
     gait, ends = found.gait, np.cumsum([len(loop) for loop in loops])[:-1]
     return _used(np.split(gait.durations * gait.directions[:, 0], ends)), found
@@ -126,7 +127,7 @@ def _polygon(loops: list[np.ndarray], like: Mixture, sense: int) -> Mixture:
 
 
 def _value(problem: Problem, polygon: Mixture) -> float:
-    space = MixtureSpace(problem, len(polygon.durations))
+    space = MixtureSpace(control_problem(problem), len(polygon.durations))
     return ReducedProgram(space, problem.delta).objective(space.parameters(polygon))
 
 

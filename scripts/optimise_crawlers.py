@@ -13,9 +13,9 @@ import numpy as np
 
 from colloc.gaits.polygon import Corners
 from colloc.mechanics.friction import Friction
-from colloc.reduced.spaces import space_near
 from colloc.search.converge import FIRST_RADIUS, converged
 from colloc.search.optimum import ROUGH
+from colloc.search.spaces import space_near
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.verification.replay import Replay, replay

@@ -78,11 +78,12 @@ def unsolved():
 def guess_in_balance(problem):
     from colloc.collocation.transcription import transcribe
     from colloc.collocation.warm_start import feasible_point
+    from colloc.gaits.control_problem import control_problem
     from colloc.results.answer import Answer
     from colloc.results.solution import Solution
     from colloc.verification.replay import replay
 
-    transcription = transcribe(problem)
+    transcription = transcribe(control_problem(problem))
     x = feasible_point(transcription, problem.gait.parameters(problem.guess), problem.delta)
     gait, mesh = transcription.member(x[transcription.layout.parameters[:, 0]]), transcription.mesh
     fine = replay(problem.body, problem.friction, lambda t: (gait.angles(t), gait.rates(t)), problem.delta, instants=200)

@@ -163,6 +163,13 @@ def test_the_page_names_what_exists_and_fits_a_screen():
     assert len(PAGE.splitlines()) <= 75
 
 
+def test_the_engine_takes_no_problem_apart():
+    """`colloc.gaits.control_problem` does that once; motions, programs and errors of meshes are made from its parts."""
+    for name, path in modules().items():
+        if name.partition(".")[0] in ("motion", "verification", "collocation", "reduced"):
+            assert "colloc.gaits.problem" not in set(imported(path)), name
+
+
 COLLOCATED = re.compile(r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b")
 ADAPTIVE = (
     "replay",

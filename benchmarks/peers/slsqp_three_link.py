@@ -15,7 +15,7 @@ from benchmarks.peers.settings import INTERVALS
 from colloc import Harmonic, Problem, ellipse
 from colloc.collocation.layout import RADIANS
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
+from colloc.search.spaces import space_near
 
 TOLERANCE = 1e-9
 STATED = Problem(

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from colloc.gaits.problem import Problem
+from colloc.gaits.control_problem import ControlProblem
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.inertia import STATES
-from colloc.numerics.mesh import Mesh, uniform_mesh
-from colloc.numerics.schemes import scheme
+from colloc.numerics.mesh import Mesh
 
 RADIANS = 2 * np.pi
 """Radians of phase per period: rates, velocities and delta of the variables are those per period divided by it."""
@@ -41,29 +40,24 @@ class Layout:
         return np.concatenate([(ends | own)[name] for name in names])[:, None]
 
 
-def problem_mesh(problem: Problem, edges: np.ndarray | None = None, of_scheme: str = "") -> Mesh:
-    """The mesh of a problem on the part of the period that is solved: uniform and of its scheme, or as given."""
-    collocation = scheme(of_scheme or problem.scheme)
-    return uniform_mesh(collocation, problem.intervals, problem.gait.fraction) if edges is None else Mesh(collocation, edges)
-
-
-def problem_layout(problem: Problem, mesh: Mesh, knots: np.ndarray | None = None) -> Layout:
-    """Index arrays of all variables of a problem on a mesh; a gait's arcs meet at knots, by default at the edges."""
-    n_joint, full = problem.body.n_joint, problem.formulation == FULL
+def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = None) -> Layout:
+    """Index arrays of all variables on a mesh; a gait's arcs meet at knots, by default at the edges."""
+    body, gait, full = control.dynamics.body, control.admissible.gait, control.formulation == FULL
+    n_joint = body.n_joint
     # without them angles, rates and velocities along a path follow from its parameters
-    n_point = mesh.n_point if full or not problem.gait.unit_speed else 0
+    n_point = mesh.n_point if full or not gait.unit_speed else 0
     sizes = {
-        "parameters": (problem.gait.size(n_joint, (mesh.edges if knots is None else knots).size - 1), 1),
+        "parameters": (gait.size(n_joint, (mesh.edges if knots is None else knots).size - 1), 1),
         "theta": (1, mesh.n_site),
         "distance": (1, mesh.n + 1),
         "work": (1, mesh.n + 1),
         "angles": (n_joint, n_point),
         "rates": (n_joint, n_point),
         "z": (3, n_point),
-        "momenta": (len(STATES) if problem.froude else 0, mesh.n_site),
-        "forces": (problem.body.n_force if full else 0, n_point),
-        "length": (int(problem.uses("length")), 1),
-        "driven_work": (int(problem.uses("driven_work")), 1),
+        "momenta": (len(STATES) if control.dynamics.froude else 0, mesh.n_site),
+        "forces": (body.n_force if full else 0, n_point),
+        "length": (int(control.aims.uses("length")), 1),
+        "driven_work": (int(control.aims.uses("driven_work")), 1),
     }
     indices, start = {}, 0
     for name, (rows, columns) in sizes.items():

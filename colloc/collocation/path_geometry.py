@@ -9,9 +9,9 @@ from scipy import sparse
 
 from colloc.collocation.path_equations import Piece, arc, chord, excess_turn, placed_check, side, side_lengths, unit_norm
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
+from colloc.gaits.control_problem import Admissible
 from colloc.gaits.free_path import ArcPath, FreePath, across_the_axis
 from colloc.gaits.polygon import Corners, Polygon
-from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, end_conditions, tangent_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.blocks import LocalFunction
@@ -57,12 +57,12 @@ def _ends(name: str, conditions: tuple[np.ndarray, np.ndarray], columns: np.ndar
     return equalities(name, first @ selector(columns[:, 0], n) + last @ selector(columns[:, -1], n))
 
 
-def _add_checks(geometry: PathGeometry, problem: Problem, n: int) -> None:
+def _add_checks(geometry: PathGeometry, admissible: Admissible, n: int) -> None:
     n_cell = geometry.start.size
     for check in geometry.checks:
         given = np.vstack([geometry.given(np.full(n_cell, 0.5)), np.full(n_cell, -1.0)])
         geometry.blocks[check.name] = (placed_check(check, geometry.piece), geometry.shape, given)
-        geometry.groups.append(check.group(problem.joint_limit, n_cell, n))
+        geometry.groups.append(check.group(admissible.joint_limit, n_cell, n))
 
 
 def _nested(mesh: Mesh, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -72,12 +72,12 @@ def _nested(mesh: Mesh, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
     return h, on, (mesh.edges[:-1] - knots[on]) / h[on], mesh.h / h[on]
 
 
-def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath, far: Pairs) -> PathGeometry:
+def arc_geometry(admissible: Admissible, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath, far: Pairs) -> PathGeometry:
     """Arcs that join, close, keep the bound on curvature and admissible; the mesh has an edge wherever two of them meet.
 
     Parameters
     ----------
-    problem : Problem
+    admissible : Admissible
     mesh : Mesh
         Of phases.
     parameters : (n_parameter,)
@@ -87,18 +87,18 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
     near : ArcPath
         Fixes which part of the period each arc takes, the winding, and the start phase of a path whose symmetry does not.
     """
-    gait: FreePath = problem.gait
-    n_joint, symmetry = problem.body.n_joint, gait.symmetry
+    gait: FreePath = admissible.gait
+    n_joint, symmetry = admissible.n_joint, gait.symmetry
     speed, tangents, shapes = gait.split(parameters, n_joint)
     piece = arc(n_joint)
     h, on, start, width = _nested(mesh, near.edges)
     n_arc = h.size
     arcs = np.concatenate([shapes[:, :-1], tangents[:, :-1], tangents[:, 1:], np.repeat(speed, n_arc, axis=1)])
     geometry = PathGeometry(
-        piece, arcs[:, on], on, start, width, h[on], [], {}, shape_checks(problem.body, far),
+        piece, arcs[:, on], on, start, width, h[on], [], {}, shape_checks(admissible.body, far),
         np.full(n, -np.inf), np.full(n, np.inf),
     )  # fmt: skip
-    geometry.lower[speed], geometry.upper[speed] = problem.smallest_shape_speed, _FASTEST
+    geometry.lower[speed], geometry.upper[speed] = admissible.smallest_shape_speed, _FASTEST
 
     function = chord(piece)
     geometry.blocks["chord"] = (function, arcs, h[None])
@@ -142,19 +142,21 @@ def arc_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, n
         normal = near.rates(np.zeros(1))[:, 0] / near.length
         level = np.array([normal @ near.shapes[:, 0]])
         geometry.groups.append(Group("start", level, level, sparse.csr_matrix(normal) @ selector(shapes[:, 0], n)))
-    _add_checks(geometry, problem, n)
+    _add_checks(geometry, admissible, n)
     return geometry
 
 
-def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: Corners, far: Pairs) -> PathGeometry:
+def side_geometry(
+    admissible: Admissible, mesh: Mesh, parameters: np.ndarray, n: int, near: Corners, far: Pairs
+) -> PathGeometry:
     """Straight pieces that close and keep admissible; the mesh, in phases of `near`, has an edge at every vertex of it."""
-    gait: Polygon = problem.gait
-    n_joint, symmetry = problem.body.n_joint, gait.symmetry
+    gait: Polygon = admissible.gait
+    n_joint, symmetry = admissible.n_joint, gait.symmetry
     vertices = gait.split(parameters, n_joint)
     span, on, start, width = _nested(mesh, near.phases)
     geometry = PathGeometry(
         side(n_joint), np.concatenate([vertices[:, on], vertices[:, on + 1]]), on, start, width, 1.0 / span[on],
-        [_ends("closure", end_conditions(symmetry, n_joint), vertices, n)], {}, shape_checks(problem.body, far),
+        [_ends("closure", end_conditions(symmetry, n_joint), vertices, n)], {}, shape_checks(admissible.body, far),
         np.full(n, -np.inf), np.full(n, np.inf),
     )  # fmt: skip
     across = tangent_conditions(BILATERAL, n_joint)[0][: n_joint // 2]
@@ -166,7 +168,7 @@ def side_geometry(problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, 
     geometry.blocks["sides"] = (side_lengths(n_joint, n_piece), parameters[:, None], np.empty((0, 1)))
     shortest = np.full(n_piece, gait.shortest_side)
     shortest[[0, -1]] *= np.where(gait.half_ends, 0.5, 1.0)
-    least = np.append(shortest**2, 2 * np.pi * problem.smallest_shape_speed * gait.fraction)
+    least = np.append(shortest**2, 2 * np.pi * admissible.smallest_shape_speed * gait.fraction)
     geometry.groups.append(block_group("sides", least, np.inf, n_piece + 1, n))
-    _add_checks(geometry, problem, n)
+    _add_checks(geometry, admissible, n)
     return geometry

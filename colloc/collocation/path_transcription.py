@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
-from colloc.collocation.layout import Layout, problem_layout, problem_mesh
+from colloc.collocation.layout import Layout, layout_of
 from colloc.collocation.path_equations import (
     ADVANCE,
     OMEGA,
@@ -31,11 +31,11 @@ from colloc.collocation.path_geometry import PathGeometry, arc_geometry, side_ge
 from colloc.collocation.point_equations import BlockParts, actuator_rows, driven_point, objective_block, period_rows
 from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.collocation.shape_checks import ShapeCheck
+from colloc.gaits.control_problem import Admissible, ControlProblem
 from colloc.gaits.free_path import ArcPath, FreePath
 from colloc.gaits.path_samples import Gait, arcs_through, corners_through, graded_edges
 from colloc.gaits.polygon import Corners
-from colloc.gaits.problem import Problem
-from colloc.mechanics.bodies import Pairs
+from colloc.mechanics.bodies import Body, Pairs
 from colloc.motion.heading import closing_sign
 from colloc.numerics.blocks import Block
 from colloc.numerics.constraint_rows import Group, equalities, output_group, quadrature_group, rotation_groups, selector
@@ -64,41 +64,43 @@ class PathProgram(GaitProgram):
 
 
 def _geometry(
-    problem: Problem, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath | Corners, far: Pairs
+    admissible: Admissible, mesh: Mesh, parameters: np.ndarray, n: int, near: ArcPath | Corners, far: Pairs
 ) -> PathGeometry:
     if isinstance(near, ArcPath):
-        return arc_geometry(problem, mesh, parameters, n, near, far)
-    return side_geometry(problem, mesh, parameters, n, near, far)
+        return arc_geometry(admissible, mesh, parameters, n, near, far)
+    return side_geometry(admissible, mesh, parameters, n, near, far)
 
 
 def _knots(path: ArcPath | Corners) -> np.ndarray | None:
     return path.edges if isinstance(path, ArcPath) else None
 
 
-def path_through(problem: Problem, gait: Gait, edges: np.ndarray | None) -> tuple[ArcPath | Corners, Mesh]:
-    """A path of the problem's kind laid through a gait, and the mesh in its phases; it need not keep every constraint.
+def path_through(
+    control: ControlProblem, gait: Gait, edges: np.ndarray | None, scheme: str = ""
+) -> tuple[ArcPath | Corners, Mesh]:
+    """A path of the class laid through a gait, and the mesh in its phases; it need not keep every constraint.
 
     Where arcs of a free path meet, the mesh has an edge. Arcs that meet at edges already are kept; else every interval is an
     arc, if those are not too many.
     """
-    if isinstance(problem.gait, FreePath):
-        knots = _arc_knots(problem, gait, edges)
-        mesh = problem_mesh(problem, knots if edges is None else with_knots(edges, knots))
-        return arcs_through(gait, problem.gait, knots), mesh
-    mesh = problem_mesh(problem, edges)
-    corners = corners_through(gait, problem.gait)
-    if isinstance(gait, Corners) and gait.symmetry == problem.gait.symmetry and gait.corners.shape == corners.corners.shape:
+    kind = control.admissible.gait
+    if isinstance(kind, FreePath):
+        knots = _arc_knots(control, gait, edges)
+        return arcs_through(gait, kind, knots), control.mesh(knots if edges is None else with_knots(edges, knots), scheme)
+    mesh, corners = control.mesh(edges, scheme), corners_through(gait, kind)
+    if isinstance(gait, Corners) and gait.symmetry == kind.symmetry and gait.corners.shape == corners.corners.shape:
         corners = gait
     return corners, Mesh(mesh.scheme, _with_vertices(mesh.edges, corners.phases))
 
 
-def _arc_knots(problem: Problem, gait: Gait, edges: np.ndarray | None) -> np.ndarray:
+def _arc_knots(control: ControlProblem, gait: Gait, edges: np.ndarray | None) -> np.ndarray:
+    kind = control.admissible.gait
     if edges is not None:
-        if isinstance(gait, ArcPath) and gait.symmetry == problem.gait.symmetry and np.isin(gait.edges, edges).all():
+        if isinstance(gait, ArcPath) and gait.symmetry == kind.symmetry and np.isin(gait.edges, edges).all():
             return gait.edges
-        if edges.size - 1 <= problem.gait.most_arcs(problem.body.n_joint):
+        if edges.size - 1 <= kind.most_arcs(control.admissible.n_joint):
             return edges
-    return graded_edges(gait, problem.gait, problem.intervals)
+    return graded_edges(gait, kind, control.intervals)
 
 
 def with_knots(edges: np.ndarray, knots: np.ndarray) -> np.ndarray:
@@ -120,18 +122,21 @@ def _with_vertices(edges: np.ndarray, phases: np.ndarray) -> np.ndarray:
     return np.concatenate([*parts, phases[-1:]])
 
 
-def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathProgram:
-    """The nonlinear program of a problem whose class bounds the path, near a gait, which fixes winding, start phase, and which
+def transcribe_path(
+    control: ControlProblem, gait: Gait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+) -> PathProgram:
+    """The nonlinear program for a class that bounds the path, near a gait, which fixes winding, start phase, and which
     interval lies on which side.
 
     Edges are phases; by default graded by the turns of the gait (free paths), or evenly spread over the sides (polygons).
     """
-    near, mesh = path_through(problem, gait, edges)
-    layout = problem_layout(problem, mesh, _knots(near))
-    geometry = _geometry(problem, mesh, layout.parameters[:, 0], layout.n, near, far)
-    kind = arc if isinstance(problem.gait, FreePath) else side
+    near, mesh = path_through(control, gait, edges, scheme)
+    layout = layout_of(control, mesh, _knots(near))
+    body, law, aims, fraction = *control.dynamics[:2], control.aims, control.admissible.gait.fraction
+    geometry = _geometry(control.admissible, mesh, layout.parameters[:, 0], layout.n, near, far)
+    kind = arc if isinstance(near, ArcPath) else side
     full = layout.forces.size > 0
-    point = (full_path_point if full else path_point)(problem.body, problem.law, kind)
+    point = (full_path_point if full else path_point)(body, law, kind)
     interval = np.repeat(np.arange(mesh.n), mesh.scheme.s)
     tau = np.tile(mesh.scheme.c, mesh.n)
     # a point that two intervals share would have two tangents at a corner: points of each interval are its own
@@ -140,7 +145,7 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     own = np.concatenate([layout.angles, layout.rates, layout.z, layout.forces]) if full else np.empty((0, tau.size), dtype=int)
     geometry.blocks["point"] = (point, np.concatenate([theta, own, geometry.shape[:, interval]]), given)
     if full:
-        limit = problem.body.largest_forces(problem.law)
+        limit = body.largest_forces(law)
         geometry.lower[layout.forces], geometry.upper[layout.forces] = -limit, limit
 
     n_point, n_out = tau.size, point.n_out
@@ -149,13 +154,13 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
     pick = selector(np.arange(n_point) * n_out + omega, n_out * n_point)
     groups = [
         *geometry.groups,
-        *(_full_groups(problem, n_out, n_point, layout.n) if full else []),
+        *(_full_groups(body, n_out, n_point, layout.n) if full else []),
         equalities("orientation", state @ selector(layout.theta[0], layout.n), {"point": (-rate @ pick).tocsr()}),
-        *rotation_groups(closing_sign(problem.gait.symmetry), layout.theta[0], layout.n, problem.rotation),
+        *rotation_groups(closing_sign(near.symmetry), layout.theta[0], layout.n, aims.rotation),
         quadrature_group("distance", layout.distance, forward, n_out, mesh, layout.n, 1.0),
         quadrature_group("work", layout.work, power, n_out, mesh, layout.n, 1.0),
     ]
-    velocity = ImplicitVelocity(problem.body, problem.law, n_point)
+    velocity = ImplicitVelocity(body, law, n_point)
     piece = geometry.piece
     place = ca.Function("place", [piece.shape, piece.given], [piece.angles, piece.direction]).map(n_point)
     unknown = ca.DM(np.full((3, n_point), np.nan))
@@ -170,45 +175,49 @@ def transcribe_path(problem: Problem, gait: Gait, edges: np.ndarray | None = Non
 
     def driven() -> BlockParts:
         gather = np.concatenate([layout.angles, layout.rates, layout.forces, here])
-        return driven_point(problem.body, problem.law, piece.shape, piece.given, piece.speed), gather, given
+        return driven_point(body, law, piece.shape, piece.given, piece.speed), gather, given
 
     densities = {"length": lambda: (piece_pace(geometry.piece), here, given), "driven_work": driven}
-    besides = period_rows(problem, layout, mesh, densities, 1.0) | actuator_rows(problem, layout, problem.law, 1.0)
+    besides = period_rows(aims, layout, mesh, densities, 1.0, fraction=fraction)
+    besides |= actuator_rows(control.actuators, body, law, layout, 1.0)
     for name, (parts, group) in besides.items():
         geometry.blocks[name] = parts
         groups.append(group)
     implicit: Implicit = {} if full else {"point": balanced}
-    objective = objective_block(problem, layout)
-    return _program(problem, mesh, _knots(near), layout, geometry, groups, objective, implicit, velocity)
+    objective = objective_block(aims.objective, layout, fraction)
+    return _program(control, mesh, _knots(near), layout, geometry, groups, objective, implicit, velocity)
 
 
-def _full_groups(problem: Problem, n_out: int, n_point: int, n: int) -> list[Group]:
+def _full_groups(body: Body, n_out: int, n_point: int, n: int) -> list[Group]:
     """The equations of every point where nothing is eliminated."""
-    n_joint, n_law = problem.body.n_joint, problem.body.n_force
+    n_joint, n_law = body.n_joint, body.n_force
     ends = np.cumsum([0, n_joint, n_joint, n_law, 3])
     names = ("angles", "rates", "force law", "balance")
     return [output_group(name, range(a, b), n_out, n_point, n) for name, a, b in zip(names, ends, ends[1:], strict=False)]
 
 
-def transcribe_fit(problem: Problem, gait: Gait, edges: np.ndarray | None = None, far: Pairs = ()) -> PathProgram:
+def transcribe_fit(
+    control: ControlProblem, gait: Gait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+) -> PathProgram:
     """The nonlinear program of the member of a path class nearest to a gait, without friction, x or W.
 
     Nearest means in the sum of the squared distances of edges, or corners, to those of a path laid through the gait.
     """
-    near, mesh = path_through(problem, gait, edges)
-    size = problem_layout(problem, mesh, _knots(near)).parameters.size
+    near, mesh = path_through(control, gait, edges, scheme)
+    admissible = control.admissible
+    size = layout_of(control, mesh, _knots(near)).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
     layout = Layout(own, *10 * (none,), size)
-    geometry = _geometry(problem, mesh, own[:, 0], size, near, far)
-    shapes = problem.gait.split(own[:, 0], problem.body.n_joint)
-    shapes = (shapes[-1] if isinstance(problem.gait, FreePath) else shapes).ravel(order="F")
-    target = problem.gait.parameters(near)[shapes]
+    geometry = _geometry(admissible, mesh, own[:, 0], size, near, far)
+    shapes = admissible.gait.split(own[:, 0], admissible.n_joint)
+    shapes = (shapes[-1] if isinstance(near, ArcPath) else shapes).ravel(order="F")
+    target = admissible.gait.parameters(near)[shapes]
     objective = Block(squared_distance(shapes.size), shapes[:, None], sparse.eye(1, format="csr"), target[:, None])
-    return _program(problem, mesh, _knots(near), layout, geometry, geometry.groups, objective, {}, None)
+    return _program(control, mesh, _knots(near), layout, geometry, geometry.groups, objective, {}, None)
 
 
 def _program(
-    problem: Problem,
+    control: ControlProblem,
     mesh: Mesh,
     knots: np.ndarray | None,
     layout: Layout,
@@ -221,5 +230,5 @@ def _program(
     assembly, names, row_lower, row_upper, rows = assembled(layout, objective, geometry.blocks, groups, implicit)
     lower, upper, checks = geometry.lower, geometry.upper, geometry.checks
     return PathProgram(
-        problem, mesh, knots, layout, assembly, names, lower, upper, row_lower, row_upper, rows, checks, 1.0, velocity, geometry
+        control, mesh, knots, layout, assembly, names, lower, upper, row_lower, row_upper, rows, checks, 1.0, velocity, geometry
     )

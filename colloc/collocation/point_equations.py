@@ -23,11 +23,11 @@ from scipy import sparse
 
 from colloc.collocation.layout import Layout
 from colloc.collocation.shape_checks import ShapeCheck
+from colloc.gaits.control_problem import Aims
 from colloc.gaits.gait_fields import AnyClass
 from colloc.gaits.objective import QUANTITIES, Objective
-from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import Slope, checked_chain
-from colloc.mechanics.actuators import driven_power
+from colloc.mechanics.actuators import ActuatorLimits, driven_power
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
@@ -150,17 +150,18 @@ def driven_point(
     return local_function("driven", local, ca.SX(0, 1) if given is None else given, delta, out)
 
 
-def actuator_rows(problem: Problem, layout: Layout, friction: Law, unit: float) -> dict[str, tuple[BlockParts, Group]]:
+def actuator_rows(
+    limits: ActuatorLimits, body: Body, friction: Law, layout: Layout, unit: float
+) -> dict[str, tuple[BlockParts, Group]]:
     """Block and rows, by name, that keep the actuators within their limits at the points of a full program, if there are any.
 
     Rates of the variables are those per period divided by `unit`; `friction` takes them.
     """
-    limits = problem.actuator_limits
     if not limits.names:
         return {}
-    _, angles, rates, _, delta = _symbols(problem.body)
-    forces = ca.SX.sym("forces", problem.body.n_force)
-    shares = limits.shares(problem.body, friction, angles, unit * rates, forces, delta)
+    _, angles, rates, _, delta = _symbols(body)
+    forces = ca.SX.sym("forces", body.n_force)
+    shares = limits.shares(body, friction, angles, unit * rates, forces, delta)
     function = local_function(ACTUATORS, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, shares)
     gather, n_point = np.concatenate([layout.angles, layout.rates, layout.forces]), layout.angles.shape[1]
     group = block_group(ACTUATORS, np.tile(limits.least, n_point), 1.0, n_point * len(limits.names), layout.n)
@@ -181,25 +182,25 @@ def period_block(aims: Sequence[Objective], sign: float, layout: Layout, fractio
     return function, layout.of_period(names), np.empty((0, 1))
 
 
-def objective_block(problem: Problem, layout: Layout) -> Block:
-    """Minus the problem's objective."""
-    function, gather, given = period_block([problem.objective], -1.0, layout, problem.gait.fraction)
+def objective_block(objective: Objective, layout: Layout, fraction: float) -> Block:
+    """Minus an objective for a whole period, of which a part is solved."""
+    function, gather, given = period_block([objective], -1.0, layout, fraction)
     return Block(function, gather, sparse.eye(1, format="csr"), given)
 
 
 def period_rows(
-    problem: Problem, layout: Layout, mesh: Mesh, densities: Mapping[str, Callable[[], BlockParts]], unit: float
+    aims: Aims, layout: Layout, mesh: Mesh, densities: Mapping[str, Callable[[], BlockParts]], unit: float, *, fraction: float
 ) -> dict[str, tuple[BlockParts, Group]]:
-    """Blocks and rows, by name, of what a problem asks of a whole period besides its objective.
+    """Blocks and rows, by name, of what is asked of a whole period, of which a fraction is solved, besides the objective.
 
     `densities`: blocks of the quantities that are integrals, per `unit` of time at the points; made if they are asked for.
     """
     found = {}
     for name, density in densities.items():
-        if problem.uses(name):
+        if aims.uses(name):
             found[name] = density(), total_group(name, getattr(layout, name), mesh, layout.n, unit)
-    if problem.at_least:
-        aims, least = zip(*problem.at_least, strict=True)
-        parts = period_block(aims, 1.0, layout, problem.gait.fraction)
+    if aims.at_least:
+        reached, least = zip(*aims.at_least, strict=True)
+        parts = period_block(reached, 1.0, layout, fraction)
         found["at least"] = parts, block_group("at least", np.array(least), np.inf, len(least), layout.n)
     return found

@@ -14,8 +14,8 @@ from colloc.collocation.layout import Layout
 from colloc.collocation.point_equations import BlockParts
 from colloc.collocation.shape_checks import ShapeCheck
 from colloc.collocation.worst_instants import held_shares, worst_instants
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.problem import Problem
 from colloc.numerics.blocks import Assembly, Block
 from colloc.numerics.constraint_rows import Group, stacked
 from colloc.numerics.mesh import Mesh
@@ -26,9 +26,9 @@ Implicit = dict[str, Callable[[ca.MX, ca.MX], ca.MX]]
 
 @dataclass(frozen=True, eq=False)
 class GaitProgram:
-    """A problem on a mesh, ready for a solver of nonlinear programs."""
+    """An optimal control problem on a mesh, ready for a solver of nonlinear programs."""
 
-    problem: Problem
+    control: ControlProblem
     mesh: Mesh
     knots: np.ndarray | None
     """``(n,)`` or None: phases where the arcs of a free path meet; None for other gaits."""
@@ -61,7 +61,7 @@ class GaitProgram:
 
     def member(self, parameters: np.ndarray) -> AnyGait:
         """The gait of a parameter vector ``(n_parameter,)``."""
-        return self.problem.gait.member(parameters, self.problem.body.n_joint, self.knots)
+        return self.control.admissible.member(parameters, self.knots)
 
     def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member."""
@@ -79,7 +79,8 @@ class GaitProgram:
         """
         gait = self.member(parameters)
         mesh, given = self.phase_mesh(gait), {}
-        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks, self.problem.joint_limit), strict=True):
+        limit = self.control.admissible.joint_limit
+        for check, times in zip(self.checks, worst_instants(gait, mesh, self.checks, limit), strict=True):
             given[check.name] = np.vstack([self.placed(check, times, mesh), held_shares(check, gait, times)])
         blocks = zip(self.names, self.assembly.blocks, strict=True)
         return [self.assembly.objective.parameters, *(given.get(name, block.parameters) for name, block in blocks)]

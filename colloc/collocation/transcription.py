@@ -19,7 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.collocation.implicit_velocity import ImplicitVelocity
-from colloc.collocation.layout import RADIANS, Layout, problem_layout, problem_mesh
+from colloc.collocation.layout import RADIANS, Layout, layout_of
 from colloc.collocation.point_equations import (
     N_RATE,
     BlockParts,
@@ -36,8 +36,8 @@ from colloc.collocation.point_equations import (
 )
 from colloc.collocation.program import GaitProgram, Implicit, assembled
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
+from colloc.gaits.control_problem import Admissible, ControlProblem
 from colloc.gaits.limits import widest
-from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FULL, Pairs
 from colloc.mechanics.inertia import STATES
 from colloc.motion.heading import closing_sign, momenta_image
@@ -60,26 +60,26 @@ class SeriesProgram(GaitProgram):
 
     def placed(self, check: ShapeCheck, times: np.ndarray, mesh: Mesh) -> np.ndarray:
         """The matrices from parameters to what is checked at the instants, a column each."""
-        return _columns(check, self.problem, times)
+        return _columns(check, self.control.admissible, times)
 
 
-def _columns(check: ShapeCheck, problem: Problem, times: np.ndarray) -> np.ndarray:
-    matrix = check.matrix(problem.gait, times, problem.body.n_joint)
+def _columns(check: ShapeCheck, admissible: Admissible, times: np.ndarray) -> np.ndarray:
+    matrix = check.matrix(admissible.gait, times, admissible.n_joint)
     return matrix.transpose(0, 2, 1).reshape(times.size, -1).T
 
 
-def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = ()) -> SeriesProgram:
-    """The nonlinear program of a problem on its uniform mesh, or on the mesh with the given edges.
+def transcribe(control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> SeriesProgram:
+    """The nonlinear program on the first mesh, or on the one with the given edges.
 
     Self-contact is constrained between links two apart, and between the pairs `far` of links farther apart: see
     `colloc.search.converge.crossing_pairs`.
     """
-    mesh = problem_mesh(problem, edges)
-    layout = problem_layout(problem, mesh)
-    checks = shape_checks(problem.body, far, problem.largest_speeds)
-    friction = problem.law.in_speeds_of(RADIANS)
-    point = point_function(problem.formulation, problem.body, friction, problem.slope, problem.froude * RADIANS**2)
-    n_joint = problem.body.n_joint
+    mesh, dynamics, admissible, aims = control.mesh(edges, scheme), control.dynamics, control.admissible, control.aims
+    layout = layout_of(control, mesh)
+    body, friction, slope, froude, _ = dynamics.in_speeds_of(RADIANS)
+    gait, n_joint = admissible.gait, body.n_joint
+    checks = shape_checks(body, far, admissible.largest_speeds)
+    point = point_function(control.formulation, body, friction, slope, froude * RADIANS**2)
     n_parameter = layout.parameters.shape[0]
 
     sites = np.empty(mesh.n_point, dtype=int)
@@ -90,10 +90,10 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     blocks = {"point": (point, point_gather, np.empty((0, mesh.n_point)))}
     for check in checks:
         function = gait_check(check, n_joint, n_parameter)
-        middles = np.vstack([_columns(check, problem, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])), np.full(mesh.n, -1.0)])
+        middles = np.vstack([_columns(check, admissible, 0.5 * (mesh.edges[1:] + mesh.edges[:-1])), np.full(mesh.n, -1.0)])
         blocks[check.name] = (function, np.repeat(layout.parameters, mesh.n, axis=1), middles)
     blocks["shape speed"] = (
-        mean_square(ca.DM(problem.gait.mean_square_rate(n_joint) / RADIANS**2)),
+        mean_square(ca.DM(gait.mean_square_rate(n_joint) / RADIANS**2)),
         layout.parameters,
         np.empty((0, 1)),
     )
@@ -101,66 +101,69 @@ def transcribe(problem: Problem, edges: np.ndarray | None = None, far: Pairs = (
     none, own = np.empty((0, mesh.n_point)), np.concatenate([layout.angles, layout.rates, layout.forces])
     densities: dict[str, Callable[[], BlockParts]] = {
         "length": lambda: (path_pace(n_joint), layout.rates, none),
-        "driven_work": lambda: (driven_point(problem.body, friction), own, none),
+        "driven_work": lambda: (driven_point(body, friction), own, none),
     }
-    besides = period_rows(problem, layout, mesh, densities, RADIANS) | actuator_rows(problem, layout, friction, RADIANS)
-    if problem.slope is not None and problem.towards is not None:
-        across = across_point(problem.body, friction, problem.slope)
+    besides = period_rows(aims, layout, mesh, densities, RADIANS, fraction=gait.fraction)
+    besides |= actuator_rows(control.actuators, body, friction, layout, RADIANS)
+    if slope is not None and aims.no_way_across:
+        across = across_point(body, friction, slope)
         parts = across, point_gather[: across.n_local], none
         besides["across"] = parts, zero_total_group("across", mesh, layout.n)
-    if not problem.gait.linear:
-        members = member_equations(problem.gait, n_joint)
+    if not gait.linear:
+        members = member_equations(gait, n_joint)
         besides["members"] = (
             (members, layout.parameters, np.empty((0, 1))),
             block_group("members", 0.0, 0.0, members.n_out, layout.n),
         )
     blocks |= {name: parts for name, (parts, _) in besides.items()}
 
-    rates = problem.gait.rate_matrix(mesh.times, n_joint) / RADIANS
+    rates = gait.rate_matrix(mesh.times, n_joint) / RADIANS
     groups = [
-        gait_group("angles", layout.angles, layout.parameters, problem.gait.angle_matrix(mesh.times, n_joint), layout.n),
+        gait_group("angles", layout.angles, layout.parameters, gait.angle_matrix(mesh.times, n_joint), layout.n),
         gait_group("rates", layout.rates, layout.parameters, rates, layout.n),
-        *_point_groups(problem, point.n_out, mesh, layout),
-        *_orientation_groups(problem, mesh, layout),
+        *_point_groups(control, point.n_out, mesh, layout),
+        *_orientation_groups(control, mesh, layout),
         quadrature_group("distance", layout.distance, point.n_out - 2, point.n_out, mesh, layout.n, RADIANS),
         quadrature_group("work", layout.work, point.n_out - 1, point.n_out, mesh, layout.n, RADIANS),
-        *(check.group(problem.joint_limit, mesh.n, layout.n) for check in checks),
-        block_group("shape speed", problem.smallest_shape_speed**2, np.inf, 1, layout.n),
+        *(check.group(admissible.joint_limit, mesh.n, layout.n) for check in checks),
+        block_group("shape speed", admissible.smallest_shape_speed**2, np.inf, 1, layout.n),
         *(group for _, group in besides.values()),
     ]
-    velocity = ImplicitVelocity(problem.body, friction, mesh.n_point)
+    velocity = ImplicitVelocity(body, friction, mesh.n_point)
 
     def velocity_map(local: ca.MX, delta: ca.MX) -> ca.MX:
         _, angles, rates, z = ca.vertsplit(local, [0, 1, 1 + n_joint, 1 + 2 * n_joint, 4 + 2 * n_joint])
         return velocity(angles, rates, z, delta)
 
-    implicit: Implicit = {} if problem.formulation == FULL else {"point": velocity_map}
-    assembly, names, row_lower, row_upper, rows = assembled(layout, objective_block(problem, layout), blocks, groups, implicit)
-    lower, upper = _variable_bounds(problem, layout)
+    implicit: Implicit = {} if control.formulation == FULL else {"point": velocity_map}
+    objective = objective_block(aims.objective, layout, gait.fraction)
+    assembly, names, row_lower, row_upper, rows = assembled(layout, objective, blocks, groups, implicit)
+    lower, upper = _variable_bounds(control, layout)
     return SeriesProgram(
-        problem, mesh, None, layout, assembly, names, lower, upper, row_lower, row_upper, rows, checks, RADIANS, velocity
+        control, mesh, None, layout, assembly, names, lower, upper, row_lower, row_upper, rows, checks, RADIANS, velocity
     )
 
 
-def _variable_bounds(problem: Problem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+def _variable_bounds(control: ControlProblem, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.full(layout.n, -np.inf), np.full(layout.n, np.inf)
-    upper[layout.parameters[:, 0]] = problem.gait.largest_parameters(problem.body, widest(problem.joint_limit))
+    gait, body, limit, *_ = control.admissible
+    upper[layout.parameters[:, 0]] = gait.largest_parameters(body, widest(limit))
     lower[layout.parameters] = -upper[layout.parameters]
     if layout.forces.size:
-        limit = problem.body.largest_forces(problem.law)
-        lower[layout.forces], upper[layout.forces] = -limit, limit
+        most = body.largest_forces(control.dynamics.law)
+        lower[layout.forces], upper[layout.forces] = -most, most
     for state in (layout.distance, layout.work):
         lower[state[0, 0]] = upper[state[0, 0]] = 0.0
     return lower, upper
 
 
-def _point_groups(problem: Problem, n_out: int, mesh: Mesh, layout: Layout) -> list[Group]:
+def _point_groups(control: ControlProblem, n_out: int, mesh: Mesh, layout: Layout) -> list[Group]:
     """The equations of every point: lifted force laws, then the balance (or the velocity map in its place), or with inertia
     what the momenta are; and how these grow, and close a period."""
     n, n_point, momenta = layout.n, mesh.n_point, layout.momenta
     n_law = n_out - N_RATE - 3 - len(momenta)
     groups = [output_group("balance", range(n_law, n_law + 3), n_out, n_point, n)]
-    if problem.formulation == FULL:
+    if control.formulation == FULL:
         groups.insert(0, output_group("force law", range(n_law), n_out, n_point, n))
     state, rate = mesh.integration()
     for row, sites in enumerate(momenta):
@@ -168,19 +171,20 @@ def _point_groups(problem: Problem, n_out: int, mesh: Mesh, layout: Layout) -> l
         grown = state @ selector(sites, n)
         groups.append(equalities(f"momentum {STATES[row]}", grown, {"point": (-RADIANS * rate @ pick).tocsr()}))
     if len(momenta):
-        image = momenta_image(problem.gait.motion_symmetry)
+        image = momenta_image(control.dynamics.symmetry)
         begin, end = selector(momenta[:, 0], n), selector(momenta[:, -1], n)
         groups.append(equalities("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin)))
     return groups
 
 
-def _orientation_groups(problem: Problem, mesh: Mesh, layout: Layout) -> list[Group]:
+def _orientation_groups(control: ControlProblem, mesh: Mesh, layout: Layout) -> list[Group]:
     """theta' = omega, how theta closes where no symmetry does it, and on a slope where it begins."""
     state, rate = mesh.integration()
     linear = state @ selector(layout.theta[0], layout.n) - RADIANS * rate @ selector(layout.z[2], layout.n)
+    sign = closing_sign(control.admissible.gait.closing_symmetry)
     begin = selector(layout.theta[0, :1], layout.n) - selector(layout.parameters[-1], layout.n)
     return [
         equalities("orientation", linear),
-        *rotation_groups(closing_sign(problem.gait.closing_symmetry), layout.theta[0], layout.n, problem.rotation),
-        *([] if problem.slope is None else [equalities("heading", begin)]),
+        *rotation_groups(sign, layout.theta[0], layout.n, control.aims.rotation),
+        *([] if control.dynamics.slope is None else [equalities("heading", begin)]),
     ]

@@ -6,8 +6,8 @@ import numpy as np
 
 from colloc.collocation.layout import Layout
 from colloc.collocation.program import GaitProgram
+from colloc.gaits.control_problem import Dynamics
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.problem import Problem
 from colloc.mechanics.actuators import driven_power_in_balance
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
 from colloc.motion.kinds import OMEGA, Passed, Shapes, begin_of, first_theta, kind_of_motion
@@ -19,11 +19,11 @@ def feasible_point(transcription: GaitProgram, parameters: np.ndarray, delta: fl
     ``(n_parameter,)`` and delta in the units of the problem's class of gaits."""
     gait = transcription.member(parameters)
     mesh = transcription.phase_mesh(gait)
-    return balanced_variables(transcription.problem, transcription.layout, mesh, gait, parameters, delta)
+    return balanced_variables(transcription.control.dynamics, transcription.layout, mesh, gait, parameters, delta)
 
 
 def balanced_variables(
-    problem: Problem, layout: Layout, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, delta: float
+    dynamics: Dynamics, layout: Layout, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, delta: float
 ) -> np.ndarray:
     """The same for a layout of variables, a mesh in phases of the gait, and the gait's parameters in that layout."""
     x = np.zeros(layout.n)
@@ -31,8 +31,8 @@ def balanced_variables(
     unit = gait.speed_unit
     slow = delta * gait.delta_unit / unit
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / unit
-    body, friction = problem.body, problem.law.in_speeds_of(unit)
-    kind = kind_of_motion(problem, friction)
+    kind = kind_of_motion(dynamics.in_speeds_of(unit))
+    body, friction = kind.body, kind.friction
     begin = begin_of(kind, gait)
     along = kind.along(mesh, Shapes(angles, rates, slow, unit), begin)
     now, z = along.now, along.z

@@ -2,7 +2,7 @@
 
 A gait is a function of the phase, with words for its reader. A class says which gaits are allowed. Its members are known by a
 vector of parameters on a mesh. How a class is collocated and searched, where its angles are not linear in its parameters, is
-registered in `colloc.reduced.spaces`.
+registered in `colloc.search.spaces`.
 """
 
 from __future__ import annotations

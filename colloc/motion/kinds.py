@@ -16,8 +16,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from colloc.gaits.control_problem import Dynamics
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.problem import Problem
 from colloc.gaits.sloped import Slope, checked_chain
 from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
@@ -331,12 +331,12 @@ class WithInertia(SlowOnLevel):
         return np.empty((len(on_out), 0))
 
 
-def kind_of_motion(problem: Problem, friction: Law | None = None) -> Kind:
-    """How the body of a problem moves, or would under another law of friction."""
-    body, law, symmetry = problem.body, problem.law if friction is None else friction, problem.gait.motion_symmetry
-    if problem.froude:
-        return WithInertia(checked_mass(body), law, symmetry, problem.froude)
-    return SlowOnLevel(body, law, symmetry) if problem.slope is None else SlowOnSlope(body, law, problem.slope)
+def kind_of_motion(dynamics: Dynamics) -> Kind:
+    """How a body moves."""
+    body, law, slope, froude, symmetry = dynamics
+    if froude:
+        return WithInertia(checked_mass(body), law, symmetry, froude)
+    return SlowOnLevel(body, law, symmetry) if slope is None else SlowOnSlope(body, law, slope)
 
 
 def begin_of(kind: Kind, gait: AnyGait) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from colloc.gaits.control_problem import control_problem
 from colloc.pictures.figure import (
     draw_angles,
     draw_filmstrip,
@@ -61,7 +62,8 @@ def draw_convergence(axes: Axes, solution: Solution) -> None:
 
 def mesh_errors(solution: Solution) -> np.ndarray:
     """Estimated error of the objective from every mesh interval, ``(n,)``, magnitudes."""
-    return np.abs(mesh_error(solution.answer.problem, solution.mesh, solution.gait, solution.delta_per_period).value)
+    control = control_problem(solution.answer.problem)
+    return np.abs(mesh_error(control, solution.mesh, solution.gait, solution.delta_per_period).value)
 
 
 def draw_mesh(axes: Axes, solution: Solution, errors: np.ndarray) -> None:

@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, peaks
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import widest
-from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import remembered
@@ -21,7 +20,7 @@ from colloc.reduced.given import Given
 
 class LinearSpace:
     """Members of a linear class by their parameters v, in which angles and rates are linear, on a mesh (by default the
-    problem's first), with pairs of links `far` apart that are kept from crossing; what it answers is
+    first one), with pairs of links `far` apart that are kept from crossing; what it answers is
     told by `colloc.reduced.program.SearchSpace`.
 
     Rows: shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed.
@@ -30,27 +29,27 @@ class LinearSpace:
     knots: np.ndarray | None = None
     _follows: Callable[[np.ndarray], list[_Placed]] | None
 
-    def __init__(self, problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
-        self.problem, self.far, self.given = problem, far, Given(None, edges, scheme)
-        self.mesh = problem_mesh(problem, edges, scheme)
-        self.checks = shape_checks(problem.body, far, problem.largest_speeds)
-        gait, n_joint, limit = problem.gait, problem.body.n_joint, problem.joint_limit
+    def __init__(self, control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
+        self.control, self.far, self.given = control, far, Given(None, edges, scheme)
+        self.mesh, self._admissible = control.mesh(edges, scheme), control.admissible
+        gait, body, limit, speeds, _ = control.admissible
+        self.checks, n_joint = shape_checks(body, far, speeds), body.n_joint
         angles, rates = gait.angle_matrix(self.mesh.times, n_joint), gait.rate_matrix(self.mesh.times, n_joint)
         self._matrix = np.concatenate([angles, rates], axis=1)
         self.n = self._matrix.shape[2]
         self._pace = np.ones(self.mesh.n_point)
         self._square = gait.mean_square_rate(n_joint) / (2 * np.pi) ** 2
-        self.upper = gait.largest_parameters(problem.body, widest(limit))
+        self.upper = gait.largest_parameters(body, widest(limit))
         self.lower = -self.upper
         self.own = np.arange(self.n)
         self.move_checks(np.zeros(self.n))
 
     def member(self, v: np.ndarray) -> AnyGait:
-        return self.problem.gait.member(v, self.problem.body.n_joint)
+        return self._admissible.member(v)
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters ``(n,)`` of the member nearest to a gait."""
-        return self.problem.gait.parameters(self.problem.gait.through(gait))
+        return self._admissible.gait.parameters(self._admissible.gait.through(gait))
 
     laid = parameters
 
@@ -63,10 +62,10 @@ class LinearSpace:
 
     def remeshed(self, gait: AnyGait, edges: np.ndarray, scheme: str) -> LinearSpace:
         """The class on another mesh."""
-        return type(self)(self.problem, edges, scheme, self.far)
+        return type(self)(self.control, edges, scheme, self.far)
 
     def with_far(self, far: Pairs) -> LinearSpace:
-        return type(self)(self.problem, self.mesh.edges, self.mesh.scheme.name, far)
+        return type(self)(self.control, self.mesh.edges, self.mesh.scheme.name, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
@@ -79,21 +78,21 @@ class LinearSpace:
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
         """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad, or of
         a largest speed]."""
-        gait, n_joint, limit = self.member(v), self.problem.body.n_joint, self.problem.joint_limit
+        gait, n_joint, limit = self.member(v), self._admissible.n_joint, self._admissible.joint_limit
         self._placed, self._follows, self.watched, low, high, excess = [], None, {}, [], [], -np.inf
         for check, (cells, times) in zip(self.checks, peaks(gait, self.mesh, self.checks, limit), strict=True):
             self.watched[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
-            values, matrix = check_values(check, gait, times), check.matrix(self.problem.gait, times, n_joint)
+            values, matrix = check_values(check, gait, times), check.matrix(self._admissible.gait, times, n_joint)
             may_move = moving(values, check, limit, times, self.mesh, cells)
             self._placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move))
             excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
             low.append(lower)
             high.append(upper)
         self.watched["shape speed"] = np.zeros(1, dtype=int)
-        self.row_lower = np.concatenate([*low, [self.problem.smallest_shape_speed**2]])
+        self.row_lower = np.concatenate([*low, [self._admissible.smallest_shape_speed**2]])
         self.row_upper = np.concatenate([*high, [np.inf]])
         return excess
 
@@ -108,8 +107,8 @@ class LinearSpace:
                 cells = placed.cells[which]
                 where, matrix = (self.mesh.edges[cells], self.mesh.h[cells]), matrix.copy()
                 at = placed.check, placed.shares[which], gait, placed.times[which]
-                worst = followed(*at, cells=where, limit=self.problem.joint_limit)
-                matrix[which] = placed.check.matrix(self.problem.gait, worst, self.problem.body.n_joint)
+                worst = followed(*at, cells=where, limit=self._admissible.joint_limit)
+                matrix[which] = placed.check.matrix(self._admissible.gait, worst, self._admissible.n_joint)
             found.append(placed._replace(matrix=matrix))
         return found
 

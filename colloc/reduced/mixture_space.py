@@ -8,13 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.collocation.shape_checks import shape_checks
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.path_samples import Gait, symmetric_samples
-from colloc.gaits.problem import Problem
 from colloc.gaits.relaxed import Mixture
 from colloc.gaits.symmetry import end_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.schemes import scheme
 from colloc.reduced.given import Given
 
 _NEAR = 0.6
@@ -35,38 +34,40 @@ class MixtureSpace:
 
     Parameters
     ----------
-    problem : Problem
+    control : ControlProblem
         Of a class `colloc.gaits.relaxed.Relaxed`.
     pieces : int
     far : pairs of links more than two apart that are kept from crossing.
+    scheme : str, optional
     directions : int, optional
         Other than those of the class, to see what more would be worth.
     """
 
     knots: np.ndarray | None = None
 
-    def __init__(self, problem: Problem, pieces: int, far: Pairs = (), directions: int = 0) -> None:
-        self.problem, self.pieces, self.far = problem, pieces, far
-        self.given = Given(None, np.arange(pieces + 1.0), problem.scheme)
-        self.n_joint, self.n_direction = problem.body.n_joint, directions or problem.gait.directions
-        self.mesh = Mesh(scheme(problem.scheme), np.arange(pieces * _CELLS + 1.0) / _CELLS)
+    def __init__(self, control: ControlProblem, pieces: int, far: Pairs = (), scheme: str = "", directions: int = 0) -> None:
+        self.control, self.pieces, self.far, admissible = control, pieces, far, control.admissible
+        self.given = Given(None, np.arange(pieces + 1.0), scheme or control.scheme)
+        self._symmetry, self._limit = admissible.gait.symmetry, admissible.joint_limit
+        self.n_joint, self.n_direction = admissible.n_joint, directions or admissible.gait.directions
+        self.mesh = control.mesh(np.arange(pieces * _CELLS + 1.0) / _CELLS, scheme)
         piece = np.repeat(np.arange(pieces), _CELLS * self.mesh.scheme.s)
         self._piece, self._part = piece, self.mesh.times - piece
         self._in_piece = (piece == np.arange(pieces)[:, None]).astype(float)
-        self._checks = shape_checks(problem.body, far)
-        self._first, self._last = end_conditions(problem.gait.symmetry, self.n_joint)
+        self._checks = shape_checks(admissible.body, far)
+        self._first, self._last = end_conditions(self._symmetry, self.n_joint)
         count = pieces * self.n_direction
         self.time = slice(self.n_joint, self.n_joint + count)
         self.n = self.time.stop + count * (1 if self.n_joint == 2 else self.n_joint)
         self.own = np.arange(self.n)
         self.lower, self.upper = np.full(self.n, -np.inf), np.full(self.n, np.inf)
         # a side of a polygon goes across the square of admissible angles at most
-        longest = _LONGEST if self.n_direction > 1 else 2 * problem.joint_limit * np.sqrt(self.n_joint)
+        longest = _LONGEST if self.n_direction > 1 else 2 * self._limit * np.sqrt(self.n_joint)
         self.lower[self.time], self.upper[self.time] = 0.0, longest
         # instants of the checks as means of the shapes where pieces meet
         ends = np.eye(pieces + 1)
         self._watch = np.vstack([ends, 0.5 * (ends[:-1] + ends[1:])])
-        self._least = 2 * np.pi * problem.smallest_shape_speed * problem.gait.fraction
+        self._least = 2 * np.pi * admissible.smallest_shape_speed * admissible.gait.fraction
         self._placed: list[np.ndarray] = []
         self.watched: dict[str, np.ndarray] = {}
         self.row_lower = self.row_upper = np.empty(0)
@@ -81,7 +82,7 @@ class MixtureSpace:
 
     def member(self, v: np.ndarray) -> Mixture:
         durations, _, directions = self._split(v)
-        return Mixture(np.maximum(durations, 0.0), directions, v[: self.n_joint], self.problem.gait.symmetry)
+        return Mixture(np.maximum(durations, 0.0), directions, v[: self.n_joint], self._symmetry)
 
     def parameters(self, gait: Gait) -> np.ndarray:
         """Parameters of a mixture of so many pieces, or of one along the path of another gait."""
@@ -95,7 +96,7 @@ class MixtureSpace:
 
     def _along(self, gait: Gait) -> Mixture:
         """A mixture that follows a path: the first direction along it, the others spread, for a small part of the time."""
-        points = symmetric_samples(gait, self.problem.gait.symmetry, _SAMPLES)
+        points = symmetric_samples(gait, self._symmetry, _SAMPLES)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points), axis=0))])
         at = np.linspace(0.0, along[-1], self.pieces + 1)
         steps = np.diff(np.stack([np.interp(at, along, row) for row in points])).T
@@ -109,7 +110,7 @@ class MixtureSpace:
             others = np.random.default_rng(0).standard_normal((self.pieces, self.n_direction - 1, self.n_joint))
             others /= np.linalg.norm(others, axis=2, keepdims=True)
         shares = np.concatenate([[1.0], np.full(self.n_direction - 1, _LOOP)])
-        return Mixture(size * shares, np.concatenate([ahead, others], axis=1), points[:, 0], self.problem.gait.symmetry)
+        return Mixture(size * shares, np.concatenate([ahead, others], axis=1), points[:, 0], self._symmetry)
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         """There is no other program: they are v."""
@@ -121,10 +122,10 @@ class MixtureSpace:
 
     def remeshed(self, gait: Mixture, edges: np.ndarray, scheme: str) -> MixtureSpace:
         """The class with as many pieces as there are intervals between the edges."""
-        return MixtureSpace(self.problem.with_(scheme=scheme), edges.size - 1, self.far)
+        return MixtureSpace(self.control, edges.size - 1, self.far, scheme)
 
     def with_far(self, far: Pairs) -> MixtureSpace:
-        return MixtureSpace(self.problem, self.pieces, far)
+        return MixtureSpace(self.control, self.pieces, far, self.mesh.scheme.name)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, directions and durations at the points of the mesh: a block of columns for each direction."""
@@ -176,7 +177,7 @@ class MixtureSpace:
 
         They are ends and middles of pieces, and move with those alone: `later` changes nothing.
         """
-        angles, limit = self.member(v).shapes @ self._watch.T, self.problem.joint_limit
+        angles, limit = self.member(v).shapes @ self._watch.T, self._limit
         self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
         closing = np.zeros(len(self._first))
         for check in self._checks:

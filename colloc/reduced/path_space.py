@@ -12,11 +12,11 @@ import numpy as np
 
 from colloc.collocation.path_transcription import path_through, transcribe_fit
 from colloc.collocation.worst_instants import check_values, held_shares, peaks
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.free_path import ArcPath
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.polygon import Corners
-from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.columns import ChosenRows, ColumnFunction
@@ -44,15 +44,14 @@ class PathSpace:
     edges of the mesh are phases of that one. Attributes as `colloc.reduced.program.SearchSpace`."""
 
     def __init__(
-        self, problem: Problem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+        self, control: ControlProblem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
     ) -> None:
-        self.problem, self.near, self.far, self.given = problem, near, far, Given(near, edges, scheme)
-        stated = problem if scheme in ("", problem.scheme) else problem.with_(scheme=scheme)
-        self._fit = fit = transcribe_fit(stated, near, edges, far)
+        self.control, self.near, self.far, self.given = control, near, far, Given(near, edges, scheme)
+        self._fit = fit = transcribe_fit(control, near, edges, scheme, far)
         self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
-        gait, n_joint = problem.gait, problem.body.n_joint
+        gait, n_joint = control.admissible.gait, control.admissible.n_joint
         self.shapes, self._arcs = np.arange(fit.lower.size), gait.of_arcs
         self._closed = self._arcs and n_joint > 2 and gait.symmetry != BILATERAL
         self._side = 1.0 if gait.symmetry == NONE else -1.0
@@ -81,7 +80,7 @@ class PathSpace:
         out = ca.vertcat(piece.angles, piece.direction, piece.speed)
         arguments = [piece.shape, piece.given]
         self._value = ColumnFunction(ca.Function("place", arguments, [out]))
-        n_joint = self.problem.body.n_joint
+        n_joint = self.control.admissible.n_joint
         self._pulled = along_arcs(n_joint) if self._arcs and n_joint > 2 else along_shape(piece)
         self._given = self._geometry.given(np.tile(mesh.scheme.c, mesh.n))
         self._gather = np.repeat(self._geometry.shape, mesh.scheme.s, axis=1)
@@ -163,8 +162,9 @@ class PathSpace:
             target, accuracy = self.full_parameters(v), _FITTED
         if outside < _SETTLED:
             return v
-        bound = f"; allow more curvature than {self.problem.gait.curvature:g}" if self._arcs else ""
-        raise NotConvergedError(f"found no {self.problem.gait.describe()} near the guess; try another guess{bound}.")
+        kind = self.control.admissible.gait
+        bound = f"; allow more curvature than {kind.curvature:g}" if self._arcs else ""
+        raise NotConvergedError(f"found no {kind.describe()} near the guess; try another guess{bound}.")
 
     def laid(self, gait: AnyGait) -> np.ndarray:
         """Parameters of a path through a gait, which need not be a member: it may bend more than it should."""
@@ -172,19 +172,20 @@ class PathSpace:
 
     def _through(self, gait: AnyGait) -> np.ndarray:
         """Full parameters of a path through a gait; it need not keep every constraint."""
+        kind = self.control.admissible.gait
         if self.knots is not None:
-            return self.problem.gait.parameters(arcs_through(gait, self.problem.gait, self.knots))
-        return self.problem.gait.parameters(path_through(self.problem, gait, self.mesh.edges)[0])
+            return kind.parameters(arcs_through(gait, kind, self.knots))
+        return kind.parameters(path_through(self.control, gait, self.mesh.edges)[0])
 
     def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
         return self._fit.phase_mesh(gait)
 
     def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
         """The class near a member on another mesh; its intervals are arcs, unless those are too many."""
-        return PathSpace(self.problem, self.problem.gait.laid_on(gait, edges), edges, scheme, self.far)
+        return PathSpace(self.control, self.control.admissible.gait.laid_on(gait, edges), edges, scheme, self.far)
 
     def with_far(self, far: Pairs) -> PathSpace:
-        return PathSpace(self.problem, self.near, self.mesh.edges, self.mesh.scheme.name, far)
+        return PathSpace(self.control, self.near, self.mesh.edges, self.mesh.scheme.name, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
@@ -198,7 +199,7 @@ class PathSpace:
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
         p, fit = self.full_parameters(v), self._fit
-        gait, limit = fit.member(p), self.problem.joint_limit
+        gait, limit = fit.member(p), self.control.admissible.joint_limit
         mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
         given = {name: block.parameters.copy() for name, block in zip(self._geometry.blocks, fit.assembly.blocks, strict=True)}
         for check, (cells, times) in zip(fit.checks, peaks(gait, mesh, fit.checks, limit), strict=True):

@@ -6,10 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
-from colloc.gaits.friction_unit import in_friction_units, in_unit
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import Objective
-from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.bodies import Pairs
 from colloc.motion.kinds import kind_of_motion
@@ -22,7 +21,7 @@ from colloc.reduced.motion import ReducedMotion, Shapes
 class SearchSpace(Shapes, Protocol):
     """A class of gaits on a mesh: its members by parameters v, and the rows and bounds that keep them in the class."""
 
-    problem: Problem
+    control: ControlProblem
     mesh: Mesh
     far: Pairs
     lower: np.ndarray
@@ -79,7 +78,7 @@ FORCES = ("work", "driven_work")
 
 
 class ReducedProgram:
-    """Maximise a problem's objective over a class of gaits on a mesh, at one delta.
+    """Maximise an objective over a class of gaits on a mesh, at one delta.
 
     Rows: net rotation where it is prescribed and no symmetry closes it, on a slope the way across a direction that is asked
     for, what must be reached at least, what actuators can do, the space's.
@@ -89,25 +88,21 @@ class ReducedProgram:
     lower, upper : (n,)
     delta : float
         In the units of the class; may be changed.
-    unit : float
-        The friction that is 1 inside: objective, work and multipliers are in units of it, so that tolerances mean the same
-        whatever the coefficients are (`colloc.gaits.friction_unit`).
     actuators : ActuatorRows, optional
-        Where the problem limits them.
+        Where they are limited.
     """
 
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
-        problem, self.unit = in_friction_units(space.problem)
-        besides = [name for name in ("length", "driven_work") if problem.uses(name)]
-        self.motion = ReducedMotion(kind_of_motion(problem), space.mesh, space, besides)
-        held = {"rotation": problem.rotation} if problem.gait.closing_symmetry == NONE else {}
-        held |= {} if problem.towards is None else {"across": 0.0}
+        aims, limits = space.control.aims, space.control.actuators
+        besides = [name for name in ("length", "driven_work") if aims.uses(name)]
+        self.motion = ReducedMotion(kind_of_motion(space.control.dynamics), space.mesh, space, besides)
+        held = {"rotation": aims.rotation} if space.control.admissible.gait.closing_symmetry == NONE else {}
+        held |= {"across": 0.0} if aims.no_way_across else {}
         self._held = [name for name, value in held.items() if value is not None]
-        equal, least = [held[name] for name in self._held], [value for _, value in problem.at_least]
-        self._objective, self._reached = problem.objective, [aim for aim, _ in problem.at_least]
+        equal, least = [held[name] for name in self._held], [value for _, value in aims.at_least]
+        self._objective, self._reached = aims.objective, [aim for aim, _ in aims.at_least]
         self._own_lower, self._own_upper = np.array([*equal, *least]), np.array([*equal, *np.full(len(least), np.inf)])
-        limits = problem.actuator_limits
         self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
         self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
@@ -162,12 +157,12 @@ class ReducedProgram:
 
     def stated(self, objective: float) -> float:
         """The value that an `objective` stands for, in the units of the problem."""
-        return in_unit(-objective, self.unit, self._objective)
+        return self.space.control.stated(-objective)
 
     def period(self, v: np.ndarray) -> dict[str, float]:
         """What a period comes to, by the names of `colloc.gaits.objective.QUANTITIES`, in the units of the problem."""
         found = self.motion.values(v, self.delta)
-        return {name: value * self.unit if name in FORCES else value for name, value in found.items()}
+        return {name: value * self.space.control.unit if name in FORCES else value for name, value in found.items()}
 
     def gradient(self, v: np.ndarray) -> np.ndarray:
         """Of the objective, ``(n,)``."""

@@ -121,7 +121,7 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
 
     >>> from colloc import Harmonic, Problem, ellipse
     >>> from colloc.reduced.program import ReducedProgram
-    >>> from colloc.reduced.spaces import space_near
+    >>> from colloc.search.spaces import space_near
     >>> space, v = space_near(Problem("saddle", gait=Harmonic(1, "bilateral")), ellipse(0.0, 0.307347, 0.767811))
     >>> round(curvature(ReducedProgram(space, 1e-4), v).smallest, 1)
     -0.8

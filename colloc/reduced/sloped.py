@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.motion.kinds import SlowOnLevel
+from colloc.motion.kinds import kind_of_motion
 from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.motion import ReducedMotion
 
@@ -17,10 +17,10 @@ class SlopeSpace(LinearSpace):
     def parameters(self, gait: AnyGait) -> np.ndarray:
         v = super().parameters(gait)
         if np.isnan(v[-1]):
-            problem, v[-1] = self.problem, 0.0
-            kind = SlowOnLevel(problem.body, problem.law, problem.gait.motion_symmetry)
-            level = ReducedMotion(kind, self.mesh, self)
-            v[-1] = (problem.towards or 0.0) - np.angle(level.at(v, problem.delta_start).pose.place[-1])
+            dynamics, v[-1] = self.control.dynamics, 0.0
+            assert dynamics.slope is not None
+            level = ReducedMotion(kind_of_motion(dynamics._replace(slope=None)), self.mesh, self)
+            v[-1] = dynamics.slope.ahead - np.angle(level.at(v, self.control.delta_start).pose.place[-1])
         return v
 
     laid = parameters

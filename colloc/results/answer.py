@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.collocation.layout import Layout, problem_layout
+from colloc.collocation.layout import Layout, layout_of
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.numerics.mesh import Mesh
@@ -169,7 +170,7 @@ class Answer:
     @property
     def layout(self) -> Layout:
         """Where every variable is in `x`."""
-        return problem_layout(self.problem, self.mesh, self.knots)
+        return layout_of(control_problem(self.problem), self.mesh, self.knots)
 
     @property
     def delta_per_period(self) -> float:

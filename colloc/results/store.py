@@ -25,7 +25,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from colloc.collocation.layout import problem_layout
+from colloc.collocation.layout import layout_of
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait, fields, gait_from, statement_hash
 from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.polygon import Corners
@@ -194,7 +195,7 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}
     history = tuple(Step(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
     # by the variables, not by what the group gait says for other readers
-    layout = problem_layout(problem, Mesh(scheme(plain["scheme"]), arrays["edges"]), knots)
+    layout = layout_of(control_problem(problem), Mesh(scheme(plain["scheme"]), arrays["edges"]), knots)
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
         raise StoreError(f"{file.filename} is damaged: its variables do not fit its mesh.")
     parameters, meet = arrays["x"][layout.parameters[:, 0]], arrays["edges"] if knots is None else knots

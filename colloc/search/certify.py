@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.friction_unit import friction_unit, in_unit
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
@@ -67,7 +67,7 @@ def is_trivial(answer: Answer) -> bool:
     """Whether a search ended in a gait that goes nowhere and does not turn, such as a retraced one: no optimum."""
     problem = answer.problem
     if problem.slope is not None:
-        return in_unit(answer.value, 1 / friction_unit(problem.law), problem.objective) < NOWHERE
+        return control_problem(problem).in_units(answer.value) < NOWHERE
     if not goes_nowhere(answer):
         return False
     theta = answer.x[answer.layout.theta[0]]
@@ -154,7 +154,8 @@ def gait_certificate(
     """
 
     settings = {"tolerance": tolerance, "instants": instants, "breaks": breaks, "rotation": problem.rotation}
-    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "run": replayer(problem)}
+    run = replayer(problem.slope, problem.froude)
+    settings |= {"driven": problem.uses("driven_work"), "limits": problem.actuator_limits, "run": run}
     known = measured(problem.body, problem.law, path, delta, **settings, objective=problem.objective)  # type: ignore[arg-type]
     fine = known.fine
     checks = (
@@ -319,7 +320,7 @@ def _mesh(answer: Answer) -> list[Check]:
     tolerance = problem.mesh_tolerance
     if tolerance == 0:
         return []
-    error = mesh_error(problem, answer.mesh, answer.gait, answer.delta_per_period, tolerance)
+    error = mesh_error(control_problem(problem), answer.mesh, answer.gait, answer.delta_per_period, tolerance)
     return [
         Check("mesh error", error.estimate, tolerance, f"of the {problem.objective.name}, relative, from defects between nodes")
     ]

@@ -17,16 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from colloc.collocation.layout import Layout, problem_layout
+from colloc.collocation.layout import Layout, layout_of
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import balanced_variables, feasible_point
-from colloc.gaits.friction_unit import in_friction_units, in_unit
-from colloc.gaits.problem import Problem
+from colloc.gaits.control_problem import ControlProblem
 from colloc.numerics.sqp import Stationarity, stationarity
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
-from colloc.reduced.spaces import heading, space_near, transcribed
 from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
 from colloc.search.certify import ADMISSIBLE, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
@@ -34,6 +32,7 @@ from colloc.search.diagnosis import explanation
 from colloc.search.ipopt import NlpResult, Solver
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
+from colloc.search.spaces import heading, space_near, transcribed
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
@@ -91,7 +90,7 @@ def confirm(optimum: Optimum) -> Answer:
         reduced = found.program()
         outcome = _outcome(found, reduced, stationarity(reduced, found.v))
         program, result, confirmed = outcome.program, outcome.result, outcome.verdict is Verdict.CONFIRMED
-        answer = answer_of(optimum.problem, program, result, optimum.delta, reduced.unit)
+        answer = answer_of(program, result, optimum.delta)
         answer = replace(
             answer,
             program=optimum.problem.formulation if confirmed else REDUCED,
@@ -107,8 +106,8 @@ def confirm(optimum: Optimum) -> Answer:
 
 def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity) -> _Outcome:
     space, delta = optimum.space, optimum.delta
-    scaled, _ = in_friction_units(optimum.problem.with_(scheme=space.mesh.scheme.name))
-    program = transcribed(scaled, optimum.gait, space.phase_mesh(optimum.gait).edges, space.far)
+    mesh = space.phase_mesh(optimum.gait)
+    program = transcribed(optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.far)
     x = feasible_point(program, space.full_parameters(optimum.v), delta)
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, _OPTIONS)
@@ -156,11 +155,11 @@ def _sentence(optimum: Optimum, outcome: _Outcome) -> str:
     return f"{text} {outcome.ended}." if outcome.ended else text
 
 
-def answer_of(problem: Problem, program: GaitProgram, result: NlpResult, delta: float, unit: float) -> Answer:
-    """A point of a full program in units of friction, as an answer to the stated problem."""
+def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
+    """A point of a full program, as an answer to the stated problem."""
     gait = program.member(result.x[program.layout.parameters[:, 0]])
     answer = Answer(
-        problem,
+        program.control.problem,
         gait,
         delta,
         edges=program.phase_mesh(gait).edges,
@@ -169,8 +168,8 @@ def answer_of(problem: Problem, program: GaitProgram, result: NlpResult, delta: 
         x=result.x,
         lam_x=result.lam_x,
         lam_g=result.lam_g,
-        value=in_unit(-result.objective, unit, problem.objective),
-        **_of_period(problem, program.layout, result.x, unit),
+        value=program.control.stated(-result.objective),
+        **_of_period(program.control, program.layout, result.x),
         kkt_error=result.kkt_error,
         violation=result.violation,
         complementarity=result.complementarity,
@@ -178,16 +177,16 @@ def answer_of(problem: Problem, program: GaitProgram, result: NlpResult, delta: 
         optimal=result.optimal,
         iterations=result.iterations,
         seconds=result.seconds,
-        program=problem.formulation,
+        program=program.control.formulation,
     )
     return replace(answer, history=(answer.step,))
 
 
 def unconfirmed(optimum: Optimum) -> Answer:
     """The gait as the search found it, every other variable following from its balance: where there is no time for more."""
-    space, (scaled, unit) = optimum.space, in_friction_units(optimum.problem)
-    mesh, layout = space.phase_mesh(optimum.gait), problem_layout(scaled, space.mesh, space.knots)
-    x = balanced_variables(scaled, layout, mesh, optimum.gait, space.full_parameters(optimum.v), optimum.delta)
+    space, control = optimum.space, optimum.space.control
+    mesh, layout = space.phase_mesh(optimum.gait), layout_of(control, space.mesh, space.knots)
+    x = balanced_variables(control.dynamics, layout, mesh, optimum.gait, space.full_parameters(optimum.v), optimum.delta)
     return Answer(
         optimum.problem,
         optimum.gait,
@@ -199,7 +198,7 @@ def unconfirmed(optimum: Optimum) -> Answer:
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
         value=optimum.value,
-        **_of_period(optimum.problem, layout, x, unit),
+        **_of_period(control, layout, x),
         kkt_error=optimum.kkt_error,
         violation=optimum.violation,
         complementarity=optimum.complementarity,
@@ -211,10 +210,10 @@ def unconfirmed(optimum: Optimum) -> Answer:
     )
 
 
-def _of_period(problem: Problem, layout: Layout, x: np.ndarray, unit: float) -> dict[str, Any]:
+def _of_period(control: ControlProblem, layout: Layout, x: np.ndarray) -> dict[str, Any]:
     """Distance and work of a whole period, from variables in units of friction."""
-    distance, work = (float(x[row[0, -1]]) / problem.gait.fraction for row in (layout.distance, layout.work))
-    return {"distance": distance, "work": work * unit}
+    distance, work = (float(x[row[0, -1]]) / control.admissible.gait.fraction for row in (layout.distance, layout.work))
+    return {"distance": distance, "work": work * control.unit}
 
 
 def second_order(answer: Answer) -> SecondOrder:
@@ -239,7 +238,7 @@ def _limited(reduced: ReducedProgram, program: GaitProgram) -> GaitProgram:
 def _multipliers(reduced: ReducedProgram, conditions: Stationarity, program: GaitProgram) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
-    space, reached = reduced.space, len(reduced.space.problem.at_least)
+    space, reached = reduced.space, len(reduced.space.control.aims.at_least)
     of_period, on_rows = np.split(conditions.on_rows, [conditions.on_rows.size - space.row_lower.size])
     if reduced.actuators is not None:
         limited = reduced.actuators

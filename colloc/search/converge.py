@@ -16,8 +16,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
@@ -128,7 +128,7 @@ def optimum_at(
         seconds=seconds,
     )
     found = Optimum(
-        space.problem,
+        space.control.problem,
         space.given,
         space.far,
         v,
@@ -181,7 +181,7 @@ def converged(
     NotConvergedError
         If friction does not hold the body on its slope all the way.
     """
-    given = (space.problem, space.given, space.far, v, delta, radius, effort, curvature)
+    given = (space.control.problem, space.given, space.far, v, delta, radius, effort, curvature)
 
     def compute() -> Optimum:
         begin, here = time.perf_counter(), space
@@ -242,7 +242,7 @@ class Members(Protocol):
     """A class of gaits by parameters."""
 
     @property
-    def problem(self) -> Problem: ...
+    def control(self) -> ControlProblem: ...
 
     def member(self, parameters: np.ndarray) -> AnyGait:
         """The gait of a parameter vector."""
@@ -254,7 +254,8 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     Judged by plain intersection: the smooth `mechanics.contact.clearance` keeps a small distance, and constraining pairs that
     only touch makes problems harder for nothing (a folded chain of equal links has such contacts).
     """
-    body, t = space.problem.body, np.linspace(0.0, space.problem.gait.fraction, PHASES)
+    admissible = space.control.admissible
+    body, t = admissible.body, np.linspace(0.0, admissible.gait.fraction, PHASES)
     angles = space.member(v).angles(t)
     return tuple(
         pair

@@ -47,7 +47,7 @@ _STEPS, _SHARE = 2, 0.1
 def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
     """What a constraint row, by its index among all, states, and the phase at which it does."""
     name, rows = next((n, s) for n, s in transcription.groups.items() if s.start <= row < s.stop)
-    index, body, mesh = row - rows.start, transcription.problem.body, transcription.mesh
+    index, body, mesh = row - rows.start, transcription.control.dynamics.body, transcription.mesh
     if name in ("angles", "rates"):
         point, joint = divmod(index, body.n_joint)
         return f"the {name[:-1]} of {body.coordinate} {joint + 1} against its gait", float(mesh.times[point])
@@ -58,8 +58,8 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         point, which = divmod(index, body.n_force)
         return f"the friction law of the {body.force_names[which]}", float(mesh.times[point])
     if name == ACTUATORS:
-        point, which = divmod(index, len(transcription.problem.actuator_limits.names))
-        return f"the limit on the {transcription.problem.actuator_limits.names[which]}", float(mesh.times[point])
+        point, which = divmod(index, len(transcription.control.actuators.names))
+        return f"the limit on the {transcription.control.actuators.names[which]}", float(mesh.times[point])
     if name == "orientation":
         return "the rotation between nodes", float(mesh.edges[index * mesh.n // (rows.stop - rows.start)])
     if name == "rotation":
@@ -97,7 +97,7 @@ def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> 
     elif result.status == "still moving":
         failed, advice = "the gait kept moving from trust region to trust region", "start from a better guess"
     else:
-        what = transcription.problem.objective.name
+        what = transcription.control.aims.objective.name
         failed = f"every equation holds, but the {what} is not stationary (KKT error {result.kkt_error:.1e})"
         advice = "use more intervals, since kinks at stick may be under-resolved, or start from another guess"
         if delta < SMALLEST_DELTA:

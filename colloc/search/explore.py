@@ -23,16 +23,16 @@ from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import laid_into, latin_hypercube_gait, on_speed_floor, over_links
 from colloc.mechanics.chain import Chain
-from colloc.reduced.closure import closed_gait
 from colloc.reduced.program import ReducedProgram, SearchSpace
-from colloc.reduced.spaces import space_about, space_near
 from colloc.results.answer import Alternative
 from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
+from colloc.search.closure import closed_gait
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, as_it_is, converged
 from colloc.search.descend import FACTOR, descend, is_viscous, levels
 from colloc.search.optimum import ROUGH, SKETCH, Optimum
 from colloc.search.run import this_run
 from colloc.search.small_starts import small_loops
+from colloc.search.spaces import space_about, space_near
 from colloc.system.errors import CollocError, NotConvergedError
 
 STARTS, _ENOUGH, _MOST = 32, 8, 3
@@ -229,7 +229,7 @@ def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
 
 def _follow(space: SearchSpace, v: np.ndarray, deltas: list[float], known: list[list[Candidate]]) -> None:
     """Follow a start through the deltas until it comes through a known gait; what it finds is added to the known ones."""
-    problem = space.problem
+    problem = space.control.problem
     before, radius = None, FIRST_RADIUS
     for delta, here in zip(deltas, known, strict=True):
         found = converged(space, v, delta, radius, SKETCH)

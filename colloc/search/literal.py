@@ -12,9 +12,7 @@ import numpy as np
 
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.warm_start import feasible_point
-from colloc.gaits.friction_unit import in_friction_units
 from colloc.gaits.problem import Problem
-from colloc.reduced.spaces import heading, nearest_parameters, transcribed
 from colloc.results.answer import Answer, Step
 from colloc.search.confirm import answer_of, second_order
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS
@@ -23,6 +21,7 @@ from colloc.search.diagnosis import explanation, redundant_equations
 from colloc.search.ipopt import NlpResult, Solver
 from colloc.search.refine import MESHES
 from colloc.search.run import this_run
+from colloc.search.spaces import heading, nearest_parameters, transcribed
 from colloc.system.errors import ProblemError
 from colloc.verification.refinement import planned_mesh
 
@@ -49,13 +48,12 @@ def literal_answer(problem: Problem) -> Answer:
     """
     if problem.gait.mixes:
         raise ProblemError("relaxed gaits have no full program; leave --search full out.")
-    scaled, unit = in_friction_units(problem)
-    program = transcribed(scaled)
-    parameters, radius, history = nearest_parameters(program, scaled.guess), FIRST_RADIUS, tuple[Step, ...]()
-    below = levels(scaled, scaled.delta_start)
+    program = transcribed(problem)
+    parameters, radius, history = nearest_parameters(program, problem.guess), FIRST_RADIUS, tuple[Step, ...]()
+    below = levels(problem, problem.delta_start)
     for done, delta in enumerate(below):
         this_run().told("descend", done, len(below))
-        answer = _solved(problem, program, parameters, delta, radius, unit)
+        answer = _solved(program, parameters, delta, radius)
         history = (*history, answer.step)
         if not answer.optimal:
             return replace(answer, history=history)
@@ -65,12 +63,12 @@ def literal_answer(problem: Problem) -> Answer:
         this_run().told("refine", done, MESHES)
         gait = program.member(parameters)
         mesh = program.phase_mesh(gait)
-        plan = planned_mesh(problem, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
+        plan = planned_mesh(program.control, mesh, gait, delta * gait.delta_unit, problem.mesh_tolerance, kept=kept)
         if plan is None:
             break
         kept = np.concatenate([kept, plan.kept])
-        program = transcribed(scaled.with_(scheme=plan.scheme), gait, plan.edges)
-        answer = _solved(problem, program, nearest_parameters(program, gait), delta, NEXT_RADIUS, unit)
+        program = transcribed(problem, gait, plan.edges, plan.scheme)
+        answer = _solved(program, nearest_parameters(program, gait), delta, NEXT_RADIUS)
         history = (*history, answer.step)
         if not answer.optimal:
             return replace(answer, history=history)
@@ -78,17 +76,17 @@ def literal_answer(problem: Problem) -> Answer:
     return replace(answer, second_order=second_order(answer), history=history)
 
 
-def _solved(problem: Problem, program: GaitProgram, parameters: np.ndarray, delta: float, radius: float, unit: float) -> Answer:
+def _solved(program: GaitProgram, parameters: np.ndarray, delta: float, radius: float) -> Answer:
     """The full program solved from the gait of some parameters."""
 
     def compute() -> Answer:
         x = feasible_point(program, parameters, delta)
         solver = Solver(heading(program, x), {"max_iter": _ITERATIONS})
         result = solver.solve(x, delta, None, radius)
-        answer = answer_of(problem, program, result, delta, unit)
+        answer = answer_of(program, result, delta)
         return answer if result.optimal else replace(answer, message=_why(solver, x, result, delta))
 
-    given = (problem, parameters, delta, radius, program.mesh.edges, program.mesh.scheme.name)
+    given = (program.control.problem, parameters, delta, radius, program.mesh.edges, program.mesh.scheme.name)
     return this_run().kept("literal", given, compute)
 
 

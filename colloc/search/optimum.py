@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.gaits.friction_unit import in_friction_units, in_unit
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Pairs
 from colloc.reduced.given import Given
 from colloc.reduced.program import ReducedProgram, SearchSpace
-from colloc.reduced.spaces import space_of
 from colloc.results.answer import Step
+from colloc.search.spaces import space_of
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Optimum:
     @property
     def value(self) -> float:
         """Of the problem's objective."""
-        return in_unit(-self.objective, in_friction_units(self.problem)[1], self.problem.objective)
+        return control_problem(self.problem).stated(-self.objective)
 
     @property
     def optimal(self) -> bool:

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.collocation.layout import problem_layout
+from colloc.collocation.layout import layout_of
 from colloc.collocation.warm_start import balanced_variables
-from colloc.gaits.friction_unit import in_friction_units
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.polygon import Corners
@@ -52,7 +52,7 @@ def _on_a_fine_mesh(
     """The answer on a mesh that meets the problem's tolerance for a gait, and on which the phases `kept` are knots."""
     begin, mesh, message = time.perf_counter(), Mesh(scheme(problem.scheme), edges), ""
     for _ in range(MESHES if problem.mesh_tolerance > 0 else 0):
-        plan = planned_mesh(problem, mesh, gait, problem.delta, problem.mesh_tolerance, kept=kept)
+        plan = planned_mesh(control_problem(problem), mesh, gait, problem.delta, problem.mesh_tolerance, kept=kept)
         if plan is None:
             break
         mesh = Mesh(scheme(plan.scheme), plan.edges)
@@ -71,9 +71,9 @@ def realised(problem: Problem, gait: Corners, history: tuple[Step, ...]) -> Answ
 
 def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray, word: str) -> Answer:
     """A gait with everything else following from its balance."""
-    scaled, unit = in_friction_units(problem)
-    layout = problem_layout(scaled, mesh)
-    x = balanced_variables(scaled, layout, mesh, gait, parameters, problem.delta)
+    control = control_problem(problem)
+    layout = layout_of(control, mesh)
+    x = balanced_variables(control.dynamics, layout, mesh, gait, parameters, problem.delta)
     periods = 1.0 / problem.gait.fraction
     distance, work = (periods * float(x[row[0, -1]]) for row in (layout.distance, layout.work))
     return Answer(
@@ -86,9 +86,9 @@ def as_it_is(problem: Problem, mesh: Mesh, gait: AnyGait, parameters: np.ndarray
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
-        value=distance / (work * unit),
+        value=distance / (work * control.unit),
         distance=distance,
-        work=work * unit,
+        work=work * control.unit,
         kkt_error=0.0,
         violation=0.0,
         complementarity=0.0,

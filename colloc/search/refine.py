@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.reduced.program import ReducedProgram, SearchSpace
-from colloc.reduced.spaces import space_of
 from colloc.search.certify import NOWHERE
 from colloc.search.converge import NEXT_RADIUS, converged
 from colloc.search.optimum import FINE, ROUGH, Optimum, replace_keeping_space
 from colloc.search.run import this_run
+from colloc.search.spaces import space_of
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
@@ -44,7 +44,7 @@ class _Meshes:
         problem, gait, late = optimum.problem, optimum.gait, max(0, self.count - _SAME_AIM)
         mesh = optimum.space.phase_mesh(gait)
         return planned_mesh(
-            problem,
+            optimum.space.control,
             mesh,
             gait,
             optimum.delta * gait.delta_unit,

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
@@ -70,7 +71,7 @@ def prices(found: Optimum) -> tuple[np.ndarray, np.ndarray]:
         mixture.start,
         mixture.symmetry,
     )
-    wide = MixtureSpace(space.problem, space.pieces, space.far, directions=more.durations.shape[1])
+    wide = MixtureSpace(space.control, space.pieces, space.far, directions=more.durations.shape[1])
     w = wide.parameters(more)
     wide.move_checks(w)
     on_rows = stationarity(found.program(), found.v).on_rows
@@ -91,7 +92,7 @@ def with_turned_directions(found: Optimum, pieces: int) -> tuple[MixtureSpace, n
             # the next one on another side
             best = best[best @ best[0] < 0.5]
     turned = Mixture(mixture.durations, directions, mixture.start, mixture.symmetry).split(pieces)
-    space = MixtureSpace(found.problem, len(turned.durations), found.far)
+    space = MixtureSpace(found.space.control, len(turned.durations), found.far)
     return space, space.parameters(turned)
 
 
@@ -165,7 +166,7 @@ def _tried(problem: Problem, gait: AnyGait, pieces: int) -> Optimum:
     if isinstance(gait, Mixture):
         gait = gait.split(pieces)
         pieces = len(gait.durations)
-    space = MixtureSpace(problem, pieces)
+    space = MixtureSpace(control_problem(problem), pieces)
     first, *others = levels(problem, problem.delta_start)
     found = converged(space, space.parameters(gait), first, FIRST_RADIUS, SKETCH)
     for delta in others[:1]:

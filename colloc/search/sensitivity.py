@@ -23,7 +23,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
-from colloc.reduced.spaces import space_about, space_near, space_of
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
@@ -31,6 +30,7 @@ from colloc.search.choose import solution_of
 from colloc.search.converge import NEXT_RADIUS, converged
 from colloc.search.optimum import FINE, ROUGH
 from colloc.search.solve import finished
+from colloc.search.spaces import space_about, space_near, space_of
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import Replay
 from colloc.verification.replayer import replayer
@@ -350,7 +350,7 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
     found = solution_of(problem, finished(converged(space, v, delta, NEXT_RADIUS, ROUGH)))
     best = found.certificate if found.success else UNCERTIFIED
     at = problem.body, problem.law, gait, delta * gait.delta_unit
-    kept = replayer(problem)(*at, breaks=gait.corner_phases, objective=problem.objective)
+    kept = replayer(problem.slope, problem.froude)(*at, breaks=gait.corner_phases, objective=problem.objective)
     breaks = "; ".join(_broken(problem, kept, ReducedProgram(space, delta).place_rows(v)))
     return Again(change, best.value, best.value_error, found.status, kept.value, kept.error * abs(kept.value), breaks)
 

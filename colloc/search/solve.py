@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.problem import Problem
-from colloc.reduced.actuator_demand import check_actuators_suffice
-from colloc.reduced.spaces import space_about
 from colloc.results.answer import Answer
 from colloc.results.solution import Solution
+from colloc.search.actuator_demand import check_actuators_suffice
 from colloc.search.certify import SADDLE, Certified, certify, is_trivial
 from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
@@ -33,6 +32,7 @@ from colloc.search.prescribed import prescribed_answer
 from colloc.search.refine import refine
 from colloc.search.relaxed import RELAXED_STARTS, explore_relaxed, realised_solution, unrefined
 from colloc.search.run import Progress, Run, this_run
+from colloc.search.spaces import space_about
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.interruption import heeded
 

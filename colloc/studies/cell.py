@@ -13,11 +13,11 @@ import numpy as np
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, laid_into, start_gait
-from colloc.reduced.closure import closed_gait
-from colloc.reduced.spaces import space_near
 from colloc.results.distinct_optima import fourier_series, phase_distance
 from colloc.results.outcome import ERROR, Outcome
 from colloc.results.solution import SOLVED
+from colloc.search.closure import closed_gait
+from colloc.search.spaces import space_near
 from colloc.studies.campaign import run_guess
 from colloc.system.errors import CollocError
 from colloc.verification.replayer import replayer
@@ -117,7 +117,7 @@ def value_as_it_is(problem: Problem, gait: AnyGait, instants: int = _INSTANTS, m
     200 instants are within 3e-4 of 1,600 for the ellipse of efficiency 0.26 and delta from 1e-2 to 1e-4.
     """
     try:
-        found = replayer(problem)(
+        found = replayer(problem.slope, problem.froude)(
             problem.body,
             problem.law,
             gait,

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.gaits.problem import Problem
+from colloc.gaits.control_problem import ControlProblem, Dynamics
 from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.inertia import checked_mass
 from colloc.motion.collocated import CollocatedPose, stage_weights
-from colloc.motion.kinds import OMEGA, Along, Passed, Shapes, begin_of, first_theta, kind_of_motion
+from colloc.motion.kinds import OMEGA, Along, Kind, Passed, Shapes, begin_of, first_theta, kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.gait_on_slope import GaitOnSlope
@@ -48,27 +48,28 @@ class CourseOfGait(NamedTuple):
     error: float
 
 
-def course(problem: Problem, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
+def course(dynamics: Dynamics, gait: Any, delta: float, mesh: Mesh, error: float) -> CourseOfGait:
     """The motion of a gait without breaks, delta per period; with inertia it is sought near the one on a mesh."""
-    body, friction = problem.body, problem.law
-    if problem.slope is not None:
-        grade = problem.slope.grade
+    body, friction, slope, froude, _ = dynamics
+    if slope is not None:
+        grade = slope.grade
         on = GaitOnSlope(checked_chain(body, friction, grade), friction, gait, delta, (), grade)
         ran = on.followed(np.array([gait.theta, 0.0, 0.0, 0.0, 0.0, 0.0]), error)
         return CourseOfGait(lambda t: ran.at(t)[:4], error)
-    played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=problem.froude)
-    ran = played.settled(_along(problem, mesh, gait, delta).edges[:, 0], error)
+    played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=froude)
+    ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
     return CourseOfGait(lambda t: ran.at(t)[3:], error)
 
 
-def _along(problem: Problem, mesh: Mesh, gait: Any, delta: float) -> Along:
-    kind, (angles, rates) = kind_of_motion(problem), gait(mesh.times)
+def _along(kind: Kind, mesh: Mesh, gait: Any, delta: float) -> Along:
+    angles, rates = gait(mesh.times)
     return kind.along(mesh, Shapes(angles, rates, delta), begin_of(kind, gait))
 
 
-def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> Defects:
+def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float, exact: CourseOfGait) -> Defects:
     """Errors of collocating a gait whose motion has states, delta per period."""
-    kind, own = kind_of_motion(problem), _along(problem, mesh, gait, delta)
+    kind, objective = kind_of_motion(control.dynamics), control.aims.objective
+    own = _along(kind, mesh, gait, delta)
     pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA], own.now.centre, first_theta(kind, own.begin))
     passed = np.linalg.norm(gait(mesh.times)[1], axis=0)
     spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))
@@ -76,7 +77,7 @@ def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact:
         spent = np.nan * spent
     at_edges = exact.at(mesh.edges)
     theta, x, y, work = np.diff(at_edges, axis=1)
-    length, periods = path_lengths(gait, mesh.edges[:-1], mesh.edges[1:], 4), 1.0 / problem.gait.fraction
+    length, periods = path_lengths(gait, mesh.edges[:-1], mesh.edges[1:], 4), kind.periods
     rotation, energy, way = pose.rotations - theta, spent - work, np.diff(pose.place)
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()))
     found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()))
@@ -88,7 +89,7 @@ def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact:
         displacement = way * turned_back - (x + 1j * y) + 1j * rotation * (0.5 * place[-1] - place[1:])
     period = kind.counted(true) | {"length": periods * float(length.sum()), "driven_work": np.nan}
     other = kind.counted(found) | {"length": periods * float(run.sum()), "driven_work": np.nan}
-    aims, value = problem.objective.shares(period), np.zeros(mesh.n)
+    aims, value = objective.shares(period), np.zeros(mesh.n)
     for name, share in kind.shares(true).items():
         turns = rotation if name == "rotation" else 0.0
         value += aims.get(name, 0.0) * ((np.conj(share.side) * displacement).real + turns + share.work * energy)
@@ -100,7 +101,7 @@ def course_defects(problem: Problem, mesh: Mesh, gait: Any, delta: float, exact:
         energy,
         np.full(mesh.n, np.nan),
         value,
-        float(problem.objective(other) / problem.objective(period) - 1),
+        float(objective(other) / objective(period) - 1),
         float(exact.error * sum(map(abs, aims.values()))),
-        turned if problem.gait.symmetry == NONE else 0.0,
+        turned if control.admissible.gait.symmetry == NONE else 0.0,
     )

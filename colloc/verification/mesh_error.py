@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.gaits.control_problem import Admissible, ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
-from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.motion.collocated import CollocatedPose
 from colloc.motion.heading import heading
@@ -47,7 +47,7 @@ class MeshError:
     """Largest error between the nodes of the interpolated velocity of the tail or, times a body length, of its rotation rate
     [body lengths per period], ``(n,)``."""
     value: np.ndarray
-    """Contribution to the error of the problem's objective, relative to its magnitude, signed, to first order, ``(n,)``."""
+    """Contribution to the error of the objective, relative to its magnitude, signed, to first order, ``(n,)``."""
     violation: np.ndarray
     """Largest excess over a joint limit [rad] or penetration of links [rad or body lengths] inside the interval, ``(n,)``."""
     total: float
@@ -66,66 +66,66 @@ class MeshError:
 
 
 class Known(NamedTuple):
-    """A gait of a problem, delta per period, and its motion (`gait_motion`)."""
+    """A gait, delta per period, and its motion (`gait_motion`)."""
 
-    problem: Problem
+    control: ControlProblem
     gait: AnyGait
     delta: float
     fine: Any
 
 
-def gait_motion(problem: Problem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float) -> Any:
+def gait_motion(control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float) -> Any:
     """The gait's motion on adaptive panels, a `FineMotion`; where it has states, a `CourseOfGait`."""
-    if kind_of_motion(problem).states:
-        return course(problem, gait, delta, mesh, _OF_WAY * tolerance)
-    length = _whole_length(problem, gait)
+    if kind_of_motion(control.dynamics).states:
+        return course(control.dynamics, gait, delta, mesh, _OF_WAY * tolerance)
+    length = _whole_length(control, gait)
 
     def shares(part: Mapping[str, float]) -> dict[str, float]:
-        return _shares(problem, part, length)
+        return _shares(control, part, length)
 
-    of = (problem.body, problem.law, gait)
-    return fine_motion(*of, delta, mesh.edges, tolerance, shares, problem.uses("driven_work"))
+    of = (*control.dynamics[:2], gait)
+    return fine_motion(*of, delta, mesh.edges, tolerance, shares, control.aims.uses("driven_work"))
 
 
-def _period(problem: Problem, part: Mapping[str, float], length: float) -> dict[str, float]:
+def _period(control: ControlProblem, part: Mapping[str, float], length: float) -> dict[str, float]:
     """What a whole period comes to, from distance, work, rotation and driven work of the part that is solved."""
-    whole = {name: part[name] / problem.gait.fraction for name in ("distance", "work", "driven_work")}
+    whole = {name: part[name] / control.admissible.gait.fraction for name in ("distance", "work", "driven_work")}
     return whole | {"rotation": part["rotation"], "length": length}
 
 
-def _shares(problem: Problem, part: Mapping[str, float], length: float) -> dict[str, float]:
+def _shares(control: ControlProblem, part: Mapping[str, float], length: float) -> dict[str, float]:
     """What a small change of each quantity of the solved part changes in the objective, relative to it."""
-    shares = problem.objective.shares(_period(problem, part, length))
-    return {name: share if name == "rotation" else share / problem.gait.fraction for name, share in shares.items()}
+    shares = control.aims.objective.shares(_period(control, part, length))
+    return {name: share if name == "rotation" else share / control.admissible.gait.fraction for name, share in shares.items()}
 
 
-def _whole_length(problem: Problem, gait: AnyGait) -> float:
+def _whole_length(control: ControlProblem, gait: AnyGait) -> float:
     """Length of the path over a period [rad]; 1 where nobody asks for it."""
-    if not problem.uses("length"):
+    if not control.aims.uses("length"):
         return 1.0
-    return gait.length if problem.gait.unit_speed else whole_length(gait)[0]
+    return gait.length if control.admissible.gait.unit_speed else whole_length(gait)[0]
 
 
 def mesh_error(
-    problem: Problem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float = 1e-6, fine: Any = None
+    control: ControlProblem, mesh: Mesh, gait: AnyGait, delta: float, tolerance: float = 1e-6, fine: Any = None
 ) -> MeshError:
     """Errors of collocating a gait on a mesh, with delta per period; relative ones below the tolerance need not be exact.
     `fine` is the gait's motion, if it is known. `NotConvergedError` if the balance cannot be solved at some instant."""
     if fine is None:
-        fine = gait_motion(problem, gait, delta, mesh, FINER * tolerance)
-    if kind_of_motion(problem).states:
-        off, violation = course_defects(problem, mesh, gait, delta, fine), constraint_violation(problem, mesh, gait)
+        fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
+    if kind_of_motion(control.dynamics).states:
+        off, violation = course_defects(control, mesh, gait, delta, fine), constraint_violation(control.admissible, mesh, gait)
         return MeshError(off.rotation, np.abs(off.displacement), off.work, off.velocity, off.value, violation, *off[5:])
-    known = Known(problem, gait, delta, fine)
+    known = Known(control, gait, delta, fine)
     own = _collocated_intervals(known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:])
-    exact = problem.objective(_period(problem, _fine_part(known), _whole_length(problem, gait)))
+    exact = control.aims.objective(_period(control, _fine_part(known), _whole_length(control, gait)))
     return MeshError(
         own.rotation,
         np.abs(own.displacement),
         own.work,
         _velocity_error(mesh, own.rates, fine),
         own.value,
-        constraint_violation(problem, mesh, gait),
+        constraint_violation(control.admissible, mesh, gait),
         _collocated_value(known, own) / exact - 1,
         float(fine.unresolved.sum()),
         abs(float(_turning(known, own).sum())),
@@ -154,10 +154,10 @@ class _Own(NamedTuple):
 
 
 def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Own:
-    problem, gait, delta, fine = known
+    control, gait, delta, fine = known
     nodes = left[:, None] + (right - left)[:, None] * rule.c
-    at = problem.body, problem.law, gait, delta, nodes
-    rates = rates_at(*at, fine.velocity(nodes), problem.uses("driven_work"))
+    at = *control.dynamics[:2], gait, delta, nodes
+    rates = rates_at(*at, fine.velocity(nodes), control.aims.uses("driven_work"))
     pose, weights = CollocatedPose(rule, right - left, rates.z[2], rates.centre), (right - left)[:, None] * rule.b
     spent, delivered = (weights * rates.power).sum(axis=1), (weights * rates.driven).sum(axis=1)
     (theta, path, work, driven), (theta_right, path_right, work_right, driven_right) = fine.at(left), fine.at(right)
@@ -165,11 +165,11 @@ def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: n
     displacement = pose.displacements * np.exp(1j * theta) - (path_right - path)
     # an error of rotation turns everything after it, and by half of it the direction that counts
     pull = displacement + 1j * rotation * (0.5 * fine.path[-1] - path_right)
-    direction, length = _direction(problem, fine.path[-1], fine.theta[-1]), np.zeros(left.size)
-    if problem.uses("length") and not problem.gait.unit_speed:  # else arc length is the clock, and exact
+    direction, length = _direction(control, fine.path[-1], fine.theta[-1]), np.zeros(left.size)
+    if control.aims.uses("length") and not control.admissible.gait.unit_speed:  # else arc length is the clock, and exact
         pace = np.linalg.norm(gait.rates(nodes.ravel()), axis=0).reshape(nodes.shape)
         length = (right - left) * (pace @ rule.b) - path_lengths(gait, left, right, 4)
-    shares = _shares(problem, _fine_part(known), _whole_length(problem, gait))
+    shares = _shares(control, _fine_part(known), _whole_length(control, gait))
     ahead = (pull * np.conj(direction)).real
     value = shares["distance"] * ahead + shares["work"] * energy + shares["rotation"] * rotation + shares["length"] * length
     value += shares["driven_work"] * (delivered - (driven_right - driven))
@@ -178,31 +178,31 @@ def _collocated_intervals(known: Known, rule: Scheme, left: np.ndarray, right: n
 
 def _turning(known: Known, own: _Own) -> np.ndarray:
     """Rotation missed by intervals, times the body's reach over the distance, ``(n,)``."""
-    return own.rotation * (0.5 / abs(known.fine.path[-1]) if known.problem.gait.symmetry == NONE else 0.0)
+    return own.rotation * (0.5 / abs(known.fine.path[-1]) if known.control.admissible.gait.symmetry == NONE else 0.0)
 
 
-def _part(problem: Problem, end: complex, work: float, rotation: float, driven_work: float) -> dict[str, float]:
-    distance = float((end * np.conj(_direction(problem, end, rotation))).real)
+def _part(control: ControlProblem, end: complex, work: float, rotation: float, driven_work: float) -> dict[str, float]:
+    distance = float((end * np.conj(_direction(control, end, rotation))).real)
     return {"distance": distance, "work": float(work), "rotation": float(rotation), "driven_work": float(driven_work)}
 
 
 def _fine_part(known: Known) -> dict[str, float]:
     """What the solved part comes to."""
     fine = known.fine
-    return _part(known.problem, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
+    return _part(known.control, fine.path[-1], fine.work[-1], fine.theta[-1], fine.driven_work[-1])
 
 
 def _collocated_value(known: Known, own: _Own) -> float:
     """The objective as the scheme sees it."""
-    problem = known.problem
-    part = _part(problem, own.pose.place[-1], own.spent, own.pose.theta[-1], own.delivered)
-    length = _whole_length(problem, known.gait) + float(own.length.sum()) / problem.gait.fraction
-    return problem.objective(_period(problem, part, length))
+    control = known.control
+    part = _part(control, own.pose.place[-1], own.spent, own.pose.theta[-1], own.delivered)
+    length = _whole_length(control, known.gait) + float(own.length.sum()) / control.admissible.gait.fraction
+    return control.aims.objective(_period(control, part, length))
 
 
-def _direction(problem: Problem, end: complex, rotation: float) -> complex:
+def _direction(control: ControlProblem, end: complex, rotation: float) -> complex:
     """Unit vector along which the solved part's displacement counts."""
-    return np.exp(1j * heading(problem.gait.motion_symmetry, end, rotation))
+    return np.exp(1j * heading(control.dynamics.symmetry, end, rotation))
 
 
 def _velocity_error(mesh: Mesh, rates: Rates, fine: FineMotion) -> np.ndarray:
@@ -214,11 +214,11 @@ def _velocity_error(mesh: Mesh, rates: Rates, fine: FineMotion) -> np.ndarray:
     return largest
 
 
-def constraint_violation(problem: Problem, mesh: Mesh, gait: AnyGait) -> np.ndarray:
+def constraint_violation(admissible: Admissible, mesh: Mesh, gait: AnyGait) -> np.ndarray:
     """Largest excess over a joint limit or penetration of any two links inside each interval, ``(n_interval,)``; 0 if none."""
     t = (mesh.edges[:-1, None] + mesh.h[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)).ravel()
-    angles, body = gait.angles(t), problem.body
-    stretched, limit = under_one_limit(angles, problem.joint_limit)
+    angles, body = gait.angles(t), admissible.body
+    stretched, limit = under_one_limit(angles, admissible.joint_limit)
     rows = [
         np.abs(body.limited @ stretched).max(axis=0, initial=0.0) - limit,
         body.crossing_depth(angles, body.far_pairs),

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.problem import Problem
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
@@ -66,10 +66,10 @@ class MeshPlan:
     """Phases that have to stay knots: they split intervals in which a constraint was violated."""
 
 
-def kink_knots(problem: Problem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
+def kink_knots(control: ControlProblem, gait: AnyGait, delta: float, fine: FineMotion) -> np.ndarray:
     """Phases of the kinks of a gait's velocities, one for each group of very close ones."""
-    kinks = kink_phases(problem.body, problem.law, gait, delta, fine)
-    apart = _ONE_KINK * problem.gait.fraction
+    kinks = kink_phases(*control.dynamics[:2], gait, delta, fine)
+    apart = _ONE_KINK * control.admissible.gait.fraction
     knots: list[float] = []
     for kink in kinks:
         if not knots or kink - knots[-1] > apart:
@@ -97,7 +97,7 @@ def moved_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np
 
 
 def planned_mesh(
-    problem: Problem,
+    control: ControlProblem,
     mesh: Mesh,
     gait: AnyGait,
     delta: float,
@@ -112,7 +112,7 @@ def planned_mesh(
 
     Parameters
     ----------
-    problem : Problem
+    control : ControlProblem
     mesh : Mesh
         The mesh the gait was found on.
     gait : AnyGait
@@ -135,26 +135,26 @@ def planned_mesh(
     NotConvergedError
         If the balance cannot be solved at some instant.
     """
-    fine = gait_motion(problem, gait, delta, mesh, FINER * tolerance)
-    known, error = Known(problem, gait, delta, fine), mesh_error(problem, mesh, gait, delta, tolerance, fine)
+    fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
+    known, error = Known(control, gait, delta, fine), mesh_error(control, mesh, gait, delta, tolerance, fine)
     accurate = error.estimate <= _GOOD * tolerance and error.turning <= TURNING
     if accurate and error.violation.max() <= VIOLATION:
         return None
     knots = np.union1d(violated_middles(mesh, error), [] if kept is None else kept)
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
-    if kind_of_motion(problem).states:
+    if kind_of_motion(control.dynamics).states:
         return _halved(known, mesh.scheme, knots, tolerance, aim, most_points)
-    given = scheme(problem.scheme)
-    kinks = kink_knots(problem, gait, delta, fine)
-    switches = not problem.law.reversible
+    given = scheme(control.scheme)
+    kinks = kink_knots(control, gait, delta, fine)
+    switches = not control.dynamics.law.reversible
     best: MeshPlan | None = None
     for rule in _family(given):
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself kinked
         on_knots = kinks[:0] if switches and (rule.left or rule.right) else kinks
         # knots of a path are where its arcs and sides end: there they may be added, not moved
-        snap = _SNAP if problem.gait.moves_knots and not nested else 0.0
-        first = np.union1d(mesh.edges if nested else problem.gait.first_edges(mesh.edges), knots)
+        snap = _SNAP if control.admissible.gait.moves_knots and not nested else 0.0
+        first = np.union1d(mesh.edges if nested else control.admissible.gait.first_edges(mesh.edges), knots)
         edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
         plan = _split(known, rule, edges, knots, on_knots, tolerance, aim, budget)
@@ -229,10 +229,10 @@ def _split(
 
 def _halved(known: Known, rule: Scheme, kept: np.ndarray, tolerance: float, aim: float, most_points: int) -> MeshPlan:
     """A uniform mesh whose intervals with the largest errors are halved until all together are small enough."""
-    problem, gait, delta, fine = known
-    edges = np.union1d(np.linspace(0.0, problem.gait.fraction, problem.intervals + 1), kept)
+    control, gait, delta, fine = known
+    edges = np.union1d(np.linspace(0.0, control.admissible.gait.fraction, control.intervals + 1), kept)
     while True:
-        error = mesh_error(problem, Mesh(rule, edges), gait, delta, tolerance, fine)
+        error = mesh_error(control, Mesh(rule, edges), gait, delta, tolerance, fine)
         shares = np.abs(error.value)
         if shares.sum() <= aim * tolerance or edges.size * rule.s > most_points or np.isnan(shares).any():
             return MeshPlan(rule.name, edges, error.estimate, error.estimate <= tolerance, kept)

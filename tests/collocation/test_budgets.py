@@ -10,6 +10,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ellipse, solve_balance
 from colloc.collocation.point_equations import point_function
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.control_problem import control_problem
 from colloc.numerics.blocks import oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers, quasi_definite_factors
 from colloc.search.ipopt import Solver
@@ -41,7 +42,7 @@ def test_nonzeros_grow_by_so_many_for_every_interval(formulation, jacobian, hess
         problem = Problem(
             "p", ellipse(0.3, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=intervals, formulation=formulation
         )
-        options = oracles(transcribe(problem).assembly).options
+        options = oracles(transcribe(control_problem(problem)).assembly).options
         counts.append((options["jac_g"].nnz_out(1), options["hess_lag"].nnz_out(0)))
     growth = np.diff(counts, axis=0)[0] / 20
     assert growth[0] <= jacobian
@@ -54,7 +55,7 @@ def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_m
     fill = []
     for intervals in (20, 40):
         problem = Problem("p", ellipse(0.3, 1, 0.5), intervals=intervals, formulation=formulation)
-        solver = Solver(transcribe(problem))
+        solver = Solver(transcribe(control_problem(problem)))
         t = solver.transcription
         x = feasible_point(t, problem.gait.parameters(problem.guess), 0.1)
         jacobian, _ = solver.equality_jacobian(x, 0.1)
@@ -106,7 +107,7 @@ def test_balance_solves_an_iteration_asks_for():
     from colloc.search.ipopt import Solver
 
     problem = Problem("p", ellipse(0.3, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=12)
-    solver = Solver(transcribe(problem))
+    solver = Solver(transcribe(control_problem(problem)))
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
     result = solver.solve(x, 0.1, radius=1.0)
     assert result.optimal

@@ -8,6 +8,7 @@ from shared.differences import assert_derivatives_are_differences
 from colloc.collocation.layout import RADIANS
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
@@ -18,7 +19,7 @@ SCHEMES = ["gauss-3", "radau-2", "trapezoid", "hermite-simpson"]
 
 def program(problem, delta):
     """Transcription, oracles, a feasible point, NLP parameters, and the function (x, p) -> (f, g)."""
-    transcription = transcribe(problem)
+    transcription = transcribe(control_problem(problem))
     found = oracles(transcription.assembly)
     parameters = problem.gait.parameters(problem.guess)
     x = feasible_point(transcription, parameters, delta)
@@ -80,7 +81,7 @@ def test_schemes_converge_at_their_order_away_from_stick(name, order):
 
 def test_the_program_without_symmetry_closes_its_rotation_and_with_one_has_no_such_row():
     groups = {
-        symmetry: transcribe(Problem("p", ellipse(0, 1, 0.5), gait=Harmonic(1, symmetry), intervals=6)).groups
+        symmetry: transcribe(control_problem(Problem("p", ellipse(0, 1, 0.5), gait=Harmonic(1, symmetry), intervals=6))).groups
         for symmetry in ("none", "bilateral", "antipodal")
     }
     assert "rotation" in groups["none"]
@@ -102,7 +103,7 @@ def test_no_equation_is_redundant():
 def test_local_functions_do_not_grow_with_the_mesh():
     def nodes(intervals):
         problem = Problem("p", ellipse(0, 1, 0.5), gait=Harmonic(1, "bilateral"), intervals=intervals)
-        point = transcribe(problem).assembly.blocks[0].function
+        point = transcribe(control_problem(problem)).assembly.blocks[0].function
         return point.hessian.n_instructions()
 
     assert nodes(6) == nodes(60)

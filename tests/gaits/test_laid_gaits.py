@@ -8,8 +8,8 @@ from colloc.gaits.path_samples import path_length
 from colloc.gaits.starts import laid_into, over_links, prolonged
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.mechanics.contact import crossing_depth
-from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.search.solve import solve
+from colloc.search.spaces import nearest_parameters, transcribed
 from colloc.system.errors import ProblemError
 from scripts.class_rows import FEWER, equal_links, named_gait, rows
 

@@ -9,7 +9,7 @@ from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.gait_fields import class_from, fields, gait_from
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
+from colloc.search.spaces import space_near
 
 T = np.arange(200) / 200
 PHASES = np.arange(96) / 96

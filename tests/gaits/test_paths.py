@@ -14,7 +14,7 @@ from colloc.gaits.starts import prolonged
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.numerics.arcs import advance, direction
-from colloc.reduced.spaces import nearest_parameters, transcribed
+from colloc.search.spaces import nearest_parameters, transcribed
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.replay import replay
 

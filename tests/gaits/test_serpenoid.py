@@ -7,9 +7,9 @@ from colloc import Chain, Fourier, Friction, Harmonic, Problem, ProblemError, Se
 from colloc.collocation.warm_start import feasible_point
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near, transcribed
 from colloc.results.store import load, save
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near, transcribed
 
 FIVE = Chain((0.2,) * 5)
 SNAKE = Friction(mu_t=10, mu_f=1, mu_b=1)
@@ -56,7 +56,7 @@ def test_gradients_are_those_of_finite_differences(gait_class):
 def test_the_full_program_says_what_the_search_does(gait_class):
     """At a member all its equations hold, and the objectives agree; with another lag it is no member."""
     space, v = moved(gait_class)
-    reduced, full = ReducedProgram(space, 1e-2), transcribed(space.problem)
+    reduced, full = ReducedProgram(space, 1e-2), transcribed(space.control.problem)
     x = feasible_point(full, space.full_parameters(v), 1e-2)
     found = oracles(full.assembly)
     p = found.parameter_vector(1e-2 / full.speed_unit, full.block_parameters(x[full.layout.parameters[:, 0]]))

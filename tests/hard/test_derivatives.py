@@ -10,6 +10,7 @@ from cases import HARD
 
 from colloc.collocation.point_equations import point_function
 from colloc.collocation.transcription import transcribe
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant
@@ -109,7 +110,7 @@ def other_blocks():
     """Every block but the point function, by name, from a transcription of three unequal links."""
     guess = Fourier([0.2, -0.1], [[0.8, 0.1], [-0.5, 0.2]], [[0.1, 0.3], [0.6, -0.2]])
     problem = Problem("p", guess, body=Chain((0.3, 0.45, 0.25)), gait=Harmonic(2), intervals=8)
-    chain = transcribe(problem).assembly
+    chain = transcribe(control_problem(problem)).assembly
     chain_names = ["joint 1", "joint 2", "links (left)", "links (right)", "shape speed"]
     yield "objective", chain.objective
     yield from zip(chain_names, chain.blocks[1:], strict=True)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import shape_checks
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -104,7 +104,7 @@ def corner_peak(gait):
     """The check at the corner, the instant of its peak, and the peak's height, on a mesh of 40 intervals."""
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
     check = next(c for c in shape_checks(problem.body) if c.name.endswith("(left)"))
-    times = worst_instants(gait, problem_mesh(problem), [check], np.pi)[0]
+    times = worst_instants(gait, control_problem(problem).mesh(), [check], np.pi)[0]
     values = check_values(check, gait, times)
     return check, times[[np.argmax(values)]], values.max()
 

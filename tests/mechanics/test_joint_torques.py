@@ -7,6 +7,7 @@ from shared.instants import random_instants
 from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.transcription import transcribe
+from colloc.gaits.control_problem import control_problem
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power, joint_moments
 
 ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
@@ -32,7 +33,7 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
 def test_torques_are_limited_both_ways_and_powers_one_way():
     """In the program's bounds, and in what a replay tells: a gait in a mirror needs the same torques the other way round."""
     np.testing.assert_array_equal(ONE.least, [-1.0, -1.0, -np.inf, -np.inf])
-    program = transcribe(Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6))
+    program = transcribe(control_problem(Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6)))
     rows = program.groups[ACTUATORS]
     assert set(program.constraint_upper[rows]) == {1.0}
     assert sorted(set(program.constraint_lower[rows])) == [-np.inf, -1.0]

@@ -6,14 +6,15 @@ import pytest
 import colloc
 from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import kinetic_energy, momentum_rates, momentum_slopes
 from colloc.motion.kinds import WithInertia
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
 from colloc.search.converge import converged
 from colloc.search.optimum import ROUGH
 from colloc.search.small_starts import small_loops
+from colloc.search.spaces import space_near
 from colloc.verification.inertial_motion import GaitWithInertia
 from colloc.verification.inertial_replay import inertial_replay
 from colloc.verification.mesh_error import mesh_error
@@ -61,7 +62,7 @@ def test_derivatives_along_the_momenta_are_those_of_differences(body, friction):
 def test_shooting_and_collocation_find_the_same_motion(froude):
     """One by steps of its own through time, one for all instants at once."""
     reduced, v = program(problem(froude=froude, intervals=200))
-    stated = reduced.space.problem
+    stated = reduced.space.control.problem
     shot = colloc.inertial_motion(stated.body, stated.law, reduced.space.member(v), 1e-2, froude)
     found = reduced.period(v)
     assert shot.stable
@@ -182,7 +183,7 @@ def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
     """Each has an error of its own, though the body turns, and what comes later with it."""
     stated = problem(intervals=12, delta=0.1, objective="efficiency")
     space, v = space_near(stated, LEANING)
-    error = mesh_error(stated, space.mesh, space.member(v), 0.1, 1e-5)
+    error = mesh_error(control_problem(stated), space.mesh, space.member(v), 0.1, 1e-5)
     assert error.value.sum() == pytest.approx(error.total, rel=0.1)
     assert abs(error.total) > 1e-5
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from colloc import Chain, Corners, Fourier, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
-from colloc.collocation.layout import problem_mesh
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import Objective
 from colloc.mechanics.actuators import ActuatorLimits
 from colloc.numerics.mesh import Mesh
@@ -93,9 +93,11 @@ FOUR_LINKS = Chain((0.2, 0.3, 0.3, 0.2))
 
 
 def _plans(stated, gait, tolerances=(1e-3, 1e-5)):
-    mesh = problem_mesh(stated)
-    plans = [planned_mesh(stated, mesh, gait, stated.delta, tolerance, most_points=600) for tolerance in tolerances]
-    return mesh_error(stated, mesh, gait, stated.delta, 1e-5), plans
+    mesh = control_problem(stated).mesh()
+    plans = [
+        planned_mesh(control_problem(stated), mesh, gait, stated.delta, tolerance, most_points=600) for tolerance in tolerances
+    ]
+    return mesh_error(control_problem(stated), mesh, gait, stated.delta, 1e-5), plans
 
 
 def meshes_for_a_bilateral_gait():
@@ -125,8 +127,8 @@ def an_uneven_mesh():
     mesh = Mesh(scheme("gauss-4"), np.array([0.0, 0.04, 0.11, 0.2, 0.25]))
     kept = np.array([0.13])
     return (
-        mesh_error(stated, mesh, gait, 1e-3, 1e-4),
-        planned_mesh(stated, mesh, gait, 1e-3, 1e-4, kept=kept, aim=0.6, most_points=90),
+        mesh_error(control_problem(stated), mesh, gait, 1e-3, 1e-4),
+        planned_mesh(control_problem(stated), mesh, gait, 1e-3, 1e-4, kept=kept, aim=0.6, most_points=90),
     )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, Problem, Relaxed, replay
+from colloc.gaits.control_problem import control_problem
 from colloc.motion.kinds import SlowOnLevel
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.motion import ReducedMotion
@@ -21,7 +22,7 @@ def begun(symmetry, links=3, directions=3, pieces=5, far=()):
         gait=Relaxed(directions, symmetry),
         joint_limit=2.0,
     )
-    space = MixtureSpace(problem, pieces, far)
+    space = MixtureSpace(control_problem(problem), pieces, far)
     v = space.parameters(problem.guess) + 0.1 * np.random.default_rng(1).standard_normal(space.n)
     v[space.time] = np.abs(v[space.time])
     space.move_checks(v)
@@ -33,7 +34,7 @@ def begun(symmetry, links=3, directions=3, pieces=5, far=()):
 def test_slopes_of_what_a_period_comes_to_and_of_rows_are_those_of_differences(symmetry, links, far):
     space, v = begun(symmetry, links, far=far)
     program, h = ReducedProgram(space, DELTA), 1e-6
-    kind = SlowOnLevel(space.problem.body, space.problem.friction, symmetry)
+    kind = SlowOnLevel(*space.control.dynamics[:2], symmetry)
     program.motion = ReducedMotion(kind, space.mesh, space, ["length"])
     slopes, rows = program.motion.gradients(v, DELTA), space.row_slopes(v)
     for k in np.random.default_rng(2).choice(space.n, 8, replace=False):
@@ -57,12 +58,12 @@ def test_a_mixture_of_one_direction_is_a_polygon(symmetry):
     v[:2], v[space.time.stop - 1], v[-1] = start, np.linalg.norm(step), np.arctan2(step[1], step[0])
     end = space.member(v).shapes[:, -1]
     assert np.allclose(end, -end[::-1] if symmetry == "bilateral" else end[::-1], atol=1e-12)
-    polygon, problem = space.member(v).realised(1), space.problem
+    polygon, problem = space.member(v).realised(1), space.control.problem
     replayed = replay(
         problem.body, problem.friction, lambda t: (polygon.angles(t), polygon.rates(t)), DELTA * polygon.length,
         breaks=np.setdiff1d(np.concatenate([polygon.phases, 1 - polygon.phases]), [0.0, 1.0]),
     )  # fmt: skip
-    fine = MixtureSpace(problem, 60)  # the same gait on a finer mesh
+    fine = MixtureSpace(control_problem(problem), 60)  # the same gait on a finer mesh
     v = fine.parameters(space.member(v).split(60))
     program = ReducedProgram(fine, DELTA)
     assert -program.objective(v) == pytest.approx(replayed.efficiency, rel=1e-5)

@@ -9,11 +9,11 @@ from scipy.optimize import linprog
 from colloc import Chain, Fourier, FreePath, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse, load, replay, save
 from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near, transcribed
 from colloc.results.solution import Solution
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is, converged
 from colloc.search.optimum import FINE
+from colloc.search.spaces import space_near, transcribed
 from tests.shared.stages import answer_near
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
@@ -79,11 +79,11 @@ def test_no_equation_among_the_rows_is_redundant(case):
 @pytest.mark.parametrize("case", CASES)
 def test_the_full_program_measures_the_same_efficiency_and_rotation(case):
     space, v, program = near_start(case, shake=0.0)
-    full = transcribed(space.problem, space.member(v), space.mesh.edges)
+    full = transcribed(space.control.problem, space.member(v), space.mesh.edges)
     x, layout = feasible_point(full, space.full_parameters(v), DELTA), full.layout
     sign = np.sign(x[layout.distance[0, -1]])  # an antipodal gait may travel either way along its axis
     assert -sign * x[layout.distance[0, -1]] / x[layout.work[0, -1]] == pytest.approx(program.objective(v), rel=1e-9)
-    if "rotation" in full.groups and space.problem.gait.symmetry == "none":
+    if "rotation" in full.groups and space.control.admissible.gait.symmetry == "none":
         turned = x[layout.theta[0, -1]] - x[layout.theta[0, 0]]
         assert turned == pytest.approx(program.rows(v)[0], abs=1e-9)
 
@@ -93,9 +93,7 @@ def test_a_finer_mesh_on_the_same_arcs_has_the_same_parameters_and_a_smaller_err
     fine, w, finer = near_start("path with two intervals an arc", shake=0.0)
     np.testing.assert_allclose(w, v, atol=1e-12)
     assert (fine.mesh.n, fine.n) == (2 * coarse.mesh.n, coarse.n)
-    exact = replay(
-        coarse.problem.body, coarse.problem.friction, coarse.member(v), DELTA * coarse.member(v).delta_unit
-    ).efficiency
+    exact = replay(*coarse.control.dynamics[:2], coarse.member(v), DELTA * coarse.member(v).delta_unit).efficiency
     assert abs(-finer.objective(w) - exact) < 0.2 * abs(-program.objective(v) - exact)
 
 

@@ -7,7 +7,7 @@ from scipy.optimize import minimize_scalar
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
-from colloc.reduced.spaces import space_near
+from colloc.search.spaces import space_near
 from tests.shared.stages import answer_near
 
 PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)

@@ -6,8 +6,8 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.collocation.warm_start import feasible_point
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near, transcribed
 from colloc.search.ipopt import Solver
+from colloc.search.spaces import space_near, transcribed
 from colloc.verification.slope import slope_motion
 
 LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals=60)
@@ -54,7 +54,7 @@ def test_gradients_are_the_limit_of_differences(problem, towards, objective):
 def test_the_full_program_holds_where_the_reduced_one_is_evaluated(towards):
     """Every equation but those that the gait has still to be found for: no turn, no way across."""
     program, v = program_at(SKEW.with_(towards=towards), 0.05)
-    full = transcribed(program.space.problem, program.space.member(v))
+    full = transcribed(program.space.control.problem, program.space.member(v))
     x = feasible_point(full, program.space.full_parameters(v), 0.05)
     found = Solver(full).measured(x, 0.05, np.zeros_like(x), np.zeros(full.constraint_lower.size))
     off = {name for name, rows in full.groups.items() if found.excess[rows].max(initial=0.0) > 1e-9}

@@ -26,10 +26,10 @@ from colloc import (
 from colloc.commands import verify
 from colloc.mechanics.actuators import ActuatorLimits, actuator_powers, driven_power_in_balance, joint_moments
 from colloc.mechanics.balance import instant
-from colloc.reduced.actuator_demand import check_actuators_suffice, least_share, least_share_without_cusps
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
+from colloc.search.actuator_demand import check_actuators_suffice, least_share, least_share_without_cusps
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near
 
 ONE = ActuatorLimits((1.0, 1.0), (1.0, 1.0))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(1.7, 1.0, 1.3)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from colloc.collocation.layout import problem_mesh
 from colloc.collocation.shape_checks import shape_checks
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.worst_instants import check_values, held_shares, worst_instants
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
@@ -78,7 +78,7 @@ def test_last_free_gait_stops_before_links_cross():
     problem = curl(1.0)
     free = problem.gait.parameters(problem.guess)
     bad = 1.6 * free
-    program = transcribe(problem)
+    program = transcribe(control_problem(problem))
     assert (0, 4) in crossing_pairs(program, bad)
     between = last_free(program, free, bad)
     assert not crossing_pairs(program, between)
@@ -88,7 +88,7 @@ def test_last_free_gait_stops_before_links_cross():
 def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell():
     problem = curl(1.1, body=Chain((0.15, 0.25, 0.2, 0.1, 0.3)))
     far = tuple(far_pairs(problem.body))
-    transcription = transcribe(problem, None, far)
+    transcription = transcribe(control_problem(problem), far=far)
     own = transcription.layout.parameters[:, 0]
     x = np.zeros(transcription.layout.n)
     x[own] = problem.gait.parameters(problem.guess) + 0.1 * np.random.default_rng(4).standard_normal(own.size)
@@ -122,7 +122,7 @@ def tips_passing(side):
 def test_a_held_share_follows_the_peak_where_tips_pass_to_second_order():
     body = Chain((0.25,) * 4)
     check = next(c for c in shape_checks(body, ((0, 3),)) if c.name == "links 1 and 4")
-    mesh = problem_mesh(Problem("tips", tips_passing(np.full(3, -0.3)), body, intervals=40))
+    mesh = control_problem(Problem("tips", tips_passing(np.full(3, -0.3)), body, intervals=40)).mesh()
     first = tips_passing(np.array([-0.002, 0.0, 0.001]))
 
     def peak(gait):

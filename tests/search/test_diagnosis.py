@@ -8,17 +8,18 @@ import pytest
 
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.polygon import Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.mechanics.chain import Chain
-from colloc.reduced.spaces import transcribed
 from colloc.results.checks import UNCERTIFIED
 from colloc.search import solve
 from colloc.search.diagnosis import explanation, redundant_equations, row_meaning
 from colloc.search.ipopt import Solver
+from colloc.search.spaces import transcribed
 
 
 def stated(**changes):
@@ -27,7 +28,7 @@ def stated(**changes):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_every_row_has_a_meaning_and_a_phase(formulation):
-    transcription = transcribe(stated(formulation=formulation))
+    transcription = transcribe(control_problem(stated(formulation=formulation)))
     phases = []
     for row in range(transcription.assembly.m):
         what, phase = row_meaning(transcription, row)
@@ -59,7 +60,7 @@ def test_every_row_of_a_path_has_a_meaning_of_its_own_and_a_phase(gait, links):
 
 
 def test_a_broken_balance_is_named_with_its_window():
-    solver = Solver(transcribe(stated(formulation="implicit velocity")), {"max_iter": 0})
+    solver = Solver(transcribe(control_problem(stated(formulation="implicit velocity"))), {"max_iter": 0})
     t = solver.transcription
     x = feasible_point(t, stated().gait.parameters(stated().guess), 0.1)
     x[t.layout.z[2, 10:13]] += 0.1
@@ -72,11 +73,11 @@ def test_a_broken_balance_is_named_with_its_window():
 
 def test_a_redundant_rotation_constraint_is_detected():
     problem = stated()
-    solver = Solver(transcribe(problem))
+    solver = Solver(transcribe(control_problem(problem)))
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
     assert redundant_equations(solver, x, 0.1) == []
     # close the rotation twice
-    t = transcribe(problem)
+    t = transcribe(control_problem(problem))
     rows = t.groups["rotation"]
     linear = t.assembly.linear.tolil()
     linear[t.groups["orientation"].start] = linear[rows.start]
@@ -87,7 +88,7 @@ def test_a_redundant_rotation_constraint_is_detected():
 def test_the_search_for_redundant_equations_takes_time_in_proportion_to_the_mesh():
     """Its factors once filled the square of the mesh: 1,000 intervals took minutes and 30 GB."""
     problem = stated().with_(intervals=600)
-    solver = Solver(transcribe(problem))
+    solver = Solver(transcribe(control_problem(problem)))
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
     begin = time.process_time()
     assert redundant_equations(solver, x, 0.1) == []
@@ -100,7 +101,7 @@ def _with_linear(transcription, linear):
 
 def test_running_out_of_iterations_says_so():
     problem = stated(delta=0.05, delta_start=0.05)
-    solver = Solver(transcribe(problem), {"max_iter": 2})
+    solver = Solver(transcribe(control_problem(problem)), {"max_iter": 2})
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.05)
     text = explanation(solver.transcription, solver.solve(x, 0.05), 0.05)
     assert "after 2 iterations" in text
@@ -110,7 +111,7 @@ def test_running_out_of_iterations_says_so():
 def test_a_delta_that_rounding_hides_is_named():
     """At delta = 1e-10 the flagship's gradient is noise of 2e-6; at 1e-9 it is still told from zero."""
     problem = stated()
-    solver = Solver(transcribe(problem), {"max_iter": 0})
+    solver = Solver(transcribe(control_problem(problem)), {"max_iter": 0})
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 1e-10)
     result = solver.solve(x, 1e-10)
     result = replace(result, excess=np.zeros_like(result.excess))
@@ -119,7 +120,7 @@ def test_a_delta_that_rounding_hides_is_named():
 
 
 def test_rows_of_a_slope_have_a_meaning():
-    transcription = transcribe(stated(grade=0.1, towards=0.3))
+    transcription = transcribe(control_problem(stated(grade=0.1, towards=0.3)))
     meanings = {row_meaning(transcription, transcription.groups[name].start)[0] for name in ("heading", "across")}
     assert meanings == {"where the body points at the start", "the way across the direction that was asked for"}
 

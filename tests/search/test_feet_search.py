@@ -12,7 +12,7 @@ from colloc.bounds.optimality_gap import refusal
 from colloc.bounds.sampling import Domain
 from colloc.commands.main import main as colloc
 from colloc.commands.summary import summary_lines
-from colloc.gaits.friction_unit import in_friction_units
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier
 from colloc.pictures.motion_frames import frames
 from colloc.search.solve import solve
@@ -108,14 +108,15 @@ def test_a_film_shows_which_feet_hold(on_feet):
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
     """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own size."""
     wheels = Chain(feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(3)))
-    one, other = (Problem("wheels", body=wheels, friction=law) for law in (Friction(), Elliptic(7, 8, 9)))
+    one, other = (Problem("wheels", body=wheels, friction=own) for own in (Friction(), Elliptic(7, 8, 9)))
     assert one.law == other.law
-    scaled, unit = in_friction_units(other)
-    assert scaled.law == one.law.in_units_of(unit)
-    assert 0.1 < scaled.law.smallest < 10
-    assert Problem.from_dict(scaled.to_dict()).law == scaled.law
+    scaled = control_problem(other)
+    law = scaled.dynamics.law
+    assert law == one.law.in_units_of(scaled.unit)
+    assert 0.1 < law.smallest < 10
+    assert Problem.from_dict(other.with_(friction=law).to_dict()).law == law
     angles, rates = random_instants(20)
-    z, same, again = (solve_balance(wheels, law, angles, rates, 1e-3).z for law in (Friction(), Elliptic(7, 8, 9), scaled.law))
+    z, same, again = (solve_balance(wheels, own, angles, rates, 1e-3).z for own in (Friction(), Elliptic(7, 8, 9), law))
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
     stated, resolved = (replay(wheels, law, KNOWN, 1e-2, tolerance=1e-4, instants=200) for law in (Friction(), one.law))

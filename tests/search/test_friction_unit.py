@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from colloc.gaits.friction_unit import friction_unit, in_friction_units
+from colloc.gaits.control_problem import control_problem, friction_unit
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
+from colloc.reduced.program import ReducedProgram
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near
 
 
 def stated(*mu, **changes):
@@ -18,7 +20,8 @@ def stated(*mu, **changes):
 def test_friction_of_usual_size_is_left_alone():
     for mu in ((1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (0.5, 1.0, 5.0), (10.0, 1.0, 1.0)):
         problem = stated(*mu)
-        assert in_friction_units(problem) == (problem, 1.0)
+        control = control_problem(problem)
+        assert (control.unit, control.dynamics.law) == (1.0, problem.law)
     assert friction_unit(Friction(2e-6, 1e-6, 3e-6)) == pytest.approx(1e-6)
 
 
@@ -44,9 +47,21 @@ def test_coefficients_of_any_size_are_solved_and_certified(usual, size):
 
 def test_what_must_be_reached_is_stated_in_units_of_friction_too():
     light = Problem("light", friction=Friction(1e-3, 1e-3, 1e-3), at_least={"efficiency": 150.0, "distance": 0.2})
-    scaled, unit = in_friction_units(light)
-    assert (unit, scaled.friction.mu_t) == (1e-3, 1.0)
-    assert [value for _, value in scaled.at_least] == pytest.approx([0.15, 0.2])
+    scaled = control_problem(light)
+    assert (scaled.unit, scaled.dynamics.law.mu_t) == (1e-3, 1.0)
+    assert [value for _, value in scaled.aims.at_least] == pytest.approx([0.15, 0.2])
     # what is proportional to no power of friction is left as it is
     mixed = light.with_(objective="distance / (work + length)")
-    assert in_friction_units(mixed) == (mixed, 1.0)
+    assert control_problem(mixed).unit == 1.0
+
+
+def test_a_pace_counts_by_its_ratio_to_friction():
+    """Friction drives the momenta: with a tenth of it, at a tenth of the Froude number, a gait moves as it did."""
+    periods = []
+    for size in (1.0, 0.1):
+        space, v = space_near(stated(size, size, size, froude=0.05 * size, gait=Harmonic(1)), ellipse(0.3, 1.0, 0.5))
+        periods.append(ReducedProgram(space, 1e-2).period(v))
+    usual, light = periods
+    assert usual["distance"] > 1e-3
+    assert light["distance"] == pytest.approx(usual["distance"], rel=1e-9)
+    assert light["work"] == pytest.approx(0.1 * usual["work"], rel=1e-9)

@@ -6,8 +6,8 @@ import pytest
 import colloc
 from colloc import BSpline, Chain, FreePath, Friction, Harmonic, ModalBody, Problem, ProblemError, Relaxed, Serpenoid, Wave
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near
 
 T = np.linspace(0, 1, 20001)
 FAR = {"objective": "distance", "friction": Friction(2, 1, 1.5)}

@@ -25,8 +25,8 @@ from colloc.gaits.objective import EFFICIENCY, SPEED
 from colloc.mechanics.actuators import actuator_powers, driven_power
 from colloc.numerics.blocks import oracles
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near, transcribed
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near, transcribed
 
 THRIFT = "sqrt(distance) / (work + 0.1 * length)"
 TURNED = "(distance + rotation**2) / (work + length)"

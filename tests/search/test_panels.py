@@ -7,11 +7,11 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.converge import as_it_is
 from colloc.search.refine import on_more_panels
+from colloc.search.spaces import space_near
 from colloc.smooth.modal_body import ModalBody
 from colloc.verification.replay import replay
 from tests.shared.stages import answer_near
@@ -28,7 +28,7 @@ def test_panels_are_added_where_a_point_at_rest_moves_over_them():
     coarse = found(8)
     finer, v = on_more_panels(coarse)
     exact = -found(96).objective
-    assert 8 < finer.problem.body.panels <= 32  # at most fourfold at a time
+    assert 8 < finer.control.dynamics.body.panels <= 32  # at most fourfold at a time
     before, after = (abs(-objective - exact) for objective in (coarse.objective, ReducedProgram(finer, 1e-2).objective(v)))
     assert after < 0.2 * before
     np.testing.assert_array_equal(finer.mesh.edges, coarse.space.mesh.edges)

@@ -11,9 +11,9 @@ from colloc.gaits.path_samples import path_length
 from colloc.gaits.starts import prolonged
 from colloc.mechanics.bodies import FORMULATIONS, FULL
 from colloc.numerics.blocks import oracles
-from colloc.reduced.spaces import nearest_parameters, transcribed
 from colloc.results.solution import SOLVED
 from colloc.search.solve import solve
+from colloc.search.spaces import nearest_parameters, transcribed
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
 CASES = {
@@ -43,7 +43,7 @@ def test_the_start_satisfies_every_equation_but_net_rotation(case, formulation):
     g = np.array(found.options["jac_g"](x, p)[0]).ravel()
     for group, rows in transcription.groups.items():
         low, high = transcription.constraint_lower[rows], transcription.constraint_upper[rows]
-        if group != "rotation" or transcription.problem.gait.symmetry != "none":
+        if group != "rotation" or transcription.control.problem.gait.symmetry != "none":
             assert np.maximum(low - g[rows], g[rows] - high).max() < 1e-7, group
 
 

@@ -5,6 +5,7 @@ import pytest
 
 import colloc
 from colloc import Friction, Problem, ProblemError, Relaxed, replay, solve
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.relaxed import Mixture
 from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results.relaxation import Optimality
@@ -70,9 +71,9 @@ def test_prices_name_a_direction_that_helps_where_one_is_missing(solution):
     assert prices_of(solution.relaxed.gait, 3).min() > -2e-3
     # the best polygon of as many pieces leaves something to be mixed in
     alone = problem(directions=1)
-    space = MixtureSpace(alone, 14)
+    space = MixtureSpace(control_problem(alone), 14)
     found = converged(space, space.parameters(alone.guess), 1e-2, 1.0, SKETCH)
-    better = as_it_is(MixtureSpace(problem(), 14), _with_idle(found.gait, problem()), 1e-2)
+    better = as_it_is(MixtureSpace(control_problem(problem()), 14), _with_idle(found.gait, problem()), 1e-2)
     assert prices(better)[0].min() < -1e-2
     ready, v = with_turned_directions(better, 14)
     again = converged(ready, v, 1e-2, 1.0, SKETCH)
@@ -81,7 +82,7 @@ def test_prices_name_a_direction_that_helps_where_one_is_missing(solution):
 
 def prices_of(gait, directions):
     stated = problem(directions)
-    space = MixtureSpace(stated, len(gait.durations))
+    space = MixtureSpace(control_problem(stated), len(gait.durations))
     return prices(as_it_is(space, space.parameters(gait), stated.delta))[0]
 
 
@@ -96,7 +97,7 @@ def _with_idle(gait, stated):
         gait.start,
         gait.symmetry,
     )
-    return MixtureSpace(stated, len(gait.durations)).parameters(full)
+    return MixtureSpace(control_problem(stated), len(gait.durations)).parameters(full)
 
 
 def test_a_solution_survives_its_file(solution, tmp_path):
@@ -127,10 +128,10 @@ def test_sides_of_a_polygon_may_be_long():
     """A side that is all there is on its piece; of several directions each takes a short time, lest loops go on for ever."""
     stated = problem(1)
     square = Mixture([[1.7], [1.7]], [[[1.0, 0.0]], [[0.0, 1.0]]], [-0.85, 0.85], "both")
-    space = MixtureSpace(stated, 2)
+    space = MixtureSpace(control_problem(stated), 2)
     v = space.parameters(square)
     assert np.all((space.lower <= v) & (v <= space.upper))
-    assert MixtureSpace(problem(3), 2).upper[2] < 1.7
+    assert MixtureSpace(control_problem(problem(3)), 2).upper[2] < 1.7
 
 
 def test_loops_that_reach_beyond_what_is_admissible_are_drawn_in(solution):

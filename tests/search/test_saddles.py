@@ -6,11 +6,11 @@ from scipy.optimize import root
 from colloc import Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
-from colloc.reduced.spaces import space_near
 from colloc.search.confirm import confirm
 from colloc.search.converge import as_it_is
 from colloc.search.descend import below_saddle
 from colloc.search.solve import finished
+from colloc.search.spaces import space_near
 from tests.shared.stages import optimum_near
 
 PROBLEM = Problem("symmetric", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=60, mesh_tolerance=0)

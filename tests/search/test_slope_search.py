@@ -21,14 +21,14 @@ from colloc import (
 )
 from colloc.commands import report, verify
 from colloc.commands import solve as solve_command
-from colloc.gaits.friction_unit import in_friction_units
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.sloped import PointedSeries
 from colloc.mechanics.bodies import FULL
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
 from colloc.search.certify import _one_motion, gait_certificate
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.slope import slope_motion
 
@@ -111,7 +111,7 @@ def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
 
 def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
     fine, coarse = (
-        mesh_error(PROBLEM, Mesh(uphill.mesh.scheme, edges), uphill.gait, 1e-2)
+        mesh_error(control_problem(PROBLEM), Mesh(uphill.mesh.scheme, edges), uphill.gait, 1e-2)
         for edges in (uphill.mesh.edges, np.linspace(0.0, 1.0, 21))
     )
     assert fine.estimate < PROBLEM.mesh_tolerance < 0.1 * coarse.estimate
@@ -130,8 +130,8 @@ def test_a_motion_that_is_left_open_for_long_fails_its_check():
 
 def test_friction_and_the_pull_have_one_unit():
     heavy = PROBLEM.with_(friction=Friction(100, 100, 100), grade=10.0)
-    scaled, unit = in_friction_units(heavy)
-    assert (unit, scaled.grade, scaled.friction) == (100.0, PROBLEM.grade, PROBLEM.friction)
+    scaled = control_problem(heavy)
+    assert (scaled.unit, scaled.dynamics.slope, scaled.dynamics.law) == (100.0, PROBLEM.slope, PROBLEM.law)
 
 
 def test_the_level_is_stated_as_before():

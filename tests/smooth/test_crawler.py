@@ -11,13 +11,13 @@ from colloc.gaits.polygon import Corners, Polygon
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.converge import converged
 from colloc.search.optimum import SKETCH
 from colloc.search.prescribed import realised
 from colloc.search.solve import solve
+from colloc.search.spaces import space_near
 from colloc.smooth.concertina import Concertina
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.system.errors import ProblemError

@@ -13,6 +13,7 @@ import pytest
 from colloc.collocation.implicit_velocity import ImplicitVelocity
 from colloc.collocation.transcription import transcribe
 from colloc.collocation.warm_start import feasible_point
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.search.ipopt import Solver
@@ -104,7 +105,7 @@ def test_no_solve_begins_after_an_interruption_that_was_swallowed():
 def test_ipopt_stops_between_iterations_and_says_nothing(capfd, monkeypatch):
     gait = Harmonic(1, "bilateral")
     problem = Problem("p", ellipse(0.3, 1.0, 0.5), gait=gait, intervals=20, formulation="implicit velocity")
-    solver, calls = Solver(transcribe(problem)), []
+    solver, calls = Solver(transcribe(control_problem(problem))), []
     x = feasible_point(solver.transcription, problem.gait.parameters(problem.guess), 0.1)
 
     def pressed(velocity_map, arguments, evaluated=ImplicitVelocity.eval):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.error_control import CASES, case_problem, held, outcome
-from colloc.collocation.layout import problem_mesh
+from colloc.gaits.control_problem import control_problem
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import instant
@@ -64,8 +64,8 @@ def test_adaptive_panels_agree_with_a_uniform_replay(friction):
 def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, friction):
     # collocating a given gait, by the scheme's own quadrature written out here
     stated = problem(name, friction)
-    mesh = problem_mesh(stated)
-    error = mesh_error(stated, mesh, GAIT, DELTA, 1e-7)
+    mesh = control_problem(stated).mesh()
+    error = mesh_error(control_problem(stated), mesh, GAIT, DELTA, 1e-7)
     t = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
     rates = rates_at(stated.body, friction, path, DELTA, t)
     theta, x, work = 0.0, 0.0, 0.0
@@ -84,7 +84,7 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
 def test_shares_of_intervals_add_up_to_the_error_of_other_objectives(objective):
     """The total is known from the scheme's own increments and the fine motion alone."""
     stated = problem("trapezoid", objective=objective)
-    error = mesh_error(stated, problem_mesh(stated), GAIT, DELTA, 1e-6)
+    error = mesh_error(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-6)
     assert abs(error.total) > 1e-4
     assert error.value.sum() == pytest.approx(error.total, rel=0.1)
 
@@ -93,9 +93,9 @@ def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
     """Antipodal gaits turn back in the other half: what counts is the displacement half way between both headings."""
     gait = Fourier(np.zeros(2), np.array([[1.5], [-1.0]]), np.array([[0.3], [1.0]]))
     stated = problem("trapezoid", gait=Harmonic(1, "antipodal"), intervals=40)
-    fine = gait_motion(stated, gait, DELTA, problem_mesh(stated), 1e-6)
+    fine = gait_motion(control_problem(stated), gait, DELTA, control_problem(stated).mesh(), 1e-6)
     assert abs(fine.theta[-1]) > 0.1
-    error = mesh_error(stated, problem_mesh(stated), gait, DELTA, 1e-6)
+    error = mesh_error(control_problem(stated), control_problem(stated).mesh(), gait, DELTA, 1e-6)
     assert error.value.sum() == pytest.approx(error.total, rel=0.02)
 
 
@@ -104,15 +104,15 @@ def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
     stated = problem(delta=10.0, delta_start=10.0)
     for name, order in (("gauss-2", 4), ("radau-2", 3), ("gauss-3", 6)):
         meshes = (Mesh(scheme(name), np.linspace(0, 0.5, n + 1)) for n in (20, 40))
-        coarse, fine = (np.abs(mesh_error(stated, mesh, GAIT, 10.0, 1e-11).work).sum() for mesh in meshes)
+        coarse, fine = (np.abs(mesh_error(control_problem(stated), mesh, GAIT, 10.0, 1e-11).work).sum() for mesh in meshes)
         assert np.log2(coarse / fine) == pytest.approx(order, abs=0.5)
 
 
 def test_the_velocity_error_of_an_interval_is_that_of_the_polynomial_through_its_nodes():
     stated = problem()
-    mesh = problem_mesh(stated)
-    fine = gait_motion(stated, GAIT, DELTA, mesh, 1e-6)
-    found = mesh_error(stated, mesh, GAIT, DELTA, 1e-6, fine).velocity
+    mesh = control_problem(stated).mesh()
+    fine = gait_motion(control_problem(stated), GAIT, DELTA, mesh, 1e-6)
+    found = mesh_error(control_problem(stated), mesh, GAIT, DELTA, 1e-6, fine).velocity
     nodes = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
     z, known = rates_at(stated.body, stated.friction, path, DELTA, nodes).z, fine.rates.z.reshape(3, -1)
     for k in range(mesh.n):
@@ -124,9 +124,9 @@ def test_the_velocity_error_of_an_interval_is_that_of_the_polynomial_through_its
 
 def test_velocity_error_is_largest_where_links_stick():
     stated = problem()
-    mesh = problem_mesh(stated)
-    error = mesh_error(stated, mesh, GAIT, DELTA)
-    fine = gait_motion(stated, GAIT, DELTA, mesh, 1e-7)
+    mesh = control_problem(stated).mesh()
+    error = mesh_error(control_problem(stated), mesh, GAIT, DELTA)
+    fine = gait_motion(control_problem(stated), GAIT, DELTA, mesh, 1e-7)
     kinks = kink_phases(stated.body, stated.friction, path, DELTA, fine)
     worst = int(error.velocity.argmax())
     assert np.any((kinks > mesh.edges[worst] - mesh.h[0]) & (kinks < mesh.edges[worst + 1] + mesh.h[0]))
@@ -135,7 +135,7 @@ def test_velocity_error_is_largest_where_links_stick():
 @pytest.mark.parametrize("friction", [Friction(), Friction(1.7, 1, 1.3)], ids=str)
 def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     stated = problem(friction=friction)
-    fine = gait_motion(stated, GAIT, DELTA, uniform_mesh(scheme("gauss-3"), 20, 0.5), 1e-6)
+    fine = gait_motion(control_problem(stated), GAIT, DELTA, uniform_mesh(scheme("gauss-3"), 20, 0.5), 1e-6)
     kinks = kink_phases(stated.body, friction, path, DELTA, fine)
     assert 4 <= kinks.size <= 24
     # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 = 0)
@@ -187,7 +187,7 @@ def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards
     """Schemes with nodes at the ends of an interval would have one there, and the efficiency a kink in the gait."""
     stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
     monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.array([kink]))
-    plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, 1e-4)
+    plan = planned_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-4)
     assert (kink in plan.edges) == held
 
 
@@ -200,14 +200,14 @@ def test_knots_move_onto_kinks_and_keep_the_rest():
 
 def test_knots_on_kinks_save_points(monkeypatch):
     stated = problem("gauss-7", intervals=16)
-    mesh = problem_mesh(stated)
-    with_knots = planned_mesh(stated, mesh, GAIT, DELTA, 1e-6)
+    mesh = control_problem(stated).mesh()
+    with_knots = planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
     monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.empty(0))
-    without = planned_mesh(stated, mesh, GAIT, DELTA, 1e-6)
+    without = planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
     points = [(plan.edges.size - 1) * scheme(plan.scheme).s for plan in (with_knots, without)]
     assert points[0] < 0.9 * points[1]
-    fine = gait_motion(stated, GAIT, DELTA, mesh, 1e-7)
-    knots = kink_knots(stated, GAIT, DELTA, fine)
+    fine = gait_motion(control_problem(stated), GAIT, DELTA, mesh, 1e-7)
+    knots = kink_knots(control_problem(stated), GAIT, DELTA, fine)
     assert np.abs(with_knots.edges[:, None] - knots).min(axis=0).max() < 1e-4
 
 
@@ -215,36 +215,36 @@ def test_knots_on_kinks_save_points(monkeypatch):
 def test_planned_meshes_are_as_accurate_as_they_say(name):
     stated = problem(name)
     for tolerance in (1e-4, 1e-6):
-        plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, tolerance)
+        plan = planned_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, tolerance)
         assert plan.reached
-        error = mesh_error(stated, Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 0.1 * tolerance)
+        error = mesh_error(control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 0.1 * tolerance)
         assert abs(error.total) <= error.estimate <= 1.1 * tolerance
-        again = planned_mesh(stated, Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1.1 * tolerance)
+        again = planned_mesh(control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1.1 * tolerance)
         assert again is None
 
 
 @pytest.mark.parametrize(("share", "good"), [(0.85, True), (0.95, False)])
 def test_a_mesh_that_is_just_good_enough_is_refined_as_the_answer_on_it_still_moves(monkeypatch, share, good):
     stated = problem("gauss-3")
-    mesh = problem_mesh(stated)
+    mesh = control_problem(stated).mesh()
     nearly = SimpleNamespace(estimate=share * 1e-5, turning=0.0, violation=np.zeros(mesh.h.size))
     monkeypatch.setattr(refinement, "mesh_error", lambda *arguments: nearly)
-    assert (planned_mesh(stated, mesh, GAIT, DELTA, 1e-5) is None) == good
+    assert (planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-5) is None) == good
 
 
 def test_a_nested_mesh_has_every_knot_of_the_one_before():
     stated = problem("gauss-3")
-    mesh = problem_mesh(stated)
-    plan, free = (planned_mesh(stated, mesh, GAIT, DELTA, 1e-6, nested=nested) for nested in (True, False))
+    mesh = control_problem(stated).mesh()
+    plan, free = (planned_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6, nested=nested) for nested in (True, False))
     assert np.isin(mesh.edges, plan.edges).all()
     assert not np.isin(mesh.edges, free.edges).all()
     assert plan.reached
-    assert mesh_error(stated, Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1e-7).estimate <= 1.1e-6
+    assert mesh_error(control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1e-7).estimate <= 1.1e-6
 
 
 def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     stated = problem("gauss-2", mesh_tolerance=1e-7, intervals=20)
-    plan = planned_mesh(stated, problem_mesh(stated), GAIT, DELTA, 1e-7, most_points=60)
+    plan = planned_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-7, most_points=60)
     assert not plan.reached
     assert plan.estimate > 1e-7
     small = planned_mesh
@@ -267,10 +267,10 @@ def test_a_refined_solution_knows_its_scheme_and_its_error():
 
 def test_violations_are_reported_in_the_interval_where_they_are():
     stated = problem()
-    mesh = problem_mesh(stated)
-    assert constraint_violation(stated, mesh, GAIT).max() == 0
+    mesh = control_problem(stated).mesh()
+    assert constraint_violation(control_problem(stated).admissible, mesh, GAIT).max() == 0
     wide = Fourier(GAIT.mean, 1.2 * GAIT.cos, 1.2 * GAIT.sin)
-    violation = constraint_violation(stated, mesh, wide)
+    violation = constraint_violation(control_problem(stated).admissible, mesh, wide)
     t = np.linspace(0, 0.5, 2001)
     excess = np.maximum(np.abs(wide.angles(t)).max(axis=0) - np.pi, crossing_depth(stated.body, wide.angles(t)))
     cells = np.unique(np.clip(np.searchsorted(mesh.edges, t[excess > 1e-3]) - 1, 0, mesh.n - 1))

@@ -16,7 +16,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.numerics.sqp import minimised
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.spaces import space_near
+from colloc.search.spaces import space_near
 
 _ACCURACY, _STEPS, _INTERVALS = 1e-8, 30, 30
 _ELSE_FREE = {"at_least": (), "torque_limit": None, "power_limit": None, "grade": 0.0, "towards": None}

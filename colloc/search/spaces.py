@@ -1,4 +1,4 @@
-"""Programs and classes of gaits for a problem of any kind: which of them a class of gaits wants.
+"""From a problem to its programs: the full one, and the space of gaits that a search sees; which of them a class wants.
 
 A class that derives from `LinearClass`, as `Harmonic` does, needs nothing here; any other has a line in `SEARCHED`.
 """
@@ -13,6 +13,7 @@ import numpy as np
 from colloc.collocation.path_transcription import transcribe_path
 from colloc.collocation.program import GaitProgram
 from colloc.collocation.transcription import transcribe
+from colloc.gaits.control_problem import ControlProblem, control_problem
 from colloc.gaits.free_path import FreePath
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.linear import LinearClass
@@ -37,23 +38,24 @@ from colloc.system.errors import ProblemError
 class Searched(NamedTuple):
     """How a class of gaits is collocated, and how a search sees it."""
 
-    program: Callable[[Problem, AnyGait, np.ndarray | None, Pairs], GaitProgram]
-    """Of a problem, a gait near, the edges of a mesh, and pairs of links that must not cross: its nonlinear program."""
-    space: Callable[[Problem, AnyGait, np.ndarray | None, str, Pairs], SearchSpace]
-    """Of a problem, a gait near, the edges of a mesh, a scheme, and those pairs: its parameters."""
+    program: Callable[[ControlProblem, AnyGait, np.ndarray | None, str, Pairs], GaitProgram]
+    """Of a control problem, a gait near, the edges of a mesh, a scheme, and pairs of links that must not cross: its nonlinear
+    program."""
+    space: Callable[[ControlProblem, AnyGait, np.ndarray | None, str, Pairs], SearchSpace]
+    """Of the same: its parameters."""
 
 
 _LINEAR = Searched(
-    lambda problem, gait, edges, far: transcribe(problem, edges, far),
-    lambda problem, gait, edges, scheme, far: LinearSpace(problem, edges, scheme, far),
+    lambda control, gait, edges, scheme, far: transcribe(control, edges, scheme, far),
+    lambda control, gait, edges, scheme, far: LinearSpace(control, edges, scheme, far),
 )
 _ALONG_PATHS = Searched(transcribe_path, PathSpace)
-_ON_SLOPE = Searched(_LINEAR.program, lambda problem, gait, edges, scheme, far: SlopeSpace(problem, edges, scheme, far))
-_SERPENOID = Searched(_LINEAR.program, lambda problem, gait, edges, scheme, far: SerpenoidSpace(problem, edges, scheme, far))
+_ON_SLOPE = Searched(_LINEAR.program, lambda control, gait, edges, scheme, far: SlopeSpace(control, edges, scheme, far))
+_SERPENOID = Searched(_LINEAR.program, lambda control, gait, edges, scheme, far: SerpenoidSpace(control, edges, scheme, far))
 _MIXED = Searched(
     transcribe_path,
-    lambda problem, gait, edges, scheme, far: MixtureSpace(
-        problem, problem.intervals if edges is None else edges.size - 1, far
+    lambda control, gait, edges, scheme, far: MixtureSpace(
+        control, control.intervals if edges is None else edges.size - 1, far, scheme
     ),
 )
 SEARCHED: dict[type, Searched] = {
@@ -73,24 +75,27 @@ def _searched(problem: Problem) -> Searched:
     if found is None:
         raise ProblemError(
             f"no search is known for the class {type(problem.gait).__name__}: derive it from LinearClass if its angles are "
-            "linear in its parameters, or give its program and its space a line in SEARCHED of colloc.reduced.spaces "
+            "linear in its parameters, or give its program and its space a line in SEARCHED of colloc.search.spaces "
             "(docs/howto/own_gait_class.md)."
         )
     return found
 
 
-def transcribed(problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, far: Pairs = ()) -> GaitProgram:
-    """The nonlinear program of a problem of any class near a gait, by default its guess.
+def transcribed(
+    problem: Problem, gait: AnyGait | None = None, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+) -> GaitProgram:
+    """The nonlinear program of a problem of any class near a gait, by default its guess, in units of friction.
 
     Self-contact is constrained between links two apart, and between the pairs `far`
     (see `colloc.search.converge.crossing_pairs`).
     """
-    return _searched(problem).program(problem, problem.guess if gait is None else gait, edges, far)
+    near = problem.guess if gait is None else gait
+    return _searched(problem).program(control_problem(problem), near, edges, scheme, far)
 
 
 def heading(program: GaitProgram, x: np.ndarray) -> GaitProgram:
     """The program with the net rotation closed as variables x close it."""
-    if program.problem.gait.closing_symmetry != ANTIPODAL:
+    if program.control.admissible.gait.closing_symmetry != ANTIPODAL:
         return program
     theta, rows = x[program.layout.theta[0]], np.zeros(program.constraint_lower.size)
     rows[program.groups["rotation"]] = whole_turns(theta[0], theta[-1])
@@ -111,7 +116,7 @@ def space_of(
 ) -> SearchSpace:
     """The class of a problem on its first mesh, or a given one, with the pairs `far` kept apart; `near` says which of several
     kinds of members are meant."""
-    return _searched(problem).space(problem, near, edges, scheme, far)
+    return _searched(problem).space(control_problem(problem), near, edges, scheme, far)
 
 
 def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
@@ -123,5 +128,5 @@ def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarra
 
 def nearest_parameters(program: GaitProgram, gait: AnyGait) -> np.ndarray:
     """Parameters of the member of a program's class that is nearest to a gait, on the program's mesh."""
-    space, v = space_near(program.problem, gait, program.mesh.edges)
+    space, v = space_near(program.control.problem, gait, program.mesh.edges, program.mesh.scheme.name)
     return space.full_parameters(v)
