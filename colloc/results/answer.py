@@ -96,7 +96,7 @@ class Answer:
         Phases where the arcs of a free path meet; they are among the edges. By default they are the edges.
     x, lam_x : (n,)
         Variables (see `colloc.collocation.layout`) and multipliers of their bounds; work and forces are in units of
-        `colloc.gaits.friction_unit`.
+        `colloc.gaits.control_problem`.
     lam_g : (m,)
         Multipliers of the constraints.
     value, distance, work : float
