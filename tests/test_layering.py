@@ -170,6 +170,30 @@ def test_the_engine_takes_no_problem_apart():
             assert "colloc.gaits.problem" not in set(imported(path)), name
 
 
+MOST_MEMBERS, WIDER = 15, {"Body": 47, "Law": 16, "FloorContact": 20, "SearchSpace": 24}
+"""Of a protocol, and of those that are still wider; these may only get fewer."""
+
+
+def members(name, protocols):
+    """Of a protocol: its own, and those of the protocols that it derives from."""
+    node = protocols[name]
+    own = {item.target.id for item in node.body if isinstance(item, ast.AnnAssign)}
+    own |= {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
+    bases = [base.id for base in node.bases if isinstance(base, ast.Name) and base.id in protocols]
+    return own.union(*(members(base, protocols) for base in bases))
+
+
+def test_a_protocol_has_few_members():
+    classes = {
+        node.name: node
+        for path in modules().values()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef) and any(getattr(base, "id", "") == "Protocol" for base in node.bases)
+    }
+    counted = {name: len(members(name, classes)) for name in classes}
+    assert {name: n for name, n in counted.items() if n > MOST_MEMBERS and n > WIDER.get(name, 0)} == {}
+
+
 COLLOCATED = re.compile(r"colloc\.(motion\.(collocated|states|kinds)|numerics\.mesh|collocation|reduced|search)\b")
 ADAPTIVE = (
     "replay",

@@ -64,9 +64,6 @@ class LinearSpace:
         """The class on another mesh."""
         return type(self)(self.control, edges, scheme, self.far)
 
-    def with_far(self, far: Pairs) -> LinearSpace:
-        return type(self)(self.control, self.mesh.edges, self.mesh.scheme.name, far)
-
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
         angles, rates = np.split((self._matrix @ v).T, 2)

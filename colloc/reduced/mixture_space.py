@@ -124,9 +124,6 @@ class MixtureSpace:
         """The class with as many pieces as there are intervals between the edges."""
         return MixtureSpace(self.control, edges.size - 1, self.far, scheme)
 
-    def with_far(self, far: Pairs) -> MixtureSpace:
-        return MixtureSpace(self.control, self.pieces, far, self.mesh.scheme.name)
-
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, directions and durations at the points of the mesh: a block of columns for each direction."""
         durations, _, directions = self._split(v)

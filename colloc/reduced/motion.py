@@ -23,10 +23,6 @@ from colloc.numerics.mesh import Mesh
 class Shapes(Protocol):
     """A class of gaits on the points of a mesh."""
 
-    @property
-    def n(self) -> int:
-        """Number of parameters v."""
-
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates ``(n_joint, n_point)``, and the pace ``(n_point,)`` by which velocities are multiplied.
 

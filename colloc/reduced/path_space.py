@@ -46,7 +46,7 @@ class PathSpace:
     def __init__(
         self, control: ControlProblem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
     ) -> None:
-        self.control, self.near, self.far, self.given = control, near, far, Given(near, edges, scheme)
+        self.control, self.far, self.given = control, far, Given(near, edges, scheme)
         self._fit = fit = transcribe_fit(control, near, edges, scheme, far)
         self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
         free = fit.lower < fit.upper
@@ -183,9 +183,6 @@ class PathSpace:
     def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
         """The class near a member on another mesh; its intervals are arcs, unless those are too many."""
         return PathSpace(self.control, self.control.admissible.gait.laid_on(gait, edges), edges, scheme, self.far)
-
-    def with_far(self, far: Pairs) -> PathSpace:
-        return PathSpace(self.control, self.near, self.mesh.edges, self.mesh.scheme.name, far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""

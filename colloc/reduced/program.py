@@ -54,9 +54,6 @@ class SearchSpace(Shapes, Protocol):
     def remeshed(self, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
         """The class near a member on another mesh, in the member's phases."""
 
-    def with_far(self, far: Pairs) -> SearchSpace:
-        """The class with other pairs of links kept apart."""
-
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
         """Place every check at the worst instants of the gait v, or later by a share of its mesh cell; how far the gait exceeds
         any bound there [rad]."""

@@ -32,7 +32,7 @@ from colloc.search.diagnosis import explanation
 from colloc.search.ipopt import NlpResult, Solver
 from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
-from colloc.search.spaces import heading, space_near, transcribed
+from colloc.search.spaces import heading, space_near, transcribed, with_far
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
@@ -222,7 +222,7 @@ def second_order(answer: Answer) -> SecondOrder:
     space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
     if v.size > _MOST_PARAMETERS:
         return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
-    program = ReducedProgram(space.with_far(problem.body.far_pairs), answer.delta)
+    program = ReducedProgram(with_far(space, problem.body.far_pairs), answer.delta)
     program.place_rows(v)
     found, size = curvature(program, v), abs(answer.value / program.stated(-1.0))
     if not found.kkt_error < _NEAR * size:

@@ -25,6 +25,7 @@ from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
 from colloc.search.optimum import ITERATIONS, ROUGH, SKETCH, VIOLATION, Effort, Optimum, replace_keeping_space
 from colloc.search.run import this_run
+from colloc.search.spaces import with_far
 from colloc.system.errors import NotConvergedError
 
 FIRST_RADIUS, NEXT_RADIUS = 1.0, 0.5
@@ -188,7 +189,7 @@ def converged(
         rested, program = _rested(here, v, delta, radius, effort, curvature)
         while new := tuple(p for p in crossing_pairs(here, rested.v) if p not in here.far):
             free = last_free(here, v, rested.v)
-            here = here.with_far(here.far + new)
+            here = with_far(here, here.far + new)
             rested, program = _rested(here, free, delta, radius, effort, None)
         return optimum_at(
             program,

@@ -110,7 +110,7 @@ class Optimum:
     @cached_property
     def space(self) -> SearchSpace:
         """The class of gaits on its mesh. Its rows are placed by whoever asks for them (`ReducedProgram.place_rows`)."""
-        return space_of(self.problem, self.given.near, self.given.edges, self.given.scheme, self.far)
+        return space_of(self.problem, *self.given, self.far)
 
     def program(self) -> ReducedProgram:
         """The program that this is an optimum of, with its rows placed."""

@@ -30,7 +30,7 @@ from colloc.search.choose import solution_of
 from colloc.search.converge import NEXT_RADIUS, converged
 from colloc.search.optimum import FINE, ROUGH
 from colloc.search.solve import finished
-from colloc.search.spaces import space_about, space_near, space_of
+from colloc.search.spaces import space_about, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import Replay
 from colloc.verification.replayer import replayer
@@ -280,8 +280,7 @@ class _Lagrangian:
 
     def __call__(self, problem: Problem) -> float:
         """Its value, in the units of the stated objective, with the rows at the worst instants of the gait."""
-        near, edges, scheme = self.space.given
-        program = ReducedProgram(space_of(problem, near, edges, scheme, self.space.far), problem.delta)
+        program = ReducedProgram(space_of(problem, *self.space.given, self.space.far), problem.delta)
         program.place_rows(self.v)
         at = {name: k for k, name in enumerate(program.row_names)}
         if missing := self.on_rows.keys() - at.keys():
@@ -313,7 +312,7 @@ def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> _Lagrangian:
 
 def _on_its_mesh(answer: Answer) -> _Lagrangian:
     space, v = space_near(answer.problem, answer.gait, answer.edges, answer.scheme)
-    return _lagrangian(space.with_far(answer.problem.body.far_pairs), v, answer.delta)
+    return _lagrangian(with_far(space, answer.problem.body.far_pairs), v, answer.delta)
 
 
 def _on_halved_mesh(answer: Answer, own: _Lagrangian) -> _Lagrangian:

@@ -119,6 +119,11 @@ def space_of(
     return _searched(problem).space(control_problem(problem), near, edges, scheme, far)
 
 
+def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
+    """The same class on the same mesh with other pairs of links kept apart."""
+    return space_of(space.control.problem, *space.given, far)
+
+
 def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
     """The class of a problem on its first mesh, and parameters about a gait that need not keep every row: ten times as fast for
     free paths."""
