@@ -1,7 +1,8 @@
 """The numbers of a problem that nobody knows exactly or that could be chosen otherwise, each with the problem where it differs.
 
-Friction, lengths, weights, feet, what limits the gait. What has to stay alike stays so: lengths, and weights, add up to 1, and
-where the class of gaits asks for a body that reads the same from both ends, mirrored links and feet change together.
+Friction, lengths, weights, masses, feet, what limits the gait. What has to stay alike stays so: lengths, weights, and masses
+add up to 1, and where the class of gaits asks for a body that reads the same from both ends, mirrored links and feet change
+together.
 """
 
 from __future__ import annotations
@@ -136,7 +137,7 @@ def _of_body(problem: Problem) -> Iterator[Parameter]:
     if body is None:
         return
     mirrored = problem.gait.symmetry in (BILATERAL, BOTH)
-    for field, words in (("lengths", "length"), ("weights", "weight")):
+    for field, words in (("lengths", "length"), ("weights", "weight"), ("masses", "mass")):
         own = getattr(body, field)
         for links in _mirror_sets(len(own), mirrored):
             if len(links) < len(own):

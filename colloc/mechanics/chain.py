@@ -47,11 +47,17 @@ class Chain(Links):
         Of every link [body lengths]: links do not overlap but neighbours about their joint (`colloc.mechanics.contact`). By
         default links are lines, which must not cross but may lie on each other. Friction is that of the lines either way.
     weights : tuple of float
-        Of the links from tail to head, in parts of the body's weight, 1; by default in proportion to their lengths. What a
-        law says of a length is multiplied by the weight per length there, so drag of a fluid goes with the default only.
+        By which the links press on the floor, from tail to head, in parts of the body's weight, 1; by default in proportion to
+        their lengths. What a law says of a length is multiplied by the weight per length there, so drag of a fluid goes with
+        the default only.
     feet : int or tuple of Foot
         What it stands on: so many on each link, evenly spread (one: its middle), or a `Foot` or `Wheel` each. By default the
         links lie on the floor along their length.
+    masses : tuple of float
+        Of the links, in parts of the body's mass, 1; by default each is as heavy as it presses. A link that hangs on its
+        neighbours, or leans on them, has another. The centre of mass follows from them, and inertia (`colloc.Problem.froude`).
+    inertias : tuple of float
+        Moments of inertia of the links about their midpoints [body mass x length^2]; by default those of uniform rods.
 
     Examples
     --------
@@ -94,6 +100,8 @@ class Chain(Links):
     def describe(self) -> str:
         wide = f", {self.width:.4g} wide" if self.width else ""
         heavy = f", of weights {', '.join(f'{weight:.4g}' for weight in self.weights)}" if self.weights else ""
+        for words, parts in (("masses", self.masses), ("moments of inertia", self.inertias)):
+            heavy += f", of {words} {', '.join(f'{part:.4g}' for part in parts)}" if parts else ""
         lengths = ", ".join(f"{length:.4g}" for length in self.lengths)
         stands = f", on {len(self.standing_on)} feet" if self.feet else ""
         if self.largest_imbalance > BALANCED:
@@ -230,22 +238,24 @@ class Chain(Links):
         return self._points(angles, self.n_link) if self.feet else np.zeros((2, 0, angles.shape[1]))
 
     def imbalance(self, angles: np.ndarray) -> np.ndarray:
-        if not self.feet:
-            return np.zeros(angles.shape[1])
-        weight = np.array([foot.weight for foot in self.standing_on])
-        pressed = np.einsum("f,cft->ct", weight, self.foot_places(angles))
-        return np.hypot(*(pressed - self.centre(angles)))
+        if self.feet:
+            weight, places = np.array([foot.weight for foot in self.standing_on]), self.foot_places(angles)
+        else:
+            weight, places = self.weight_column()[:, 0], np.stack(self.posture(angles)[2:])
+        return np.hypot(*(np.einsum("f,cft->ct", weight, places) - self.centre(angles)))
 
     @property
     def largest_imbalance(self) -> float:
         """`imbalance` at the worst shape, whatever the limits of the joints."""
-        path, weights = self.weighted_path(None), self.weight_column()[:, 0]
-        arms = -(weights @ path).astype(complex)
+        path, masses = self.weighted_path(None), self.mass_column()[:, 0]
+        if not self.feet:
+            return float(np.abs((self.weight_column()[:, 0] - masses) @ path).sum())
+        arms = -(masses @ path).astype(complex)
         for foot in self.standing_on:
             weight = float(foot.weight or 0.0)
             arms += weight * path[foot.link]
             arms[foot.link] += weight * ((foot.place - 0.5) * self.lengths[foot.link] + 1j * foot.offset)
-        return float(np.abs(arms).sum()) if self.feet else 0.0
+        return float(np.abs(arms).sum())
 
     def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         link = self.velocity(self.posture(angles), rates, z)

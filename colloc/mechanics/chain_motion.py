@@ -77,9 +77,9 @@ def _by_anchor(
 def _values(moving: Moving, load: np.ndarray, anchor: int, z: np.ndarray) -> np.ndarray:
     body, friction, angles, rates, delta, _ = moving
     now = instant(body, friction, angles, rates, z, delta, anchor)
-    (c, s, x, y), force, weight = now.posture, now.force, body.weight_column()
-    fx = force.tangential * c - force.normal * s + weight * load[0]
-    fy = force.tangential * s + force.normal * c + weight * load[1]
+    (c, s, x, y), force, mass = now.posture, now.force, body.mass_column()
+    fx = force.tangential * c - force.normal * s + mass * load[0]
+    fy = force.tangential * s + force.normal * c + mass * load[1]
     half = 0.5 * body.length_column()
     actuator = np.zeros(z.shape[1])
     for joint in range(body.n_joint):
@@ -96,7 +96,7 @@ def _slopes(moving: Moving, load: np.ndarray, anchor: int, z: np.ndarray) -> np.
     now = instant(body, friction, angles, rates, z, delta, anchor)
     n_joint, n_time = angles.shape
     behind = np.tril(np.ones((body.n_link, n_joint)), -1)
-    none, weight = np.zeros_like(behind), body.weight_column()[:, :, None]
+    none, mass = np.zeros_like(behind), body.mass_column()[:, :, None]
     still = np.zeros((body.n_link, 2))
     dphi = np.concatenate([behind, none, still], axis=1)[:, :, None]
     dw = np.repeat(np.concatenate([none, behind - behind[anchor], still], axis=1)[:, :, None], n_time, axis=2)
@@ -111,7 +111,7 @@ def _slopes(moving: Moving, load: np.ndarray, anchor: int, z: np.ndarray) -> np.
         lambda a: np.einsum("ik,kjt->ijt", path, a),
         dphi,
         dw,
-        Load(weight * load[0], weight * load[1], weight * along[:, :, 0], weight * along[:, :, 1]),
+        Load(mass * load[0], mass * load[1], mass * along[:, :, 0], mass * along[:, :, 1]),
     )
     tail = (d.vs[0], d.vn[0] - 0.5 * body.lengths[0] * d.w[0], d.w[0])
-    return np.stack([*tail, (weight * d.vx).sum(axis=0), (weight * d.vy).sum(axis=0), d.power])
+    return np.stack([*tail, (mass * d.vx).sum(axis=0), (mass * d.vy).sum(axis=0), d.power])

@@ -6,7 +6,8 @@ a body of mass 1. With friction's force F and moment M about the centre of mass,
     Fr (dVx/dt - omega Vy) = Fx,    Fr (dVy/dt + omega Vx) = Fy,    Fr dH/dt = M,    omega = (H - H_0) / I,
 
 where H_0 is the angular momentum that the joints' motion has while the tail rests, and I the moment of inertia. For Fr = 0 this
-is the balance of forces. Links are as heavy as they press on the floor, evenly along their lengths.
+is the balance of forces. Masses and moments of inertia are the chain's; by default its links are uniform rods, as heavy as they
+press on the floor.
 """
 
 from __future__ import annotations
@@ -46,19 +47,19 @@ class MomentumRates(NamedTuple):
 
 def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> Array:
     """Velocity of the centre of mass and angular momentum about it, of links that move so, ``(3, n_time)``."""
-    xp, mass, length = namespace(link.vs), body.weight_column(), body.length_column()
+    xp, mass = namespace(link.vs), body.mass_column()
     (x, y), (vx, vy) = body.centre_of_mass(posture), body.centre_velocity(posture, link)
     own_x = link.vs * posture.cos - link.vn * posture.sin
     own_y = link.vs * posture.sin + link.vn * posture.cos
-    spin = (posture.x - _each(body, x)) * own_y - (posture.y - _each(body, y)) * own_x + length**2 / 12 * link.w
-    return xp.stack([vx, vy, xp.sum_rows(mass * spin)])
+    swing = (posture.x - _each(body, x)) * own_y - (posture.y - _each(body, y)) * own_x
+    return xp.stack([vx, vy, xp.sum_rows(mass * swing + body.inertia_column() * link.w)])
 
 
 def moment_of_inertia(body: Chain, posture: Posture) -> Array:
     """Of the body about its centre of mass, ``(1, n_time)``."""
     xp, (x, y) = namespace(posture.x), body.centre_of_mass(posture)
-    square = (posture.x - _each(body, x)) ** 2 + (posture.y - _each(body, y)) ** 2 + body.length_column() ** 2 / 12
-    return xp.sum_rows(body.weight_column() * square)
+    square = (posture.x - _each(body, x)) ** 2 + (posture.y - _each(body, y)) ** 2
+    return xp.sum_rows(body.mass_column() * square + body.inertia_column())
 
 
 def _each(body: Chain, row: Array) -> Array:
@@ -69,8 +70,8 @@ def _each(body: Chain, row: Array) -> Array:
 def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
     """Of a body of mass 1 whose tail moves with z, ``(1, n_time)``."""
     link = body.velocity(body.posture(angles), rates, z)
-    square = link.vs**2 + link.vn**2 + body.length_column() ** 2 / 12 * link.w**2
-    return 0.5 * namespace(link.vs).sum_rows(body.weight_column() * square)
+    twice = body.mass_column() * (link.vs**2 + link.vn**2) + body.inertia_column() * link.w**2
+    return 0.5 * namespace(link.vs).sum_rows(twice)
 
 
 def inertial_moments(body: Chain, angles: np.ndarray, link: LinkVelocity, growth: LinkVelocity) -> np.ndarray:
@@ -79,13 +80,13 @@ def inertial_moments(body: Chain, angles: np.ndarray, link: LinkVelocity, growth
     By virtual power: that of mass times acceleration while one joint turns alone and the tail rests. `growth` is what the
     velocities `link`, in the axes of the links, change by in a unit of time; these axes turn.
     """
-    mass, posture, still = body.weight_column(), body.posture(angles), np.zeros((3, angles.shape[1]))
+    mass, posture, still = body.mass_column(), body.posture(angles), np.zeros((3, angles.shape[1]))
     along, across = growth.vs - link.w * link.vn, growth.vn + link.w * link.vs
-    spin = body.length_column() ** 2 / 12 * growth.w
+    spin = body.inertia_column() * growth.w
     moments = []
     for unit in np.eye(body.n_joint):
         turns = body.velocity(posture, np.repeat(unit[:, None], angles.shape[1], axis=1), still)
-        moments.append((mass * (along * turns.vs + across * turns.vn + spin * turns.w)).sum(axis=0))
+        moments.append((mass * (along * turns.vs + across * turns.vn) + spin * turns.w).sum(axis=0))
     return np.array(moments)
 
 

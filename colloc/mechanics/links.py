@@ -24,6 +24,8 @@ from colloc.system.errors import ProblemError
 
 TAIL = None
 """The reference of `Links.posture`: the free end of link 0; an integer means the midpoint of that link."""
+_WHOLES = {"weights": "the body's weight", "masses": "the body's mass"}
+"""What adds up to 1."""
 
 
 class Posture(NamedTuple):
@@ -52,9 +54,13 @@ class Links:
     width: float = field(default=0.0, metadata=STATED_IF_SET)
     """Of every link [body lengths], see `colloc.mechanics.contact`; by default links are lines."""
     weights: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
-    """Of the links, in parts of the body's; by default the body is as heavy everywhere."""
+    """By which the links press on the floor, in parts of the body's; by default they press evenly everywhere."""
     feet: tuple[Foot, ...] | int = field(default=(), metadata=STATED_IF_SET)
     """What it stands on, from tail to head; by default the links lie on the floor along their length."""
+    masses: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
+    """Of the links, in parts of the body's; by default they are as heavy as they press."""
+    inertias: tuple[float, ...] = field(default=(), metadata=STATED_IF_SET)
+    """Of the links about their midpoints [body mass x length^2]; by default those of uniform rods."""
 
     def __post_init__(self) -> None:
         lengths, width = _numbers("lengths", self.lengths), self.width
@@ -63,11 +69,15 @@ class Links:
         _check_parts("lengths", lengths, "the body length")
         if not (is_number(width) and 0 <= width < min(lengths)):
             raise ProblemError(f"body.width must be a number from 0 to below the shortest link, not {width!r}.")
-        if weights := _numbers("weights", self.weights):
-            if len(weights) != len(lengths):
-                raise ProblemError(f"body.weights has {len(weights)} values; give one for each of the {len(lengths)} links.")
-            _check_parts("weights", weights, "the body's weight")
-        for name, value in (("lengths", lengths), ("width", float(width)), ("weights", weights)):
+        parts = {name: _numbers(name, getattr(self, name)) for name in ("weights", "masses", "inertias")}
+        for name, values in parts.items():
+            if values and len(values) != len(lengths):
+                raise ProblemError(f"body.{name} has {len(values)} values; give one for each of the {len(lengths)} links.")
+            if values and name in _WHOLES:
+                _check_parts(name, values, _WHOLES[name])
+        if not all(0 <= inertia < np.inf for inertia in parts["inertias"]):
+            raise ProblemError(f"body.inertias must be finite and not negative, not {parts['inertias']}.")
+        for name, value in {"lengths": lengths, "width": float(width), **parts}.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "feet", checked_feet(self.feet, self.weight_column()[:, 0]))
 
@@ -102,8 +112,9 @@ class Links:
 
     @property
     def symmetric(self) -> bool:
-        """Lengths, weights and feet read the same from both ends."""
-        alike = all(np.allclose(own, own[::-1], rtol=0, atol=1e-14) for own in (self.lengths, self.weights))
+        """Lengths, weights, masses and feet read the same from both ends."""
+        parts = self.lengths, self.weights, self.masses, self.inertias
+        alike = all(np.allclose(own, own[::-1], rtol=0, atol=1e-14) for own in parts)
         return alike and read_alike_from_both_ends(self.standing_on, self.n_link)
 
     def length_column(self) -> np.ndarray:
@@ -115,8 +126,16 @@ class Links:
         return np.array(self.weights)[:, None] / self.length_column() if self.weights else np.ones((self.n_link, 1))
 
     def weight_column(self) -> np.ndarray:
-        """Weights as an ``(n_link, 1)`` column."""
+        """Weights by which the links press, as an ``(n_link, 1)`` column."""
         return np.array(self.weights or self.lengths)[:, None]
+
+    def mass_column(self) -> np.ndarray:
+        """Masses as an ``(n_link, 1)`` column."""
+        return np.array(self.masses)[:, None] if self.masses else self.weight_column()
+
+    def inertia_column(self) -> np.ndarray:
+        """Moments of inertia of the links about their midpoints, as an ``(n_link, 1)`` column."""
+        return np.array(self.inertias)[:, None] if self.inertias else self.mass_column() * self.length_column() ** 2 / 12
 
     def _joint_sum(self, reference: int | None) -> np.ndarray:
         """``(n_link, n_joint)``: joint quantities to link angles, relative to the reference link (the tail link: 0)."""
@@ -169,16 +188,16 @@ class Links:
     def centre_of_mass(self, posture: Posture) -> tuple[Array, Array]:
         """Centre of mass relative to the reference, two ``(1, n_time)`` rows."""
         xp = namespace(posture.x)
-        weight = self.weight_column()
-        return xp.sum_rows(weight * posture.x), xp.sum_rows(weight * posture.y)
+        mass = self.mass_column()
+        return xp.sum_rows(mass * posture.x), xp.sum_rows(mass * posture.y)
 
     def centre_velocity(self, posture: Posture, link: LinkVelocity) -> tuple[Array, Array]:
         """Velocity of the centre of mass in body-frame axes, two ``(1, n_time)`` rows."""
         xp = namespace(link.vs)
-        weight = self.weight_column()
+        mass = self.mass_column()
         return (
-            xp.sum_rows(weight * (link.vs * posture.cos - link.vn * posture.sin)),
-            xp.sum_rows(weight * (link.vs * posture.sin + link.vn * posture.cos)),
+            xp.sum_rows(mass * (link.vs * posture.cos - link.vn * posture.sin)),
+            xp.sum_rows(mass * (link.vs * posture.sin + link.vn * posture.cos)),
         )
 
     def joints(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

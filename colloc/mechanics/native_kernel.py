@@ -37,7 +37,7 @@ _PIECE = 4000
 """Instants a call treats: about 10 ms, after which an interrupt is heard, and a thread may have another piece."""
 
 _REAL, _COUNT, _ARRAY = ctypes.c_double, ctypes.c_ssize_t, ctypes.c_void_p
-BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
+BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_motion": (*BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
@@ -99,7 +99,7 @@ def address(array: np.ndarray | None) -> int | None:
 def call_for_all(function: Callable[..., int], body: Links, friction: Law, n_time: int, *arguments: object) -> None:
     """Call a function of the kernel for all instants: with the chain, the law and the instants of a piece, then arguments."""
     law = np.array(body.contact.kernel_law(friction).numbers, dtype=float)
-    numbers = np.array(body.lengths), body.pressure_column().ravel(), law
+    numbers = np.array(body.lengths), body.pressure_column().ravel(), body.mass_column().ravel(), law
     chain = (body.n_link, *map(address, numbers), n_time)
     _each_piece(n_time, lambda first, last: function(*chain, first, last, *arguments))
 

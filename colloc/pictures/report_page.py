@@ -45,7 +45,7 @@ PLAIN = {
     "tangent angle": "The body bends no further from its own direction than it may, so that it cannot cross itself.",
     "self-contact": "No part of the body passes through another, at any instant.",
     "stability": "After a push the body comes back to this motion, period by period.",
-    "statics": "How far the weights its feet are given press beside its centre of mass; a real body shifts its weight by that.",
+    "statics": "How far the weights it is given press beside its centre of mass; a real body shifts its weight by that.",
     "actuators": "No joint has to do more than it can, at any instant.",
     "replay gap": "An independent replay of the motion finds the same value.",
     "replay error": "The replay itself is as exact as was asked for.",

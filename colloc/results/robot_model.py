@@ -1,9 +1,9 @@
 """The robot of a result for simulators: MJCF (MuJoCo) and URDF, in metres, kilograms and seconds.
 
-Links are uniform rods of the problem's lengths and weights, drawn as boxes; joints are hinges about the vertical. Links of no
-width are drawn `_THIN` wide. What touches the floor is the whole link, or a small sphere at each foot. A simulator's own
-contacts know one coefficient of friction, here the geometric mean of the smallest and the largest: where friction has a
-direction, its floor is another than colloc's (`scripts.play_in_mujoco` applies the law itself).
+Links have the problem's lengths, masses and moments of inertia and are drawn as boxes; joints are hinges about the vertical.
+Links of no width are drawn `_THIN` wide. What touches the floor is the whole link, or a small sphere at each foot. A
+simulator's own contacts know one coefficient of friction, here the geometric mean of the smallest and the largest: where
+friction has a direction, its floor is another than colloc's (`scripts.play_in_mujoco` applies the law itself).
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def mjcf(robot: Robot, *, planar: bool = False) -> str:
                 SubElement(parent, "joint", name=name, type=kind, axis=axis)
         else:
             SubElement(parent, "freejoint", name="tail")
-        inertia = " ".join(f"{value:.9g}" for value in _inertia(robot, length, mass))
+        inertia = " ".join(f"{value:.9g}" for value in _inertia(robot, k, mass))
         SubElement(parent, "inertial", pos=f"{length / 2:.9g} 0 0", mass=f"{mass:.9g}", diaginertia=inertia)
         size = f"{length / 2:.9g} {_width(robot) / 2:.9g} {half:.9g}"
         box = {"type": "box", "pos": f"{length / 2:.9g} 0 0", "size": size, "rgba": _COLOUR}
@@ -115,7 +115,7 @@ def urdf(robot: Robot) -> str:
         inertial, middle = SubElement(link, "inertial"), f"{length / 2:.9g} 0 0"
         SubElement(inertial, "origin", xyz=middle)
         SubElement(inertial, "mass", value=f"{mass:.9g}")
-        xx, yy, zz = _inertia(robot, length, mass)
+        xx, yy, zz = _inertia(robot, k - 1, mass)
         SubElement(inertial, "inertia", ixx=f"{xx:.9g}", iyy=f"{yy:.9g}", izz=f"{zz:.9g}", ixy="0", ixz="0", iyz="0")
         for kind in ("visual",) if chain.feet else ("visual", "collision"):
             shape = SubElement(link, kind)
@@ -155,7 +155,7 @@ def _lengths(robot: Robot) -> np.ndarray:
 
 
 def _masses(robot: Robot) -> np.ndarray:
-    return np.asarray(robot.mass * _chain(robot).weight_column()[:, 0])
+    return np.asarray(robot.mass * _chain(robot).mass_column()[:, 0])
 
 
 def _width(robot: Robot) -> float:
@@ -166,10 +166,9 @@ def _height(robot: Robot) -> float:
     return _THIN * robot.length
 
 
-def _inertia(robot: Robot, length: float, mass: float) -> tuple[float, float, float]:
-    """About the link's own axes [kg m^2]: about the vertical and across it that of a rod, as in colloc; about its length
-    that of the box."""
-    upright = mass * length**2 / 12
+def _inertia(robot: Robot, link: int, mass: float) -> tuple[float, float, float]:
+    """About the link's own axes [kg m^2]: about the vertical and across it that of colloc; about its length that of the box."""
+    upright = robot.mass * robot.length**2 * float(_chain(robot).inertia_column()[link, 0])
     return mass * (_width(robot) ** 2 + _height(robot) ** 2) / 12, upright, upright
 
 

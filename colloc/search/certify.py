@@ -227,7 +227,7 @@ def _motion(
         *_speeds(problem, rates),
     ]
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
-        beside = "way from the centre of mass to where the feet's weights press [body lengths]; reported, not judged"
+        beside = "way from the centre of mass to where its weights press [body lengths]; reported, not judged"
         checks.append(Check("statics", lean, _ANY_LEAN, beside))
     if fine.multipliers:
         meaning = "largest Floquet multiplier: what a period leaves of a small change of the momenta"

@@ -175,7 +175,7 @@ def inertial_motion(
     Parameters
     ----------
     body : Chain or Coupled
-        Its links are as heavy as they press on the floor, evenly along their lengths.
+        With the masses of its links.
     friction : Law
     gait : callable
         Joint angles and rates at phases in [0, 1]; any gait of colloc but relaxed ones. Their pace within the period counts.

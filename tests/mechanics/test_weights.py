@@ -11,8 +11,8 @@ from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.bounds.sampling import Domain
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.chain_motion import chain_motion
-from colloc.mechanics.native_kernel import native_kernel
+from colloc.mechanics.chain_motion import chain_motion, chain_slopes
+from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.search.solve import solve
 from research.guarantee.guaranteed import certify
 
@@ -143,3 +143,75 @@ def test_a_bound_knows_the_weights_or_refuses():
 def test_unusable_weights_are_named(weights):
     with pytest.raises(ProblemError, match=r"body\.weights"):
         Chain(weights=weights)
+
+
+MASSES = (0.1, 0.3, 0.6)
+
+
+def test_masses_that_are_the_weights_are_no_masses():
+    said, unsaid = Chain(LENGTHS, weights=WEIGHTS, masses=WEIGHTS), Chain(LENGTHS, weights=WEIGHTS)
+    assert said.largest_imbalance == unsaid.largest_imbalance == 0.0
+    angles, rates = random_instants(30)
+    both = (by_both(body, Friction(2.0), angles, rates, 1e-4) for body in (said, unsaid))
+    for one, other in zip(*both, strict=True):
+        np.testing.assert_array_equal(one[0], other[0])
+        np.testing.assert_array_equal(one[1].centre, other[1].centre)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_masses_move_the_centre_and_nothing_else_of_a_slow_body(law):
+    """The balance is that of the weights; the centre of mass is a mean with the masses, and so is its velocity."""
+    plain, heavy = Chain(LENGTHS, weights=WEIGHTS), Chain(LENGTHS, weights=WEIGHTS, masses=MASSES)
+    angles, rates = random_instants(30)
+    solved = solve_balance(plain, law, angles, rates, 1e-4)
+    own = solve_balance(heavy, law, angles, rates, 1e-4)
+    np.testing.assert_array_equal(own.z, solved.z)
+    velocity = heavy.velocity(heavy.posture(angles), rates, own.z)
+    direction = np.exp(1j * heavy.tangent_angles(angles))
+    expected = np.array(MASSES) @ ((velocity.vs + 1j * velocity.vn) * direction)
+    (_, motion, slopes), (_, known, reference) = by_both(heavy, law, angles, rates, 1e-4)
+    np.testing.assert_allclose(motion.centre[0] + 1j * motion.centre[1], expected, atol=1e-9)
+    np.testing.assert_allclose(known.centre, motion.centre, atol=1e-9)
+    np.testing.assert_allclose(slopes, reference, atol=1e-9)
+
+
+def test_the_weight_of_a_mass_pulls_where_it_is():
+    """A slope pulls at the centre of mass; compiled and NumPy alike."""
+    body, law, (angles, rates) = Chain(LENGTHS, masses=MASSES), Friction(), random_instants(30)
+    load = np.repeat([[-0.2], [0.1]], 30, axis=1)
+    solved = solve_balance(body, law, angles, rates, 1e-3, load=load)
+    posture = body.posture(angles)
+    force = net_force(posture, instant(body, law, angles, rates, solved.z, 1e-3).force)
+    x, y = (np.array(MASSES) @ part for part in (posture.x, posture.y))
+    np.testing.assert_allclose(force, -np.stack([*load, x * load[1] - y * load[0]]), atol=1e-8)
+    motion, slopes = chain_slopes(body, law, angles, rates, 1e-3, solved, load)
+    with numpy_instead():
+        known, reference = chain_slopes(body, law, angles, rates, 1e-3, solved, load)
+    np.testing.assert_allclose(motion.actuator_power, known.actuator_power, atol=1e-9)
+    np.testing.assert_allclose(slopes / np.abs(reference).max(), reference / np.abs(reference).max(), atol=1e-9)
+
+
+def test_a_body_with_masses_says_so_and_how_it_leans():
+    body = Chain(masses=MASSES, inertias=(0.01, 0.0, 0.01))
+    text = body.describe()
+    assert "of masses 0.1, 0.3, 0.6" in text
+    assert "of moments of inertia 0.01, 0, 0.01" in text
+    assert "beside the centre of mass" in text
+    assert not body.symmetric
+    angles = random_instants(20)[0]
+    assert (body.imbalance(angles) <= body.largest_imbalance).all()
+    assert body.imbalance(np.zeros((2, 1)))[0] == pytest.approx(0.5 / 3, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"masses": (0.5, 0.5)}, "one for each of the 3 links"),
+        ({"masses": (0.5, 0.5, 0.5)}, "the body's mass 1"),
+        ({"inertias": (0.1, -0.1, 0.1)}, "not negative"),
+        ({"inertias": (0.1, 0.1)}, "one for each of the 3 links"),
+    ],
+)
+def test_masses_that_cannot_be_are_refused_in_a_sentence(fields, said):
+    with pytest.raises(ProblemError, match=said):
+        Chain(**fields)

@@ -11,18 +11,19 @@ from colloc.commands.export import main
 from colloc.results.robot_model import mjcf, urdf
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
+MASSES, INERTIAS = (0.3, 0.2, 0.5), (0.002, 0.006, 0.001)
 
 
 @pytest.fixture(scope="module")
 def uneven():
-    """Links of their own lengths and weights, ranges to one side, and feet."""
+    """Links of their own lengths, weights, masses and moments of inertia, ranges to one side, and feet."""
     feet = (
         Foot(0, 0.2, weight=0.2),
         Foot(1, weight=0.5),
         Foot(2, 0.7, offset=0.02, weight=0.15),
         Foot(2, 0.7, offset=-0.02, weight=0.15),
     )
-    body = Chain((0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet)
+    body = Chain((0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet, masses=MASSES, inertias=INERTIAS)
     limits = ((-1.0, 2.0), 1.5)
     problem = Problem("uneven", body=body, friction=Friction(2, 1, 1), gait=Harmonic(1), joint_limit=limits, delta=1e-2)
     return colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
@@ -36,9 +37,9 @@ def test_an_mjcf_has_the_links_masses_ranges_and_feet_of_the_robot(uneven):
     root = ElementTree.fromstring(mjcf(uneven.robot(**SIZE)))
     bodies = list(root.find("worldbody").iter("body"))
     masses = [float(body.find("inertial").get("mass")) for body in bodies]
-    assert masses == pytest.approx([0.6, 1.5, 0.9])
+    assert masses == pytest.approx(np.multiply(3.0, MASSES))
     upright = [numbers(body.find("inertial").get("diaginertia"))[2] for body in bodies]
-    assert upright == pytest.approx([m * length**2 / 12 for m, length in zip(masses, (0.24, 0.6, 0.36), strict=True)])
+    assert upright == pytest.approx(np.multiply(3.0 * 1.2**2, INERTIAS))
     assert [numbers(body.get("pos"))[0] for body in bodies[1:]] == pytest.approx([0.24, 0.6])
     assert [numbers(joint.get("range")) for joint in root.iter("joint")] == [[-1.0, 2.0], [-1.5, 1.5]]
     feet = [numbers(geom.get("pos")) for geom in root.iter("geom") if geom.get("name").startswith("foot")]

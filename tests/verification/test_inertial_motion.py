@@ -15,14 +15,16 @@ CHAIN, UNEQUAL = colloc.Chain(), colloc.Chain((0.3, 0.45, 0.25))
 ISOTROPIC, ANISOTROPIC = colloc.Friction(), colloc.Friction(1.7, 1.0, 1.3)
 
 
-def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=40):
+def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=40, masses=None, inertias=None):
     """Distance, work and rotation of the last period: mass points, differences in time, Runge and Kutta's method."""
     mu_t, mu_f, mu_b = mu
     lengths = np.array(lengths)
+    masses = lengths if masses is None else np.array(masses)
     along = (np.arange(points) + 0.5) / points
-    mass = np.repeat(lengths / points, points)
-    # midpoints of cells miss the turning of the cells themselves
-    own_inertia = (lengths * (lengths / points) ** 2 / 12).sum()
+    mass, weight = np.repeat(masses / points, points), np.repeat(lengths / points, points)
+    # what midpoints of cells miss of the links' inertia
+    cells = masses * lengths**2 / 12 if inertias is None else np.array(inertias)
+    cells = cells - masses * lengths**2 * ((along - 0.5) ** 2).mean()
 
     def tangents(t):
         return np.concatenate([[0.0], np.cumsum(gait(np.array([t % 1.0]))[0][:, 0])])
@@ -37,18 +39,18 @@ def newtons_law(lengths, mu, gait, delta, froude, steps=1200, periods=3, points=
         place, turn = shape(t)
         moving = (shape(t + h)[0] - shape(t - h)[0]) / (2 * h)
         spins = (tangents(t + h) - tangents(t - h)) / (2 * h)
-        return place - mass @ place, moving - mass @ moving, turn, (lengths * (lengths / points) ** 2 / 12) @ spins
+        return place - mass @ place, moving - mass @ moving, turn, cells @ spins
 
     def law(t, state, shape_now):
         """Unknowns: orientation, place and velocity of the centre of mass in the plane, angular momentum, work."""
         place, moving, turn, own = shape_now
         theta, velocity, h = state[0].real, state[2], state[3].real
-        inertia = mass @ np.abs(place) ** 2 + own_inertia
+        inertia = mass @ np.abs(place) ** 2 + cells.sum()
         omega = (h - mass @ (np.conj(place) * moving).imag - own) / inertia
         v = velocity * np.exp(-1j * theta) + moving + 1j * omega * place
         tangential, normal = (np.conj(turn) * v).real, (np.conj(turn) * v).imag
         size = np.sqrt(np.abs(v) ** 2 + delta**2)
-        force = -turn * (np.where(tangential > 0, mu_f, mu_b) * tangential + 1j * mu_t * normal) / size * mass
+        force = -turn * (np.where(tangential > 0, mu_f, mu_b) * tangential + 1j * mu_t * normal) / size * weight
         power = -(np.conj(force) * v).real.sum()
         moment = (np.conj(place) * force).imag.sum()
         pull = force.sum() * np.exp(1j * theta)
@@ -81,6 +83,19 @@ def test_newtons_law_for_dense_points_says_the_same(lengths, friction, gait):
     assert played.distance == pytest.approx(distance, rel=1e-3)
     assert played.work == pytest.approx(work, rel=1e-3)
     assert played.rotation == pytest.approx(rotation, abs=1e-3)
+
+
+def test_masses_and_inertias_of_ones_own_move_as_newtons_law_says():
+    """A body that presses evenly, with a heavy head of little inertia: a program that shares no line."""
+    lengths, masses, inertias = (0.3, 0.45, 0.25), (0.2, 0.2, 0.6), (0.001, 0.02, 0.001)
+    distance, work, rotation = newtons_law(lengths, (1.7, 1.0, 1.3), LEANING, 0.05, 0.1, masses=masses, inertias=inertias)
+    own, plain = (
+        colloc.inertial_motion(body, ANISOTROPIC, LEANING, 0.05, 0.1)
+        for body in (colloc.Chain(lengths, masses=masses, inertias=inertias), UNEQUAL)
+    )
+    assert (own.distance, own.work) == pytest.approx((distance, work), rel=1e-3)
+    assert own.rotation == pytest.approx(rotation, abs=1e-3)
+    assert abs(own.distance / plain.distance - 1) > 0.05, "what it is compared with would be nothing"
 
 
 def test_momenta_and_tail_velocity_are_inverse_to_each_other():

@@ -10,7 +10,8 @@
 
 typedef struct {
     int number;                        /* from 0 at the tail */
-    double length, pressure, cos, sin; /* pressure: weight per length over the body's; direction in the body frame */
+    double length, pressure, mass, cos, sin; /* pressure: weight per length over the body's, mass: over the body's; direction in the
+                                                 body frame */
     double x, y;             /* midpoint, seen from that of the reference */
     double rate;             /* of the joint behind the link (0 at the tail) */
     double load_x, load_y;   /* its share of an outside force on the body */
@@ -42,8 +43,8 @@ typedef struct {
 
 /* Directions of the links, from joint angles that lie `stride` apart; and rates in units of `speed`. */
 static inline void find_directions(
-    const int n, Link *link, const double *length, const double *pressure, const double *angle, const double *rate, double speed,
-    ptrdiff_t stride)
+    const int n, Link *link, const double *length, const double *pressure, const double *mass, const double *angle,
+    const double *rate, double speed, ptrdiff_t stride)
 {
     double phi = 0.0;
     for (int i = 0; i < n; ++i) {
@@ -52,6 +53,7 @@ static inline void find_directions(
         link[i].number = i;
         link[i].length = length[i];
         link[i].pressure = pressure[i];
+        link[i].mass = mass[i];
         link[i].cos = cos(phi);
         link[i].sin = sin(phi);
         link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
@@ -59,12 +61,12 @@ static inline void find_directions(
     }
 }
 
-/* An outside force on the body, in its axes, whose components lie `stride` apart: the links share it as they share the weight. */
+/* An outside force on the body, in its axes, whose components lie `stride` apart: the links share it as they share the mass. */
 static inline void find_loads(const int n, Link *link, const double *load, ptrdiff_t stride)
 {
     for (int i = 0; i < n; ++i) {
-        link[i].load_x = link[i].pressure * link[i].length * load[0];
-        link[i].load_y = link[i].pressure * link[i].length * load[stride];
+        link[i].load_x = link[i].mass * load[0];
+        link[i].load_y = link[i].mass * load[stride];
     }
 }
 

@@ -23,15 +23,15 @@ static inline double scaled_delta_of(double delta, double speed)
 }
 
 static inline void balance_instants(
-    const int n, State *s, const double *length, const double *pressure, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last, const double *angles,
-    const double *rates, double delta, const double *load, const double *start, double tolerance, long long budget, int method, double *z,
+    const int n, State *s, const double *length, const double *pressure, const double *mass, ptrdiff_t n_time, ptrdiff_t first,
+    ptrdiff_t last, const double *angles, const double *rates, double delta, const double *load, const double *start, double tolerance, long long budget, int method, double *z,
     double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     for (ptrdiff_t t = first; t < last; ++t) {
         const double largest = largest_rate_of(n, rates + t, n_time, load ? delta : 0.0), speed = speed_unit_of(largest);
         Vector3 tail;
         s->largest_rate = largest;
-        find_directions(n, s->link, length, pressure, angles + t, rates + t, speed, n_time);
+        find_directions(n, s->link, length, pressure, mass, angles + t, rates + t, speed, n_time);
         if (load)
             find_loads(n, s->link, load + t, n_time);
         s->anchor = n / 2;
@@ -58,8 +58,8 @@ static inline void balance_instants(
 
 /* `load` (2, n_time), in the body's axes, or NULL. Returns 0, or 1 without memory. */
 int colloc_balance(
-    int n, const double *length, const double *pressure, const double *law_numbers, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
-    const double *angles, const double *rates, double delta, const double *load, const double *start, double tolerance, long long budget,
+    int n, const double *length, const double *pressure, const double *mass, const double *law_numbers, ptrdiff_t n_time,
+    ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, double delta, const double *load, const double *start, double tolerance, long long budget,
     int method, double *z, double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     Link *link = malloc((size_t)n * sizeof *link);
@@ -67,8 +67,8 @@ int colloc_balance(
     if (link && sliding) {
         State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n};
         balance_instants(
-            n, &s, length, pressure, n_time, first, last, angles, rates, delta, load, start, tolerance, budget, method, z, residual,
-            iterations, anchor, anchor_velocity);
+            n, &s, length, pressure, mass, n_time, first, last, angles, rates, delta, load, start, tolerance, budget, method, z,
+            residual, iterations, anchor, anchor_velocity);
     }
     free(link);
     free(sliding);
@@ -79,8 +79,8 @@ int colloc_balance(
    derivatives of the first of them with respect to joint angles and rates, and to the load if there is one,
    (DIFFERENTIATED_ROWS, 2 (n - 1) (+ 2), n_time). */
 int colloc_motion(
-    int n, const double *length, const double *pressure, const double *law_numbers, ptrdiff_t n_time, ptrdiff_t first, ptrdiff_t last,
-    const double *angles, const double *rates, double delta, const double *load, const long long *anchor, const double *anchor_velocity,
+    int n, const double *length, const double *pressure, const double *mass, const double *law_numbers, ptrdiff_t n_time,
+    ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, double delta, const double *load, const long long *anchor, const double *anchor_velocity,
     double *values, double *slopes)
 {
     const Law law = law_of(law_numbers);
@@ -96,7 +96,7 @@ int colloc_motion(
         Vector3 z, net, dz;
         for (int i = 0; i < 3; ++i)
             z[i] = anchor_velocity[i * n_time + t] / speed;
-        find_directions(n, link, length, pressure, angles + t, rates + t, speed, n_time);
+        find_directions(n, link, length, pressure, mass, angles + t, rates + t, speed, n_time);
         if (load)
             find_loads(n, link, load + t, n_time);
         find_midpoints(n, link, a);

@@ -34,8 +34,8 @@ static inline void find_values(const int n, const Link *link, const Sliding *k, 
     value[CENTRE_ROW] = value[CENTRE_ROW + 1] = value[POWER_ROW] = 0.0;
     for (int i = 0; i < n; ++i) {
         link_velocity(&link[i], &k[i], v);
-        value[CENTRE_ROW] += link[i].pressure * link[i].length * v[0];
-        value[CENTRE_ROW + 1] += link[i].pressure * link[i].length * v[1];
+        value[CENTRE_ROW] += link[i].mass * v[0];
+        value[CENTRE_ROW + 1] += link[i].mass * v[1];
         value[POWER_ROW] -= k[i].fs * k[i].vs + k[i].fn * k[i].vn + k[i].couple * k[i].w;
     }
     value[ACTUATOR_ROW] = actuator_power(n, link, k);
@@ -102,7 +102,7 @@ static inline void load_change(const int n, const Link *link, const int side, Ch
     memset(d, 0, (size_t)n * sizeof *d);
     net[0] = side == 0, net[1] = side == 1, net[2] = 0.0;
     for (int i = 0; i < n; ++i)
-        net[2] += link[i].pressure * link[i].length * (side ? link[i].x : -link[i].y);
+        net[2] += link[i].mass * (side ? link[i].x : -link[i].y);
 }
 
 /* Let the anchor follow with dz, so that the body stays in balance. */
@@ -129,8 +129,8 @@ static inline void value_changes(
     for (int i = 0; i < n; ++i) {
         Vector3 df;
         force_change(K[i], &d[i], df);
-        change[3] += link[i].pressure * link[i].length * d[i].vx;
-        change[4] += link[i].pressure * link[i].length * d[i].vy;
+        change[3] += link[i].mass * d[i].vx;
+        change[4] += link[i].mass * d[i].vy;
         change[5] -= df[0] * k[i].vs + df[1] * k[i].vn + df[2] * k[i].w;
         change[5] -= k[i].fs * d[i].vs + k[i].fn * d[i].vn + k[i].couple * d[i].w;
     }
