@@ -14,6 +14,7 @@ from colloc.gaits.limits import Limit, range_of
 from colloc.mechanics.bodies import Body, Pairs, Stretch
 from colloc.mechanics.contact import Contact, tangent_of_minimum
 from colloc.numerics.constraint_rows import Group, block_group
+from colloc.numerics.peaks import vertex
 
 _PLACES, _FLAT = 9, 1e-12
 """On a stretch of a smooth body; a bend of its angle below which it has no peak."""
@@ -136,8 +137,7 @@ def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> Sh
         heights = np.abs(rows @ shapes)
         inner, every = np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2), np.arange(heights.shape[1])
         low, mid, high = (heights[inner + k, every] for k in (-1, 0, 1))
-        bend = np.minimum(low - 2 * mid + high, 0.0)
-        offset = np.divide(0.5 * (low - high), bend, out=np.sign(high - low), where=bend < -_FLAT)
+        offset = np.where(low - 2 * mid + high < -_FLAT, vertex(low, mid, high), np.sign(high - low))
         return fine[inner] + np.clip(offset, -1, 1) * (fine[1] - fine[0])
 
     def along(shapes: np.ndarray) -> np.ndarray:

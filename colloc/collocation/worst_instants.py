@@ -15,11 +15,8 @@ from colloc.collocation.shape_checks import ShapeCheck
 from colloc.gaits.limits import Limit
 from colloc.gaits.path_samples import Gait
 from colloc.numerics.mesh import Mesh
+from colloc.numerics.peaks import SAMPLES, peaks, vertex
 
-_SAMPLES = 16
-_ZOOMS = 3
-"""Every zoom samples 8 times as densely. On a cell of 1/40 of a period the last samples are 3e-6 periods apart, within
-which angles change by far less than the width over which a kink is smoothed."""
 _NEAR, _FAR = 0.1, 1.0
 """A search watches every cell in which a check is nearer to its bound than the first [rad], and peaks nearer than the second:
 the rest is looked at again when the gait has moved."""
@@ -35,12 +32,12 @@ def worst_instants(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: 
     return [_worst(gait, mesh, check, np.arange(mesh.n), limit) for check in checks]
 
 
-def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) -> list[tuple[np.ndarray, np.ndarray]]:
+def near_peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each check, the mesh cells in which it might bind soon, and its worst instants there, ``(n,)`` each.
 
     Those are the cells in which it is near its bound (`limit` for angles, else 0), and those in which it has a peak.
     """
-    fine = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    fine = np.linspace(0.0, 1.0, SAMPLES + 1)
     times, found = (mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel(), []
     given = {check.derivative: check for check in checks}
     shapes = {order: check.of(gait, times) for order, check in given.items()}
@@ -55,22 +52,11 @@ def peaks(gait: Gait, mesh: Mesh, checks: Sequence[ShapeCheck], limit: Limit) ->
 
 
 def _worst(gait: Gait, mesh: Mesh, check: ShapeCheck, cells: np.ndarray, limit: Limit) -> np.ndarray:
-    rows, fine = np.arange(cells.size), np.linspace(0.0, 1.0, _SAMPLES + 1)
-    left, width = mesh.edges[cells], mesh.h[cells]
-    for zoom in range(_ZOOMS + 1):
-        times = left[:, None] + width[:, None] * fine
-        values = check.magnitudes(check.of(gait, times.ravel()), limit).reshape(times.shape)
-        best = np.argmax(values, axis=1)
-        inner = np.clip(best, 1, _SAMPLES - 1)
-        if zoom < _ZOOMS:
-            left, width = times[rows, inner - 1], 2 * width / _SAMPLES
-    # one parabola through the best sample and its neighbours places a smooth maximum inside to O(step^4)
-    low, mid, high = (values[rows, inner + k] for k in (-1, 0, 1))
-    curvature = low - 2 * mid + high
-    with np.errstate(divide="ignore", invalid="ignore"):
-        offset = np.where(curvature < 0, 0.5 * (low - high) / curvature, 0.0)
-    offset = np.where(best == inner, np.clip(offset, -1, 1), 0.0)
-    return times[rows, best] + offset * width / _SAMPLES
+
+    def beyond(t: np.ndarray) -> np.ndarray:
+        return check.magnitudes(check.of(gait, t.ravel()), limit).reshape(t.shape)
+
+    return peaks(beyond, mesh.edges[cells], mesh.h[cells])[0]
 
 
 def moving(values: np.ndarray, check: ShapeCheck, limit: Limit, times: np.ndarray, mesh: Mesh, cells: np.ndarray) -> np.ndarray:
@@ -97,8 +83,7 @@ def followed(
     sign = np.sign(heights(times)[1] - check.middle(limit)) if check.both_ways else 1.0
     for _ in range(_STEPS):
         before, here, after = sign * heights(times)
-        bend = before - 2 * here + after
-        move = np.where(bend < 0, 0.5 * (before - after) / np.where(bend < 0, bend, 1.0), 0.0) * step
+        move = vertex(before, here, after) * step
         times = np.clip(times + np.clip(move, -_LARGEST * h, _LARGEST * h), left + step, left + h - step)
     return times
 

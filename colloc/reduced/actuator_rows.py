@@ -16,17 +16,18 @@ from colloc.collocation.program import GaitProgram
 from colloc.gaits.gait_fields import AnyGait
 from colloc.mechanics.actuators import ActuatorLimits
 from colloc.numerics.mesh import Mesh
+from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
 from colloc.reduced.actuator_slopes import share_slopes
 from colloc.reduced.motion import ReducedMotion
 
-_SAMPLES = np.linspace(1e-9, 1 - 1e-9, 17)
-"""Of an interval; rates may jump at its ends."""
+_INSIDE = np.linspace(1e-9, 1 - 1e-9, SAMPLES + 1)
+"""Samples of an interval, as shares of it; rates may jump at its ends."""
 _NEAR = 0.3
 """A value that is nearer to its bound than this, over the limit, is among the rows."""
-_ZOOMS, _CLOSE = 2, 0.02
-"""Samples are laid again, 8 times as densely, round the highest of an interval that is nearer than this to its limit."""
-_ZOOMS_TO_PEAK, _SHIFT, _STEP = 4, 1e-2, 1e-5
-"""A peak is known to 1e-5 of its interval; shift of it, as a share of that, and step of parameters for differences."""
+_ZOOMS, _CLOSE = 1, 0.02
+"""What is nearer to its limit than the second between the samples is sampled again around the highest, and zoomed into."""
+_SHIFT, _STEP = 1e-2, 1e-5
+"""Shift of a peak, as a share of its interval, and step of parameters for differences."""
 _EXACT = 3e-5
 """Excess over a limit that counts as none, relative: less than a certificate allows."""
 
@@ -65,27 +66,22 @@ class ActuatorRows:
 
     def _largest(self, gait: AnyGait, delta: float, phases: Mesh) -> np.ndarray:
         """In every interval, ``(n_share, n)``; delta is per period."""
-        t = phases.edges[:-1, None] + phases.h[:, None] * _SAMPLES
-        found = self._shares_at(gait, delta, t.ravel()).reshape(-1, *t.shape)
-        largest, t = found.max(axis=2), np.tile(t, (len(found), 1, 1))
-        for _ in range(_ZOOMS):
-            share, interval = np.nonzero(largest > 1.0 - _CLOSE)
-            if not share.size:
-                break
-            each, near = np.arange(share.size), found[share, interval].argmax(axis=1)
-            near, around = np.clip(near, 1, _SAMPLES.size - 2), t[share, interval]
-            left, right = around[each, near - 1], around[each, near + 1]
-            t[share, interval] = finer = left[:, None] + (right - left)[:, None] * _SAMPLES
-            every = self._shares_at(gait, delta, finer.ravel()).reshape(-1, *finer.shape)
-            found[share, interval] = every[share, each]
-            largest[share, interval] = np.maximum(largest[share, interval], every[share, each].max(axis=1))
+        t = phases.edges[:-1, None] + phases.h[:, None] * _INSIDE
+        found = self._magnitudes(self._signed_at(gait, delta, t.ravel())).reshape(-1, *t.shape)
+        largest = found.max(axis=2)
+        share, interval = np.nonzero(largest > 1.0 - _CLOSE)
+        if share.size:
+            each, near = np.arange(share.size), np.clip(found[share, interval].argmax(axis=1), 1, SAMPLES - 1)
+            left, right = t[interval, near - 1], t[interval, near + 1]
+
+            def own(t: np.ndarray) -> np.ndarray:
+                return self._magnitudes(self._signed_at(gait, delta, t.ravel())).reshape(-1, *t.shape)[share, each]
+
+            largest[share, interval] = np.maximum(largest[share, interval], peaks(own, left, right - left, _ZOOMS)[1])
         return largest
 
-    def _shares_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
-        """Magnitudes at phases, ``(n_share, n_time)``."""
-        return self._magnitudes(self._signed_at(gait, delta, t))
-
     def _signed_at(self, gait: AnyGait, delta: float, t: np.ndarray) -> np.ndarray:
+        """Shares at phases, ``(n_share, n_time)``."""
         body, at = self._motion.body, (self._motion.friction, gait.angles(t), gait.rates(t))
         return self._limits.shares_in_balance(body, *at, body.solve(*at, delta).z, delta)
 
@@ -100,25 +96,18 @@ class ActuatorRows:
         (share, point), on_rows = self.placed[:, held], on_rows[held]
         interval = (self._motion.mesh.points[:, :, None] == point).any(axis=1).argmax(axis=0)
         each, left, width = np.arange(held.size), phases.edges[interval], phases.h[interval]
+        edge = _INSIDE[0] * width
 
         def shares(at: np.ndarray, t: np.ndarray) -> np.ndarray:
             """Of every row ``(n_row, k)``, for parameters and phases of that shape."""
             gait = member(at)
             return self._signed_at(gait, delta * gait.delta_unit, t.ravel()).reshape(-1, *t.shape)[share, each]
 
-        peak, reach = left + 0.5 * width, 0.5 * width
-        for _ in range(_ZOOMS_TO_PEAK):
-            t = np.clip(peak[:, None] + reach[:, None] * (2 * _SAMPLES - 1), left[:, None], (left + width)[:, None])
-            peak = t[each, np.abs(shares(v, t)).argmax(axis=1)]
-            reach = reach / 8
+        peak, _ = peaks(lambda t: np.abs(shares(v, t)), left + edge, width - 2 * edge)
         t = peak[:, None] + _SHIFT * width[:, None] * np.array([-1.0, 0.0, 1.0])
-        low, here, high = shares(v, t).T
         steps = _STEP * np.eye(v.size)
         slopes = np.array([shares(v + step, t) - shares(v - step, t) for step in steps]) / (2 * _STEP)
-        bend, turning = low - 2 * here + high, 0.5 * (slopes[:, :, 2] - slopes[:, :, 0])
-        moves = (on_rows * bend < 0) & (np.abs(high - low) < np.abs(bend))  # else it lies on an edge of its interval
-        turning = turning[:, moves]
-        return -turning @ ((on_rows[moves] / bend[moves])[:, None] * turning.T)
+        return curvature_of_moving(on_rows, shares(v, t).T, slopes.transpose(2, 1, 0))
 
     def _magnitudes(self, shares: np.ndarray) -> np.ndarray:
         """What a bound from above is laid on: moments are bounded both ways."""

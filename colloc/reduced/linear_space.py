@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.collocation.shape_checks import ShapeCheck, shape_checks
-from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, peaks
+from colloc.collocation.worst_instants import check_values, followed, held_shares, moving, near_peaks
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import widest
@@ -77,7 +77,7 @@ class LinearSpace:
         a largest speed]."""
         gait, n_joint, limit = self.member(v), self._admissible.n_joint, self._admissible.joint_limit
         self._placed, self._follows, self.watched, low, high, excess = [], None, {}, [], [], -np.inf
-        for check, (cells, times) in zip(self.checks, peaks(gait, self.mesh, self.checks, limit), strict=True):
+        for check, (cells, times) in zip(self.checks, near_peaks(gait, self.mesh, self.checks, limit), strict=True):
             self.watched[check.name] = cells
             if not cells.size:
                 continue

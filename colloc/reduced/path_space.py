@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from colloc.collocation.path_transcription import path_through, transcribe_fit
-from colloc.collocation.worst_instants import check_values, held_shares, peaks
+from colloc.collocation.worst_instants import check_values, held_shares, near_peaks
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.free_path import ArcPath
 from colloc.gaits.gait_fields import AnyGait
@@ -199,7 +199,7 @@ class PathSpace:
         gait, limit = fit.member(p), self.control.admissible.joint_limit
         mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
         given = {name: block.parameters.copy() for name, block in zip(self._geometry.blocks, fit.assembly.blocks, strict=True)}
-        for check, (cells, times) in zip(fit.checks, peaks(gait, mesh, fit.checks, limit), strict=True):
+        for check, (cells, times) in zip(fit.checks, near_peaks(gait, mesh, fit.checks, limit), strict=True):
             self.watched[check.name] = cells
             if not cells.size:
                 continue

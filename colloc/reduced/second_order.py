@@ -5,7 +5,7 @@ On the free directions Z, along which no equation and no bound that carries a mu
     Z' (grad L(v + h Z) - grad L(v - h Z)) / 2h,      L = -d/W + multipliers . rows,
 
 has to be positive. A row is a shape check at the worst instant of a stretch of the gait, and that instant moves with the gait:
-rows held at their instants lack the curvature that this adds (Hettich and Kortanek, SIAM Review 35, 1993, section 3).
+rows held at their instants lack the curvature that this adds (`colloc.numerics.peaks`).
 
 The Hessian is formed from exact gradients by differences. Stick and slip make second derivatives jump as they move over a mesh
 point; that shows in the part that is not symmetric, and in a change with the step h. Beside such a jump a direction may look
@@ -21,6 +21,7 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import null_space
 
+from colloc.numerics.peaks import curvature_of_moving
 from colloc.numerics.sqp import NonlinearProgram, stationarity
 
 _STEP, _LONG_STEP = 1e-6, 1e-3
@@ -82,22 +83,15 @@ class Lagrangian:
         return self._program.gradient(at) + self.conditions.on_rows @ self._program.row_slopes(at)
 
     def of_moving_instants(self) -> np.ndarray:
-        """What is added to the Hessian at v, ``(n, n)``, as every check moves with the gait.
-
-        The largest value of a check c(t, v) has the second derivative c_vv - c_tv c_tv' / c_tt.
-        """
+        """What is added to the Hessian at v, ``(n, n)``, as every check moves with the gait."""
         program, v, on_rows = self._program, self._v, self.conditions.on_rows
         around = []
         for later in (-_SHIFT, 0.0, _SHIFT):
             program.move_checks(v, later)
             around.append((program.rows(v), program.row_slopes(v)))
         program.move_checks(v)
-        (low, below), (here, _), (high, above) = around
-        bend = low - 2 * here + high
-        # an instant on the edge of its cell stays there
-        turns = (on_rows != 0) & (on_rows * bend < 0) & (np.abs(high - low) < np.abs(bend))
-        w = (above - below)[turns] / 2
-        return program.of_moving_peaks(v, on_rows) - w.T @ ((on_rows[turns] / bend[turns])[:, None] * w)
+        values, slopes = map(np.array, zip(*around, strict=True))
+        return program.of_moving_peaks(v, on_rows) + curvature_of_moving(on_rows, values, slopes)
 
     def value(self, at: np.ndarray) -> float:
         """Its value with every check at the worst instant that it has at this point."""
