@@ -1,4 +1,4 @@
-"""The compiled kernel beside NumPy in the same run: python -m benchmarks --only kernel
+"""The compiled kernel beside NumPy in the same run: python -m benchmarks.kernel [--quick]
 
 Instants, certified starts, ellipse gaits and bounds, each by the kernel and by NumPy in turn: processor time, as a ratio, and
 its distance to a floor that is stated with it.
@@ -6,6 +6,7 @@ its distance to a floor that is stated with it.
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import dataclasses
 import time
@@ -17,7 +18,6 @@ from unittest import mock
 
 import numpy as np
 
-from benchmarks.balance_solvers import random_instants
 from benchmarks.tables import interleaved_seconds, markdown_table
 from colloc import Chain, Friction, solve_balance
 from colloc.bounds import cutting_plane, sampling
@@ -35,6 +35,13 @@ LAWS = (ISOTROPIC, Friction(2.5, 1, 1.6))
 START_FLOOR = 0.1
 """Processor time of a certified start below which what is not the balance would have to be rewritten as well [s]."""
 WAYS: dict[str, Callable[[], contextlib.AbstractContextManager]] = {"kernel": contextlib.nullcontext, "NumPy": numpy_instead}
+
+
+def random_instants(count: int, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Angles over all of shape space and rates with the larger one 1, ``(2, count)`` each."""
+    rng = np.random.default_rng(seed)
+    angles, rates = rng.uniform(-np.pi, np.pi, (2, count)), rng.uniform(-1, 1, (2, count))
+    return angles, rates / np.abs(rates).max(axis=0)
 
 
 def by_both(work: Callable[[], object], rounds: int = 3) -> dict[str, float]:
@@ -154,8 +161,15 @@ def bounds(quick: bool) -> str:
     return "Bounds (floor: the kernel's balances and the programs of the exchange alone).\n\n" + markdown_table(head, [row])
 
 
-def report(quick: bool, folder: Path) -> str:
-    """All tables; without a compiler there is nothing to compare."""
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer sizes and repetitions: two minutes")
+    quick = parser.parse_args().quick
     if native_kernel() is None:
-        return "No C compiler on this machine: NumPy does everything."
-    return "\n\n".join([instants(quick), starts(2 if quick else 10), sweep(quick), bounds(quick)])
+        parser.error("no C compiler on this machine, so there is nothing to compare.")
+    for table in (instants(quick), starts(2 if quick else 10), sweep(quick), bounds(quick)):
+        print(table, end="\n\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()

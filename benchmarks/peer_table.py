@@ -1,4 +1,4 @@
-"""General tools and optimisers of SciPy on the same problem: python -m benchmarks --only peer_table
+"""General tools and optimisers of SciPy on the same problem: python -m benchmarks.peer_table
 
 The problem: isotropic three-link body, one bilateral harmonic, delta from 0.1 to 1e-4, 24 intervals of three Radau points on
 half a period, the same random starts. Every tool has the best options that were found for it. Those that solve the full
@@ -18,6 +18,7 @@ exceeded between nodes by some 3e-4 rad at the best optimum; up to 2e-3 rad is f
 
 from __future__ import annotations
 
+import argparse
 import json
 from pathlib import Path
 from typing import NamedTuple
@@ -111,7 +112,7 @@ def row(name: str, tally: Tally, unit: float) -> list[object]:
     return [*cells, seconds, f"{seconds / unit:.2f}" if name not in RECORDED_ONCE else "(other day)", claim, short]
 
 
-def report(quick: bool, folder: Path) -> str:
+def table() -> str:
     """The table; ratios are those of processor seconds an optimum to colloc's certified solve."""
     runs = {name: recorded(tool.file) for name, tool in {**OWN, **OTHERS}.items()}
     tallies = {name: Tally(found, [judged(run) for run in found]) for name, found in runs.items() if found}
@@ -123,3 +124,12 @@ def report(quick: bool, folder: Path) -> str:
     if missing := [name for name in runs if name not in tallies]:
         text += f"\n\nNot recorded: {', '.join(missing)}."
     return f"{text}\n\n{_WORDS}"
+
+
+def main() -> None:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    print(table())
+
+
+if __name__ == "__main__":
+    main()

@@ -6,7 +6,7 @@ first order of its size: d/W = sum w_i e.v_i / sum w_i P_i, a linear program (`b
 
 `PROBLEM` gives a search with three harmonics the best of them as its guess: the triangle about (c, -c), whose efficiency tends
 to 2/5 as it shrinks. The best of its starts is another gait, a large loop of efficiency 0.394: with three harmonics a small
-triangle is too blunt to win. `python -m scripts.infinitesimal_map` draws the map.
+triangle is too blunt to win.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Travelling sine wave with large transverse friction (paper, figure 5B): Theta = sin(2 pi (s + t)), mu_t = 100.
 
 The motion is prescribed: nothing is optimised. The paper prints an efficiency of 0.76; with its printed parameters the
-computation converges to 0.737066 (and to 0.7623 for mu_t = 1000). python -m scripts.waves
+computation converges to 0.737066 (and to 0.7623 for mu_t = 1000).
 """
 
 from colloc import Friction, Problem, Reference, Wave

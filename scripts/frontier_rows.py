@@ -14,7 +14,7 @@ from colloc.system.replaced_file import replaced_file
 
 STORE, GAITS = Path("results/curated/frontier.json"), Path("results/frontier")
 PROVED = Path("results/curated/guaranteed.json")
-"""By `scripts.bound_guaranteed`."""
+"""By `research.guarantee`."""
 
 
 class Row(NamedTuple):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc import ArcPath, Chain, Corners, Fourier, FreePath, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.path_samples import path_length
 from colloc.gaits.starts import laid_into, over_links, prolonged
 from colloc.gaits.symmetry import SYMMETRIES
@@ -11,7 +11,6 @@ from colloc.mechanics.contact import crossing_depth
 from colloc.search.solve import solve
 from colloc.search.spaces import nearest_parameters, transcribed
 from colloc.system.errors import ProblemError
-from scripts.class_rows import FEWER, equal_links, named_gait, rows
 
 THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
 PHASES = np.linspace(0.0, 1.0, 101)
@@ -20,7 +19,7 @@ FIVE_HARMONICS = Fourier(
     [[2.50125, -0.00401, -0.12198, 0.00064, -0.03095], [-2.50125, 0.00401, 0.12198, -0.00064, 0.03095]],
     [[0.84175, -0.00217, -0.2703, 0.00101, -0.0018]] * 2,
 )
-"""The optimum of five harmonics (`scripts.class_table`), efficiency 0.40044."""
+"""The optimum of five harmonics, efficiency 0.40044."""
 
 
 def arcs(symmetry="bilateral"):
@@ -112,17 +111,3 @@ def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
     solution = solve(prolonged(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4015
-
-
-@pytest.mark.parametrize("links", [3, 4, 5])
-def test_every_richer_class_of_the_tables_starts_from_a_poorer_one(links):
-    listed = rows(links, False)
-    named = {"large loop", "middle loop", "small triangle", "best small gait", "fold", FEWER, *(f"start {k}" for k in range(6))}
-    for name, row in listed.items():
-        kind, number, *rest = name.split()
-        assert set(row.seeds) <= named | set(listed), name
-        assert len(set(row.seeds)) == len(row.seeds)
-        poorer = [other for other in listed if other.split()[0] == kind and int(other.split()[1]) < int(number)]
-        if poorer and not (kind == "corners" and rest == ["side"]):
-            assert set(row.seeds) & set(poorer), name
-        Problem("p", named_gait("start 0", links, Friction(), row.gait_class), equal_links(links), intervals=row.intervals)

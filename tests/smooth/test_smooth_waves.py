@@ -6,8 +6,8 @@ import pytest
 from colloc.mechanics.friction import Friction
 from colloc.smooth.motion import Motion, sine_wave, standing_wave, tanh_wave
 from colloc.system.errors import ProblemError
-from scripts.models.chain_study import chain_period
 from scripts.models.period import measured_period, period
+from tests.shared.chain_period import chain_period
 
 ALONG = Friction(100.0, 1.0, 1.0)
 
@@ -29,7 +29,7 @@ def test_wave_B_by_a_chain_of_links_extrapolated():
 
 
 def test_a_chain_overestimates_the_work_in_proportion_to_the_anisotropy():
-    """Relative excess (mu_t/mu_f) <kappa^2> / (12 n^2), derived in scripts.models.chain_study."""
+    """Relative excess (mu_t/mu_f) <kappa^2> / (12 n^2), derived in tests/shared/chain_period.py."""
     n = 80
     for mu in (10.0, 100.0):
         friction = Friction(mu, 1.0, 1.0)

@@ -1,6 +1,6 @@
 """Guarantee an upper bound for a three-link body under associated friction; writes what was proved as JSON.
 
-python -m scripts.bound_guaranteed --target 0.47 [--limit 3.14159265] [--lengths L1 L2 L3]
+python -m research.guarantee --target 0.47 [--limit 3.14159265] [--lengths L1 L2 L3]
     [--friction 2 1 1 --law Elliptic] [--seconds 1200] [--part 1 1] [--out results]
 
 The potential is the kept one for that limit (`scripts.check_potential`), or one made anew. Seconds are of processor time, of
