@@ -30,7 +30,7 @@ class LinearSpace:
     _follows: Callable[[np.ndarray], list[_Placed]] | None
 
     def __init__(self, control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
-        self.control, self.far, self.given = control, far, Given(None, edges, scheme)
+        self.control, self.given = control, Given(None, edges, scheme, far)
         self.mesh, self._admissible = control.mesh(edges, scheme), control.admissible
         gait, body, limit, speeds, _ = control.admissible
         self.checks, n_joint = shape_checks(body, far, speeds), body.n_joint
@@ -62,7 +62,7 @@ class LinearSpace:
 
     def remeshed(self, gait: AnyGait, edges: np.ndarray, scheme: str) -> LinearSpace:
         """The class on another mesh."""
-        return type(self)(self.control, edges, scheme, self.far)
+        return type(self)(self.control, edges, scheme, self.given.far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""

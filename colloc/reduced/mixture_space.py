@@ -46,8 +46,8 @@ class MixtureSpace:
     knots: np.ndarray | None = None
 
     def __init__(self, control: ControlProblem, pieces: int, far: Pairs = (), scheme: str = "", directions: int = 0) -> None:
-        self.control, self.pieces, self.far, admissible = control, pieces, far, control.admissible
-        self.given = Given(None, np.arange(pieces + 1.0), scheme or control.scheme)
+        self.control, self.pieces, admissible = control, pieces, control.admissible
+        self.given = Given(None, np.arange(pieces + 1.0), scheme or control.scheme, far)
         self._symmetry, self._limit = admissible.gait.symmetry, admissible.joint_limit
         self.n_joint, self.n_direction = admissible.n_joint, directions or admissible.gait.directions
         self.mesh = control.mesh(np.arange(pieces * _CELLS + 1.0) / _CELLS, scheme)
@@ -122,7 +122,7 @@ class MixtureSpace:
 
     def remeshed(self, gait: Mixture, edges: np.ndarray, scheme: str) -> MixtureSpace:
         """The class with as many pieces as there are intervals between the edges."""
-        return MixtureSpace(self.control, edges.size - 1, self.far, scheme)
+        return MixtureSpace(self.control, edges.size - 1, self.given.far, scheme)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, directions and durations at the points of the mesh: a block of columns for each direction."""

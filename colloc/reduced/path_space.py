@@ -46,7 +46,7 @@ class PathSpace:
     def __init__(
         self, control: ControlProblem, near: AnyGait, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
     ) -> None:
-        self.control, self.far, self.given = control, far, Given(near, edges, scheme)
+        self.control, self.given = control, Given(near, edges, scheme, far)
         self._fit = fit = transcribe_fit(control, near, edges, scheme, far)
         self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
         free = fit.lower < fit.upper
@@ -182,7 +182,7 @@ class PathSpace:
 
     def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
         """The class near a member on another mesh; its intervals are arcs, unless those are too many."""
-        return PathSpace(self.control, self.control.admissible.gait.laid_on(gait, edges), edges, scheme, self.far)
+        return PathSpace(self.control, self.control.admissible.gait.laid_on(gait, edges), edges, scheme, self.given.far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""

@@ -107,7 +107,7 @@ def confirm(optimum: Optimum) -> Answer:
 def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity) -> _Outcome:
     space, delta = optimum.space, optimum.delta
     mesh = space.phase_mesh(optimum.gait)
-    program = transcribed(optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.far)
+    program = transcribed(optimum.problem, optimum.gait, mesh.edges, mesh.scheme.name, space.given.far)
     x = feasible_point(program, space.full_parameters(optimum.v), delta)
     program = _limited(reduced, heading(program, x))
     solver = Solver(program, _OPTIONS)

@@ -131,7 +131,6 @@ def optimum_at(
     found = Optimum(
         space.control.problem,
         space.given,
-        space.far,
         v,
         gait,
         *(program.delta, objective, conditions.kkt_error, conditions.violation, conditions.complementarity),
@@ -182,14 +181,14 @@ def converged(
     NotConvergedError
         If friction does not hold the body on its slope all the way.
     """
-    given = (space.control.problem, space.given, space.far, v, delta, radius, effort, curvature)
+    given = (space.control.problem, space.given, v, delta, radius, effort, curvature)
 
     def compute() -> Optimum:
         begin, here = time.perf_counter(), space
         rested, program = _rested(here, v, delta, radius, effort, curvature)
-        while new := tuple(p for p in crossing_pairs(here, rested.v) if p not in here.far):
+        while new := tuple(p for p in crossing_pairs(here, rested.v) if p not in here.given.far):
             free = last_free(here, v, rested.v)
-            here = with_far(here, here.far + new)
+            here = with_far(here, here.given.far + new)
             rested, program = _rested(here, free, delta, radius, effort, None)
         return optimum_at(
             program,

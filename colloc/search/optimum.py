@@ -10,7 +10,6 @@ import numpy as np
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.mechanics.bodies import Pairs
 from colloc.reduced.given import Given
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
@@ -58,7 +57,6 @@ class Optimum:
         With the body on the panels, and the mesh and scheme, on which this was found.
     given : Given
         What the space of gaits was made of besides.
-    far : pairs of links more than two apart that are kept from crossing.
     v : (n,)
         Parameters of the gait in that space.
     gait : AnyGait
@@ -86,7 +84,6 @@ class Optimum:
 
     problem: Problem
     given: Given
-    far: Pairs
     v: np.ndarray
     gait: AnyGait
     delta: float
@@ -110,7 +107,7 @@ class Optimum:
     @cached_property
     def space(self) -> SearchSpace:
         """The class of gaits on its mesh. Its rows are placed by whoever asks for them (`ReducedProgram.place_rows`)."""
-        return space_of(self.problem, *self.given, self.far)
+        return space_of(self.problem, *self.given)
 
     def program(self) -> ReducedProgram:
         """The program that this is an optimum of, with its rows placed."""

@@ -110,7 +110,7 @@ def on_more_panels(optimum: Optimum) -> tuple[SearchSpace, np.ndarray] | None:
 
     def on(count: int) -> tuple[SearchSpace, np.ndarray, float]:
         body = problem.body.on_panels(count)
-        space = space_of(problem.with_(body=body), optimum.gait, mesh.edges, mesh.scheme.name, optimum.far)
+        space = space_of(problem.with_(body=body), optimum.gait, mesh.edges, mesh.scheme.name, optimum.given.far)
         v = space.parameters(optimum.gait)
         return space, v, ReducedProgram(space, optimum.delta).objective(v)
 

@@ -71,7 +71,7 @@ def prices(found: Optimum) -> tuple[np.ndarray, np.ndarray]:
         mixture.start,
         mixture.symmetry,
     )
-    wide = MixtureSpace(space.control, space.pieces, space.far, directions=more.durations.shape[1])
+    wide = MixtureSpace(space.control, space.pieces, space.given.far, directions=more.durations.shape[1])
     w = wide.parameters(more)
     wide.move_checks(w)
     on_rows = stationarity(found.program(), found.v).on_rows
@@ -92,7 +92,7 @@ def with_turned_directions(found: Optimum, pieces: int) -> tuple[MixtureSpace, n
             # the next one on another side
             best = best[best @ best[0] < 0.5]
     turned = Mixture(mixture.durations, directions, mixture.start, mixture.symmetry).split(pieces)
-    space = MixtureSpace(found.space.control, len(turned.durations), found.far)
+    space = MixtureSpace(found.space.control, len(turned.durations), found.given.far)
     return space, space.parameters(turned)
 
 

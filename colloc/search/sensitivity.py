@@ -280,7 +280,7 @@ class _Lagrangian:
 
     def __call__(self, problem: Problem) -> float:
         """Its value, in the units of the stated objective, with the rows at the worst instants of the gait."""
-        program = ReducedProgram(space_of(problem, *self.space.given, self.space.far), problem.delta)
+        program = ReducedProgram(space_of(problem, *self.space.given), problem.delta)
         program.place_rows(self.v)
         at = {name: k for k, name in enumerate(program.row_names)}
         if missing := self.on_rows.keys() - at.keys():

@@ -121,7 +121,7 @@ def space_of(
 
 def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
     """The same class on the same mesh with other pairs of links kept apart."""
-    return space_of(space.control.problem, *space.given, far)
+    return space_of(space.control.problem, *space.given._replace(far=far))
 
 
 def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
