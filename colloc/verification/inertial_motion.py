@@ -11,6 +11,7 @@ method on the map from one to the other, whose derivatives also say whether the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +23,8 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_inertia, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.follow import Course, followed
-from colloc.system.arguments import check_finite
-from colloc.system.errors import NotConvergedError
+from colloc.system.arguments import check_finite, is_whole
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.adaptive_motion import whole_length
 from colloc.verification.replay import Path
 
@@ -224,3 +225,74 @@ def inertial_motion(
                 return found
         aim, before = _TENTH * aim, now
     raise NotConvergedError(f"the motion with inertia cannot be replayed to a relative error of {tolerance:.0e}.")
+
+
+class FromRest(NamedTuple):
+    """Periods of a gait that a body with inertia begins at rest."""
+
+    phases: np.ndarray
+    """Where the solver stepped, ``(n,)``, from 0 to the number of periods."""
+    states: np.ndarray
+    """There, as in `InertialMotion`, ``(7, n)``."""
+    periods: np.ndarray
+    """Distance, work and rotation of each period, ``(n_period, 3)``."""
+
+
+def motion_from_rest(
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    froude: float,
+    *,
+    periods: int = 3,
+    tolerance: float = 1e-5,
+    breaks: np.ndarray | tuple[float, ...] = (),
+) -> FromRest:
+    """Play a gait from rest: how a body with inertia comes to the motion in which all periods are alike.
+
+    Its momenta are zero at first, while its joints already turn at the gait's rates.
+
+    Parameters
+    ----------
+    body, friction, gait, delta, froude, breaks
+        As of `inertial_motion`.
+    periods : int
+        How many.
+    tolerance : float
+        About the error of the states after a period.
+
+    Raises
+    ------
+    ProblemError
+        If the body is no chain, or numbers are out of range.
+    NotConvergedError
+        If the motion cannot be followed.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    >>> begun = colloc.motion_from_rest(colloc.Chain(), colloc.Friction(), gait, delta=1e-2, froude=0.1, periods=2)
+    >>> begun.periods[:, 0].round(3)
+    array([0.12 , 0.146])
+    """
+    check_finite(positive=True, froude=froude, delta=delta, tolerance=tolerance)
+    if not is_whole(periods) or periods < 1:
+        raise ProblemError(f"periods must be a whole number of at least 1, not {periods!r}.")
+    (chain, joints), at = checked_inertia(body, gait), tuple(sorted(float(t) for t in breaks))
+    played = GaitWithInertia(chain, friction, joints, delta, froude=float(froude), breaks=at)
+    courses: list[tuple[np.ndarray, np.ndarray]] = []
+    passed, start = [], np.zeros(7)
+    for _ in range(periods):
+        course = played.run(start[_MOMENTA], tolerance)
+        states = course.states.copy()
+        # each period is followed from the origin: turned and moved to where the one before ended
+        theta, place = start[_THETA], np.exp(1j * start[_THETA]) * (states[4] + 1j * states[5])
+        passed.append([np.hypot(*states[_PLACE, -1]), states[_WORK, -1], states[_THETA, -1]])
+        states[_THETA:] += np.array([theta, start[4], start[5], start[_WORK]])[:, None]
+        states[_PLACE] = start[_PLACE, None] + np.stack([place.real, place.imag])
+        courses.append((course.phases + len(courses), states))
+        start = states[:, -1]
+    phases, states = (np.concatenate(parts, axis=-1) for parts in zip(*courses, strict=True))
+    return FromRest(phases, states, np.array(passed))

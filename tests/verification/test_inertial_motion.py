@@ -165,3 +165,27 @@ def test_what_has_no_inertia_is_refused_in_words():
         colloc.slow_enough(CHAIN, colloc.Viscous(), GAIT, 1e-2)
     with pytest.raises(colloc.ProblemError, match="at most"):
         colloc.slow_enough(CHAIN, ISOTROPIC, GAIT, 1e-2, loss=0.9)
+
+
+def test_a_body_from_rest_moves_as_newtons_law_says():
+    """A program that shares no line, its first and its second period from rest, which differ."""
+    lengths, mu = (0.3, 0.45, 0.25), (1.7, 1.0, 1.3)
+    begun = colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=2)
+    expected = [newtons_law(lengths, mu, LEANING, 0.05, 0.1, periods=n) for n in (1, 2)]
+    np.testing.assert_allclose(begun.periods, expected, rtol=1e-3, atol=1e-3)
+    assert abs(begun.periods[0, 0] / begun.periods[1, 0] - 1) > 0.02
+
+
+def test_periods_from_rest_become_alike_and_are_joined_without_a_gap():
+    begun = colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=4)
+    played = colloc.inertial_motion(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1)
+    assert begun.periods[-1] == pytest.approx((played.distance, played.work, played.rotation), abs=1e-4)
+    assert not begun.states[:, 0].any()
+    assert np.abs(np.diff(begun.states, axis=1)).max() < 0.1
+    assert begun.states[3, -1] == pytest.approx(begun.periods[:, 2].sum(), abs=1e-12)
+    assert begun.states[6, -1] == pytest.approx(begun.periods[:, 1].sum(), abs=1e-12)
+    vx, vy, _, theta, x, y, _ = begun.states
+    moved = np.trapezoid(np.exp(1j * theta) * (vx + 1j * vy), begun.phases)
+    assert abs(x[-1] + 1j * y[-1] - moved) < 1e-4, "the way is that of the velocities, whatever the body has turned before"
+    with pytest.raises(colloc.ProblemError, match="whole number"):
+        colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=0)
