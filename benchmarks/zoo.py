@@ -4,12 +4,14 @@
     python -m benchmarks.zoo --laws --problems 20
     python -m benchmarks.zoo --modes --problems 20
     python -m benchmarks.zoo --paced --problems 20
+    python -m benchmarks.zoo --feet --problems 100
 
 Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1 to 4 harmonics, free paths
 and polygons; every symmetry that the body has; joints within pi, 2.5 or 2. With --laws another family: elliptic, viscous, power
 and own laws beside Coulomb's, other objectives, links of different weights, motors of limited power, slopes. With --modes a
 third: smooth bodies of 2 to 6 bending modes, under the friction of the first. With --paced a fourth: bodies of 2 to 5 links,
-a third of them on feet, played at Froude numbers from 0.001 to 1. For each: whether it is solved, its value over
+a third of them on feet, played at Froude numbers from 0.001 to 1. With --feet a fifth: bodies of 2 to 6 links on one to three
+feet or wheels a link, with weights of any share. For each: whether it is solved, its value over
 the best ever found for that problem (in benchmarks/zoo_best.json, which a better answer updates), and the processor time.
 Failures are printed with the reason.
 """
@@ -19,11 +21,26 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from colloc import Chain, Elliptic, FreePath, Friction, Harmonic, ModalBody, OwnLaw, Polygon, PowerLaw, Problem, Viscous
+from colloc import (
+    Chain,
+    Elliptic,
+    Foot,
+    FreePath,
+    Friction,
+    Harmonic,
+    ModalBody,
+    OwnLaw,
+    Polygon,
+    PowerLaw,
+    Problem,
+    Viscous,
+    Wheel,
+)
 from colloc.gaits.harmonic import harmonics_within
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.law import Law, rate_independent
@@ -117,6 +134,46 @@ def paced_problem(number: int) -> Problem:
     return Problem(f"zoo-paced-{number}", body=body, friction=Friction(mu_t, 1.0, mu_b), gait=gait, froude=froude)
 
 
+def feet_problem(number: int) -> Problem:
+    """Problem `number` of the family of bodies on feet and wheels; it depends on that number alone."""
+    rng = np.random.default_rng([SEED + 4, number])
+    body = _drawn_body(rng, 6)
+    if rng.random() < 0.15:
+        body = Chain((0.5, 0.5))
+    mu_t, mu_b = float(np.exp(rng.uniform(np.log(0.3), np.log(10.0)))), float(rng.choice([1.0, rng.uniform(1.0, 5.0)]))
+    if body.n_link == 2 and mu_b == 1.0:
+        mu_b = float(rng.uniform(2.0, 5.0))  # else no gait of one joint goes anywhere
+    body = Chain(body.lengths, feet=_drawn_feet(rng, body))
+    symmetry = str(rng.choice(["none", "bilateral", "antipodal"] if body.symmetric else ["none", "antipodal"]))
+    gait: Harmonic | FreePath = harmonics_within(int(rng.integers(1, 4)), symmetry)
+    if body.n_link > 2 and rng.random() < 0.15:
+        gait = FreePath(float(rng.choice([1.0, 2.0, 4.0])), symmetry)
+    limit = float(rng.choice([np.pi, 2.5, 2.0]))
+    return Problem(f"zoo-feet-{number}", body=body, friction=Friction(mu_t, 1.0, mu_b), gait=gait, joint_limit=limit)
+
+
+def _drawn_feet(rng: np.random.Generator, body: Chain) -> tuple[Foot, ...]:
+    """One to three a link, feet or wheels, anywhere on it or evenly spread, the same on mirrored links of symmetric bodies."""
+    kind, spread, each, feet = rng.random(), rng.random() < 0.5, int(rng.integers(1, 4)), list[Foot]()
+    kind = 1.0 if body.n_link == 2 else kind  # on wheels, the same either way, one joint leads nowhere
+    shares = rng.uniform(0.5, 1.5, body.n_link)
+    shares = shares + shares[::-1] if body.symmetric else shares
+    for link in range(body.n_link):
+        mirrored = body.symmetric and link > (body.n_link - 1) / 2
+        if mirrored:
+            feet += [foot.from_head(body.n_link) for foot in feet if foot.link == body.n_link - 1 - link]
+            continue
+        places = (np.arange(each) + 0.5) / each if spread else np.sort(rng.uniform(0.0, 1.0, each))
+        if body.symmetric and 2 * link == body.n_link - 1:
+            places = 0.5 * (places + 1 - places[::-1])
+        wheeled = kind < 0.25 or (kind < 0.4 and rng.random() < 0.5)
+        rolling = round(float(np.exp(rng.uniform(np.log(0.01), np.log(0.5)))), 3)
+        for place in places:
+            foot = Wheel(link, float(place), rolling=rolling) if wheeled else Foot(link, float(place))
+            feet.append(replace(foot, weight=shares[link] / shares.sum() / each))
+    return tuple(feet)
+
+
 def described(problem: Problem) -> str:
     """In one line."""
     law, best = problem.friction.label, "" if problem.objective == EFFICIENCY else f"best {problem.objective.name}, "
@@ -144,6 +201,7 @@ def main() -> None:
         "--modes", dest="of", action="store_const", const=modal_problem, help="smooth bodies of a few bending modes"
     )
     family.add_argument("--paced", dest="of", action="store_const", const=paced_problem, help="bodies with inertia")
+    family.add_argument("--feet", dest="of", action="store_const", const=feet_problem, help="bodies on feet and wheels")
     parser.set_defaults(of=zoo_problem)
     options = parser.parse_args()
     best = known_bests()

@@ -7,7 +7,7 @@ from colloc.gaits.problem_file import Reference as Reference, load_problem as lo
 from colloc.gaits.objective import Objective as Objective
 from colloc.mechanics.chain import Chain as Chain
 from colloc.mechanics.coupled import Coupled as Coupled
-from colloc.mechanics.feet import Foot as Foot, Wheel as Wheel
+from colloc.mechanics.feet import Foot as Foot, Pad as Pad, Wheel as Wheel
 from colloc.mechanics.actuators import ActuatorLimits as ActuatorLimits
 from colloc.smooth.modal_body import ModalBody as ModalBody
 from colloc.smooth.concertina import Concertina as Concertina

@@ -47,9 +47,11 @@ class _Points(NamedTuple):
 
     @classmethod
     def of_foot(cls, problem: Problem, body: Chain, foot: Foot) -> _Points:
-        along, across, weight = (np.full((1, 1), part) for part in (foot.place, foot.offset, foot.weight))
-        law = foot.friction or problem.friction
-        return cls(foot.link, along * body.lengths[foot.link], across, weight, law, foot.angle)
+        """It, or Gauss points of a pad."""
+        nodes, weights = np.polynomial.legendre.leggauss(POINTS if foot.extent else 1)
+        along, law = foot.place + 0.5 * foot.extent * nodes[:, None], foot.friction or problem.friction
+        weight = 0.5 * weights[:, None] * float(foot.weight or 0.0)
+        return cls(foot.link, along * body.lengths[foot.link], foot.offset + 0 * along, weight, law, foot.angle)
 
     @classmethod
     def of_lines(cls, problem: Problem, body: Chain) -> list[_Points]:

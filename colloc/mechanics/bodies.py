@@ -218,9 +218,9 @@ class Body(Protocol):
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
         """Speeds of a few parts ``(n_part, n_time)``, and what a part is called: for drawing what sticks."""
 
-    def foot_places(self, angles: np.ndarray) -> np.ndarray:
-        """Where the feet of a body are, seen from the tail, ``(2, n_foot, n_time)``: `speeds` and `rubbing` are then
-        theirs. No rows for a body that lies on the floor."""
+    def footprints(self, angles: np.ndarray) -> np.ndarray:
+        """Where the feet of a body are, seen from the tail, ``(2, 2, n_foot, n_time)``: both ends of pads, a point twice;
+        `speeds` are then theirs. None for a body that lies on the floor."""
 
     def imbalance(self, angles: np.ndarray) -> np.ndarray:
         """How far from beneath the centre of mass its weight presses on the floor [body lengths], ``(n_time,)``."""

@@ -220,26 +220,31 @@ class Chain(Links):
     ) -> tuple[np.ndarray, np.ndarray]:
         posture = self.posture(angles)
         fs, fn = self.contact.at_points(friction, self.velocity(posture, rates, z), delta, count)
-        cos, sin = (part[self.contact.points(count)[0]] for part in posture[:2])
+        links = np.array(self.contact.links)[self.contact.points(count)[0]]
+        cos, sin = (row[links] for row in posture[:2])
         return self._points(angles, count), np.stack([fs * cos - fn * sin, fs * sin + fn * cos])
 
     def _points(self, angles: np.ndarray, count: int) -> np.ndarray:
         """Where it touches the floor, at about `count` points of a line, ``(2, n_point, n_time)``."""
-        link, *at = self.contact.points(count)
-        cos, sin, x, y = (part[link] for part in self.posture(angles))
-        along, offset = (part[:, None] for part in at)
+        part, *at = self.contact.points(count)
+        cos, sin, x, y = (row[np.array(self.contact.links)[part]] for row in self.posture(angles))
+        along, offset = (row[:, None] for row in at)
         return np.stack([x + along * cos - offset * sin, y + along * sin + offset * cos])
 
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
-        """Of the midpoints of the links, or of the feet."""
+        """Of the midpoints of the links, or of the feet and pads."""
         return self.contact.speeds(self.velocity(self.posture(angles), rates, z))
 
-    def foot_places(self, angles: np.ndarray) -> np.ndarray:
-        return self._points(angles, self.n_link) if self.feet else np.zeros((2, 0, angles.shape[1]))
+    def footprints(self, angles: np.ndarray) -> np.ndarray:
+        cos, sin, x, y = (part[[foot.link for foot in self.standing_on]] for part in self.posture(angles))
+        along, length, offset = self.contact.along, self.contact.length, self.contact.offset
+        ends = [along + side * length for side in (-0.5, 0.5)] if self.feet else [np.zeros((0, 1))] * 2
+        beside = offset if self.feet else ends[0]
+        return np.stack([[x + end * cos - beside * sin for end in ends], [y + end * sin + beside * cos for end in ends]])
 
     def imbalance(self, angles: np.ndarray) -> np.ndarray:
         if self.feet:
-            weight, places = np.array([foot.weight for foot in self.standing_on]), self.foot_places(angles)
+            weight, places = np.array([foot.weight for foot in self.standing_on]), self.footprints(angles).mean(axis=1)
         else:
             weight, places = self.weight_column()[:, 0], np.stack(self.posture(angles)[2:])
         return np.hypot(*(np.einsum("f,cft->ct", weight, places) - self.centre(angles)))

@@ -111,7 +111,7 @@ class Coupled:
     slowness, rubbing = map(_under_friction, ("slowness", "rubbing"))
     speeds, seen_from_head = map(_in_motion, ("speeds", "seen_from_head"))
     crossing_depth, passing_depth = map(_at_shapes, ("crossing_depth", "passing_depth"))
-    outline, centre, foot_places, imbalance = map(_at_shapes, ("outline", "centre", "foot_places", "imbalance"))
+    outline, centre, footprints, imbalance = map(_at_shapes, ("outline", "centre", "footprints", "imbalance"))
 
     @property
     def _gears(self) -> np.ndarray:

@@ -1,21 +1,21 @@
-"""Feet: points of a chain that touch the floor, each with its share of the weight and, if it has one, a friction of its own.
+"""Feet, wheels and pads: what of a chain touches the floor, each with its share of the weight and a friction of its own if it
+has one.
 
 A foot sits on a link, `place` along it from its tail end (0) to its head end (1), and `offset` to the left of its middle line.
+A pad is a foot that has an extent along its link.
 `colloc.mechanics.floor_contact` says what friction does there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.law import KernelLaw, Law, Matrix
-from colloc.mechanics.line_integrals import line_integrals
-from colloc.numerics.arrays import Array, namespace
+from colloc.mechanics.law import KernelLaw, Law
 from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
@@ -28,7 +28,7 @@ _MOST = 20
 @named_arguments
 @dataclass(frozen=True)
 class Foot:
-    """A point of a chain that touches the floor.
+    """A point of a chain that touches the floor, or a straight part of one.
 
     Parameters
     ----------
@@ -44,6 +44,8 @@ class Foot:
         Of its own; by default that of the problem.
     angle : float
         Of the direction that counts as its forward one, to the left of the link's [rad].
+    extent : float
+        What part of the link it covers, `place` in its middle; 0 for a point (see `Pad`).
 
     Examples
     --------
@@ -60,6 +62,7 @@ class Foot:
     offset: float = field(default=0.0, metadata=STATED_IF_SET)
     friction: Law | None = field(default=None, metadata=STATED_IF_SET)
     angle: float = field(default=0.0, metadata=STATED_IF_SET)
+    extent: float = field(default=0.0, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
         if not is_whole(self.link):
@@ -73,6 +76,15 @@ class Foot:
         for name in ("offset", "angle"):
             if not is_number(getattr(self, name)):
                 raise ProblemError(f"the {name} of a foot must be a finite number, not {getattr(self, name)!r}.")
+        if not (is_number(self.extent) and 0 <= self.extent <= 1):
+            raise ProblemError(f"the extent of a foot must be a part of its link, from 0 (a point) to 1, not {self.extent!r}.")
+        if abs(self.place - 0.5) + 0.5 * self.extent > 0.5 + _SAME:
+            raise ProblemError(
+                "a pad must lie on its link, from 0 (the end towards the tail) to 1, "
+                f"not from {self.first:.6g} to {self.last:.6g}."
+            )
+        if self.extent and self.angle:
+            raise ProblemError("a pad presses along its link: only a foot, without extent, may be turned by an angle.")
         if self.friction is not None and not isinstance(self.friction, Law):
             raise ProblemError(f"the friction of a foot must be a law of friction, not {type(self.friction).__name__}.")
 
@@ -86,13 +98,23 @@ class Foot:
         return replace(self, offset=-self.offset, angle=-self.angle)
 
     @property
+    def first(self) -> float:
+        """Where on the link it begins, from 0 to 1."""
+        return self.place - 0.5 * self.extent
+
+    @property
+    def last(self) -> float:
+        """Where on the link it ends; a point where it begins."""
+        return self.place + 0.5 * self.extent
+
+    @property
     def point(self) -> tuple[float, float]:
         """Where along the body, counted in links, and beside it: the head end of a link is the tail end of the next."""
         return self.link + self.place, self.offset
 
     def is_like(self, other: Foot) -> bool:
         """Whether two feet are one, up to rounding."""
-        own, its = ((f.link, f.place, f.weight or 0.0, f.offset) for f in (self, other))
+        own, its = ((f.link, f.place, f.weight or 0.0, f.offset, f.extent) for f in (self, other))
         turns = 1 if self.friction is None or not self.friction.reversible else 2
         turned = abs(np.sin(0.5 * turns * (self.angle - other.angle)))
         return self.friction == other.friction and bool(turned < _SAME and np.allclose(own, its, rtol=0, atol=_SAME))
@@ -128,6 +150,41 @@ def Wheel(link: int, place: float = 0.5, rolling: float = 0.02, sideways: float 
     return Foot(link, place, friction=Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling), angle=angle, **foot)
 
 
+def Pad(link: int, first: float = 0.0, last: float = 1.0, **foot: Any) -> Foot:
+    """What presses evenly between two places of a link: a rubber pad, a ski, or the link itself.
+
+    Parameters
+    ----------
+    link : int
+        The link it is on, 0 at the tail.
+    first, last : float
+        Where on the link it begins and ends, from 0 (the end towards the tail) to 1.
+    **foot
+        Weight, offset and friction, as of a `Foot`.
+
+    Returns
+    -------
+    Foot
+
+    Examples
+    --------
+    >>> from colloc import Chain, Pad
+    >>> Chain(feet=tuple(Pad(link, 0.25, 0.75) for link in range(3))).symmetric
+    True
+    """
+    for name, value in (("begins", first), ("ends", last)):
+        if not (is_number(value) and 0 <= value <= 1):
+            raise ProblemError(f"the place where a pad {name} must lie on its link, from 0 to 1, not {value!r}.")
+    if not first < last:
+        raise ProblemError(f"a pad must end behind where it begins, not at {last!r} and {first!r}: a point is a Foot.")
+    return Foot(link, 0.5 * (first + last), extent=last - first, **foot)
+
+
+def whole_links(weights: np.ndarray) -> tuple[Foot, ...]:
+    """The links of a body that lies on them: pads from end to end."""
+    return tuple(Foot(link, weight=float(weight), extent=1.0) for link, weight in enumerate(weights))
+
+
 def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot, ...]:
     """The feet of a body whose links weigh `weights` ``(n_link,)``, from tail to head, each with its weight.
 
@@ -141,7 +198,7 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
     given = tuple(feet) if isinstance(feet, Iterable) else (feet,)
     stated = tuple(foot for foot in given if isinstance(foot, Foot))
     if len(stated) < len(given):
-        raise ProblemError("body.feet must be the number of feet on each link, or a sequence of Foot and Wheel.")
+        raise ProblemError("body.feet must be the number of feet on each link, or a sequence of Foot, Wheel and Pad.")
     if not stated:
         return ()
     for foot in stated:
@@ -153,7 +210,7 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
         carried = sorted(set(range(weights.size)) - {foot.link for foot in stated})
         hint = f"; no foot is on link {', '.join(map(str, carried))}, so say who bears its weight" if carried else ""
         raise ProblemError(f"the weights of the feet must add up to 1, not {total:.6g}{hint}.")
-    if len({foot.point for foot in shared}) < 2:
+    if len({foot.point for foot in shared}) < 2 and not any(foot.extent for foot in shared):
         raise ProblemError("a body needs feet at two points at least: on one it would spin freely.")
     if not _same_set(shared, [foot.mirrored for foot in shared]):
         raise ProblemError(
@@ -189,11 +246,15 @@ def read_alike_from_both_ends(feet: tuple[Foot, ...], n_link: int) -> bool:
     return _same_set(feet, [foot.from_head(n_link) for foot in feet])
 
 
+def _of_each_foot(*_: Any) -> Any:
+    raise ProblemError("feet have laws of friction of their own: this one is for none but a body that stands on them.")
+
+
 @dataclass(frozen=True)
 class FeetLaw:
-    """The laws of friction of feet that do not all have the same, foot by foot, as one; a `colloc.mechanics.law.Law` at points.
+    """The laws of friction of feet that do not all have the same, foot by foot: a `colloc.mechanics.law.Law` of them all.
 
-    Arrays have a row for each foot.
+    What it says of forces is asked of each one (`colloc.mechanics.floor_contact`).
     """
 
     laws: tuple[Law, ...]
@@ -202,6 +263,7 @@ class FeetLaw:
         object.__setattr__(self, "laws", tuple(self.laws))
 
     kernel = KernelLaw()
+    density = density_jacobian = density_secant = density_potential = staticmethod(_of_each_foot)
 
     @property
     def degree(self) -> float | None:
@@ -241,30 +303,3 @@ class FeetLaw:
 
     def in_speeds_of(self, unit: float) -> FeetLaw:
         return FeetLaw(tuple(law.in_speeds_of(unit) for law in self.laws))
-
-    def _rows(self, of: Callable[[Law, Array, Array], Any], vs: Array, vn: Array) -> list[Any]:
-        return [of(law, vs[i : i + 1, :], vn[i : i + 1, :]) for i, law in enumerate(self.laws)]
-
-    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
-        rows = self._rows(lambda law, s, n: law.density(s, n, delta), vs, vn)
-        stack = namespace(vs, vn, delta).stack
-        return stack([row[0] for row in rows]), stack([row[1] for row in rows])
-
-    def _matrices(self, rows: list[Matrix], *arrays: Array) -> Matrix:
-        stack = namespace(*arrays).stack
-        return tuple(tuple(stack([row[i][j] for row in rows]) for j in range(2)) for i in range(2))
-
-    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        return self._matrices(self._rows(lambda law, s, n: law.density_jacobian(s, n, delta), vs, vn), vs, vn, delta)
-
-    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        return self._matrices(self._rows(lambda law, s, n: law.density_secant(s, n, delta), vs, vn), vs, vn, delta)
-
-    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
-        rows = self._rows(lambda law, s, n: law.density_potential(s, n, delta), vs, vn)
-        return namespace(vs, vn, delta).stack(rows)
-
-
-@line_integrals.register
-def _at_points_only(law: FeetLaw) -> NoReturn:
-    raise ProblemError("feet have laws of friction of their own: this one is none for a body that lies on its links.")

@@ -1,10 +1,10 @@
-"""What touches the floor: a chain's links along their whole length, or feet at points of them.
+"""What touches the floor: feet at points of a chain's links, and pads along parts of them; a link that lies is one pad.
 
 A contact turns the velocities of links into the friction on them, with derivatives, and says which forces a full program has
-for variables. The line integrates a law of friction, in closed form if there is one (`colloc.mechanics.line_integrals`); feet
-ask it at a point: with the velocity of a foot of weight p on its link,
+for variables. Feet ask the law of friction at a point, pads its integral along a straight line, in closed form where there
+is one (`colloc.mechanics.line_integrals`). With the velocity of a part in its own direction, and its force and couple f,
 
-    v = R (vs - h w, vn + a w),     force on the link R' f,  couple a f_n - h f_s,     f = p density(v),
+    v = T (vs, vn, w) = (R (vs - h w, vn + a w), w),     on the link T' f,
 
 a and h its place from the link's midpoint, R the turn into its own direction. A foot lifts nothing and sinks nowhere: its
 weight is a number. One that changes with the shape would be a function of the posture here.
@@ -12,8 +12,9 @@ weight is a number. One that changes with the shape would be a function of the p
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,11 +25,11 @@ from colloc.mechanics.link_friction import LinkForce
 from colloc.numerics.arrays import Array, namespace
 
 FOOT = "foot"
-"""What a point of contact is called."""
+"""What a part is called, where it is not a whole link."""
 
 
 class LinkVelocities(Protocol):
-    """As `colloc.mechanics.links.LinkVelocity`."""
+    """As `colloc.mechanics.links.LinkVelocity`; of parts, too."""
 
     @property
     def vs(self) -> Array: ...
@@ -36,6 +37,14 @@ class LinkVelocities(Protocol):
     def vn(self) -> Array: ...
     @property
     def w(self) -> Array: ...
+
+
+class _PartVelocity(NamedTuple):
+    """Of the middles of parts, along and across their own directions, and how fast they turn, ``(n_part, n_time)`` each."""
+
+    vs: Array
+    vn: Array
+    w: Array
 
 
 class Rest(NamedTuple):
@@ -47,290 +56,276 @@ class Rest(NamedTuple):
     still: int
 
 
+class _Group(NamedTuple):
+    """Parts of one kind under one law."""
+
+    rows: list[int]
+    law: Law
+    pads: bool
+
+
 def from_middle(n: int) -> list[int]:
     """Numbers of n links, the middle one first."""
     return [n // 2, *(link for link in range(n) if link != n // 2)]
 
 
-class FloorContact(Protocol):
+class FloorContact:
     """Friction on the links of a chain, from the velocities of their midpoints and their rotation rates,
-    ``(n_link, n_time)`` each; NumPy and CasADi."""
+    ``(n_link, n_time)`` each; NumPy and CasADi.
+
+    Parameters
+    ----------
+    lengths : (n_link,)
+        Of the links.
+    parts : tuple of Foot
+        Feet and pads, each with its weight.
+    called : str
+        What they are called: "link" where the links lie on the floor.
+    """
+
+    def __init__(self, lengths: np.ndarray, parts: tuple[Foot, ...], called: str = FOOT) -> None:
+        self.parts, self.links, self.called = parts, [part.link for part in parts], called
+        names = ("place", "offset", "angle", "weight", "extent")
+        place, self.offset, angle, self.weight, extent = (np.array([[getattr(part, name)] for part in parts]) for name in names)
+        own = lengths[self.links][:, None]
+        self.along, self.length = (place - 0.5) * own, extent * own
+        self.pressure = self.weight / np.where(self.length > 0, self.length, 1.0)
+        """Weight of feet, weight per length of pads."""
+        self.cos, self.sin = np.cos(angle), np.sin(angle)
+        self._turn = (
+            (self.cos, self.sin, self.along * self.sin - self.offset * self.cos),
+            (-self.sin, self.cos, self.along * self.cos + self.offset * self.sin),
+            (0.0 * own, 0.0 * own, np.ones_like(own)),
+        )
+        self._scatter = np.zeros((len(lengths), len(parts)))
+        self._scatter[self.links, np.arange(len(parts))] = 1.0
+        self._pads = [k for k, part in enumerate(parts) if part.extent > 0]
+        self._points = [k for k, part in enumerate(parts) if part.extent == 0]
+        order = from_middle(len(lengths))
+        points = sorted(zip(self.links, self.along[:, 0], self.offset[:, 0], strict=True), key=lambda at: order.index(at[0]))
+        self.rests = tuple(Rest(*at, at[0]) for at in points)
+        """What may be at rest: from each of them a balance is sought that is not found otherwise."""
+        self._short = any(part.extent < 1 for part in parts)
+        """A part that is shorter than its link may rest while that turns."""
+        self.further_rests = tuple(Rest(*at, link) for at in points for link in order if self._short and link != at[0])
+        """Others that are tried where these lead nowhere."""
+
+    @property
+    def rounding(self) -> float:
+        """What rounding leaves of the force, times delta over the largest rate; 0 where the solver need not reckon with it.
+
+        Two feet may hold on links that turn, where what turns them cancels: each speed is then known to some units of rounding
+        of the largest, and its friction changes within delta."""
+        return 16 * float(np.finfo(float).eps) if self._short else 0.0
 
     @property
     def n_force(self) -> int:
-        """Number of forces that are variables of a full program."""
+        """Number of forces that are variables of a full program: along and across every part, and the couples on pads."""
+        return 2 * len(self.parts) + len(self._pads)
 
     @property
     def force_names(self) -> tuple[str, ...]:
         """What they are."""
-
-    def law(self, friction: Law) -> Law:
-        """The law of friction of all that touches, where the problem states `friction`."""
-
-    def force(self, friction: Law, velocity: LinkVelocities, delta: Array) -> LinkForce:
-        """On the links."""
-
-    def stiffness(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        """Minus its derivative with respect to (vs, vn, w), 3 x 3."""
-
-    def secant(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        """The matrix of the paper's fixed point (`colloc.mechanics.law.Law.density_secant`)."""
-
-    def potential(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        """The dissipation potential of what touches, row by row; of associated laws only."""
-
-    def forces(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        """The variables' values, ``(n_force, n_time)``."""
-
-    def on_links(self, forces: Array) -> LinkForce:
-        """The friction on links that they mean."""
-
-    def laws(self, friction: Law, velocity: LinkVelocities, forces: Array, delta: Array) -> list[Array]:
-        """What vanishes where they obey the law, scaled like velocities."""
-
-    def largest_forces(self, friction: Law) -> np.ndarray:
-        """Their largest magnitudes, ``(n_force, 1)``."""
-
-    @property
-    def rounding(self) -> float:
-        """What rounding leaves of the force, times delta over the largest rate; 0 where the solver need not reckon with it."""
-
-    @property
-    def rests(self) -> tuple[Rest, ...]:
-        """What may be at rest: from each of them a balance is sought that is not found otherwise."""
-
-    @property
-    def further_rests(self) -> tuple[Rest, ...]:
-        """Others that are tried where these lead nowhere."""
-
-    def slowest(self, velocity: LinkVelocities) -> np.ndarray:
-        """How fast the slowest part of each link's contact moves, ``(n_link, n_time)``; infinite for a carried link."""
-
-    def slowness(self, friction: Law, velocity: LinkVelocities) -> np.ndarray:
-        """What has to vanish for a kink of the velocities in time, ``(n_part, n_time)``."""
-
-    def kernel_law(self, friction: Law) -> KernelLaw:
-        """The law of all that touches, for the compiled kernel."""
-
-    def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
-        """Of what is drawn as sticking or sliding, and what it is called."""
-
-    def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where friction is drawn: the link of each point, its place along that from the midpoint and its offset, ``(n,)``."""
-
-    def at_points(self, friction: Law, velocity: LinkVelocities, delta: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Friction there, along and across the link: on a line per length, ``(n, n_time)`` each."""
-
-
-class LineContact:
-    """The links press evenly along their length."""
-
-    rounding = 0.0
-    further_rests: tuple[Rest, ...] = ()
-    force_names: tuple[str, ...]
-
-    def __init__(self, lengths: np.ndarray, pressure: np.ndarray) -> None:
-        self._length, self._pressure = lengths, pressure
-        kinds = ("tangential force", "normal force", "couple")
-        self.force_names = tuple(f"{kind} on link {i + 1}" for kind in kinds for i in range(len(lengths)))
-        self.rests = tuple(Rest(link, 0.0, 0.0, link) for link in from_middle(len(lengths)))
-
-    @property
-    def n_force(self) -> int:
-        return 3 * len(self._length)
-
-    def law(self, friction: Law) -> Law:
-        return friction
-
-    def force(self, friction: Law, velocity: LinkVelocities, delta: Array) -> LinkForce:
-        own = line_integrals(friction).force(velocity.vs, velocity.vn, velocity.w, self._length, delta)
-        return LinkForce(*(self._pressure * part for part in own))
-
-    def _pressed(self, blocks: Matrix) -> Matrix:
-        return tuple(tuple(self._pressure * a for a in row) for row in blocks)
-
-    def stiffness(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        return self._pressed(line_integrals(friction).jacobian(velocity.vs, velocity.vn, velocity.w, self._length, delta))
-
-    def secant(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        return self._pressed(line_integrals(friction).secant(velocity.vs, velocity.vn, velocity.w, self._length, delta))
-
-    def potential(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        return self._pressure * line_integrals(friction).potential(velocity.vs, velocity.vn, velocity.w, self._length, delta)
-
-    def forces(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        return namespace(velocity.vs).stack(list(self.force(friction, velocity, delta)))
-
-    def on_links(self, forces: Array) -> LinkForce:
-        n = len(self._length)
-        return LinkForce(forces[:n, :], forces[n : 2 * n, :], forces[2 * n :, :])
-
-    def laws(self, friction: Law, velocity: LinkVelocities, forces: Array, delta: Array) -> list[Array]:
-        own = LinkForce(*(part / self._pressure for part in self.on_links(forces)))
-        return line_integrals(friction).scaled_laws(velocity.vs, velocity.vn, velocity.w, self._length, delta, own)
-
-    def largest_forces(self, friction: Law) -> np.ndarray:
-        return line_integrals(friction).largest_forces(self._length) * np.tile(self._pressure, (3, 1))
-
-    def slowest(self, velocity: LinkVelocities) -> np.ndarray:
-        return np.abs(velocity.vs) + np.abs(velocity.vn) + 0.5 * self._length * np.abs(velocity.w)
-
-    def slowness(self, friction: Law, velocity: LinkVelocities) -> np.ndarray:
-        """Speed of the slowest point of each link, or tangential speed where directions differ."""
-        if not friction.reversible:
-            return np.abs(velocity.vs)
-        beyond = np.maximum(np.abs(velocity.vn) - 0.5 * self._length * np.abs(velocity.w), 0.0)
-        return np.hypot(velocity.vs, beyond)
-
-    def kernel_law(self, friction: Law) -> KernelLaw:
-        return friction.kernel
-
-    def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
-        """Of the midpoints of the links."""
-        return "link", np.hypot(velocity.vs, velocity.vn)
-
-    def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        n, many = len(self._length), max(2, count // len(self._length))
-        share = (np.arange(many) + 0.5) / many - 0.5
-        return np.tile(np.arange(n), many), (share[:, None] * self._length[:, 0]).ravel(), np.zeros(n * many)
-
-    def at_points(self, friction: Law, velocity: LinkVelocities, delta: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        link, along, _ = self.points(count)
-        vn = velocity.vn[link] + along[:, None] * velocity.w[link]
-        fs, fn = friction.density(velocity.vs[link], vn, delta)
-        return self._pressure[link] * fs, self._pressure[link] * fn
-
-
-class PointContact:
-    """Feet at points of the links."""
-
-    rounding = 16 * float(np.finfo(float).eps)
-    """Two feet may hold on links that turn, where what turns them cancels: each speed is then known to some units of rounding
-    of the largest, and its friction changes within delta."""
-
-    def __init__(self, lengths: np.ndarray, feet: tuple[Foot, ...]) -> None:
-        self.feet, self.links = feet, [foot.link for foot in feet]
-        column = {name: np.array([[getattr(foot, name)] for foot in feet]) for name in ("place", "offset", "angle", "weight")}
-        self.along = (column["place"] - 0.5) * lengths[self.links][:, None]
-        self.offset, self.weight = column["offset"], column["weight"]
-        self.cos, self.sin = np.cos(column["angle"]), np.sin(column["angle"])
-        # the velocity of a foot in its own directions, per velocity (vs, vn, w) of its link
-        self._turn = (
-            (self.cos, self.sin, self.along * self.sin - self.offset * self.cos),
-            (-self.sin, self.cos, self.along * self.cos + self.offset * self.sin),
-        )
-        self._scatter = np.zeros((len(lengths), len(feet)))
-        self._scatter[self.links, np.arange(len(feet))] = 1.0
-        order = from_middle(len(lengths))
-        points = sorted(zip(self.links, self.along[:, 0], self.offset[:, 0], strict=True), key=lambda at: order.index(at[0]))
-        self.rests = tuple(Rest(*at, at[0]) for at in points)
-        self.further_rests = tuple(Rest(*at, link) for at in points for link in order if link != at[0])
-        self.force_names = tuple(f"force {way} at foot {i + 1}" for way in ("along", "across") for i in range(len(feet)))
-
-    @property
-    def n_force(self) -> int:
-        """Along and across every foot."""
-        return 2 * len(self.feet)
+        kinds = (("tangential force", range(len(self.parts))), ("normal force", range(len(self.parts))), ("couple", self._pads))
+        return tuple(f"{kind} on {self.called} {k + 1}" for kind, rows in kinds for k in rows)
 
     @cached_property
     def _own(self) -> dict[Law, FeetLaw]:
         return {}
 
     def law(self, friction: Law) -> Law:
-        """That of the problem; or one that has another row for every foot, where some have their own."""
-        if isinstance(friction, FeetLaw) or all(foot.friction is None for foot in self.feet):
+        """The law of friction of all that touches, where the problem states `friction`: that, or one that has another for
+        every part, where some have their own."""
+        if isinstance(friction, FeetLaw) or all(part.friction is None for part in self.parts):
             return friction
         if friction not in self._own:
-            self._own[friction] = FeetLaw(tuple(foot.friction or friction for foot in self.feet))
+            self._own[friction] = FeetLaw(tuple(part.friction or friction for part in self.parts))
         return self._own[friction]
 
-    def _each(self, law: Law) -> tuple[Law, ...]:
-        return law.laws if isinstance(law, FeetLaw) else (law,) * len(self.feet)
+    def _each(self, friction: Law) -> tuple[Law, ...]:
+        law = self.law(friction)
+        return law.laws if isinstance(law, FeetLaw) else (law,) * len(self.parts)
 
-    def velocities(self, velocity: LinkVelocities) -> tuple[Array, Array]:
-        """Of the feet along and across their own directions, ``(n_foot, n_time)`` each."""
+    @cached_property
+    def _grouped(self) -> dict[Law, list[_Group]]:
+        return {}
+
+    def _groups(self, friction: Law) -> list[_Group]:
+        """The parts, those of one kind and law together."""
+        if friction not in self._grouped:
+            each, found = self._each(friction), []
+            for rows, pads in ((self._points, False), (self._pads, True)):
+                laws = dict.fromkeys(each[k] for k in rows)
+                found += [_Group([k for k in rows if each[k] == law], law, pads) for law in laws]
+            self._grouped[friction] = found
+        return self._grouped[friction]
+
+    def _evaluated(
+        self,
+        friction: Law,
+        velocity: LinkVelocities,
+        delta: Array,
+        of: tuple[Callable[[Law], Callable], Callable[[Law], Callable]],
+    ) -> list[tuple[_Group, Any]]:
+        """What laws say of points, and of lines."""
+        moves, found = self.velocities(velocity), []
+        for group in self._groups(friction):
+            own = [part[group.rows, :] for part in moves]
+            at = (*own, self.length[group.rows], delta) if group.pads else (*own[:2], delta)
+            found.append((group, of[group.pads](group.law)(*at)))
+        return found
+
+    def _in_order(self, pieces: Sequence[tuple[list[int], Array]]) -> Array:
+        """Rows of some parts each, as rows of all of them, from the tail."""
+        if len(pieces) == 1:
+            return pieces[0][1]
+        rows = [k for some, _ in pieces for k in some]
+        return namespace(*(piece for _, piece in pieces)).stack([piece for _, piece in pieces])[np.argsort(rows).tolist(), :]
+
+    def velocities(self, velocity: LinkVelocities) -> _PartVelocity:
+        """Of the parts."""
         vs, vn, w = velocity.vs[self.links, :], velocity.vn[self.links, :], velocity.w[self.links, :]
         vs, vn = vs - self.offset * w, vn + self.along * w
-        return self.cos * vs + self.sin * vn, self.cos * vn - self.sin * vs
+        return _PartVelocity(self.cos * vs + self.sin * vn, self.cos * vn - self.sin * vs, w)
 
     def on_links(self, forces: Array) -> LinkForce:
-        n = len(self.feet)
-        along, across = forces[:n, :], forces[n:, :]
+        """The friction on links that the variables mean."""
+        n, xp = len(self.parts), namespace(forces)
+        along, across = forces[:n, :], forces[n : 2 * n, :]
         fs, fn = self.cos * along - self.sin * across, self.sin * along + self.cos * across
-        sums = [namespace(forces).matmul(self._scatter, part) for part in (fs, fn, self.along * fn - self.offset * fs)]
+        sums = [xp.matmul(self._scatter, part) for part in (fs, fn, self.along * fn - self.offset * fs)]
+        if self._pads:
+            sums[2] = sums[2] + xp.matmul(self._scatter[:, self._pads], forces[2 * n :, :])
         return LinkForce(*sums)
 
     def forces(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        own = self.law(friction).density(*self.velocities(velocity), delta)
-        return namespace(velocity.vs).stack([self.weight * part for part in own])
+        """The variables' values, ``(n_force, n_time)``."""
+        said = self._evaluated(friction, velocity, delta, (lambda law: law.density, lambda law: line_integrals(law).force))
+        rows = [[(g.rows, self.pressure[g.rows] * own[k]) for g, own in said if k < len(own)] for k in range(3)]
+        return namespace(velocity.vs).stack([self._in_order(pieces) for pieces in rows if pieces])
 
     def force(self, friction: Law, velocity: LinkVelocities, delta: Array) -> LinkForce:
+        """On the links."""
         return self.on_links(self.forces(friction, velocity, delta))
 
-    def _blocks(self, density: Matrix) -> Matrix:
-        """3 x 3 of links from 2 x 2 of feet."""
-        turn, sums = self._turn, range(2)
-        on_feet = [
-            [sum(turn[p][i] * density[p][q] * turn[q][j] for p in sums for q in sums) for j in range(3)] for i in range(3)
-        ]
-        return tuple(tuple(self._scatter @ (self.weight * entry) for entry in row) for row in on_feet)
+    def _blocks(self, said: list[tuple[_Group, Matrix]]) -> Matrix:
+        """3 x 3 of links from 3 x 3 of pads and 2 x 2 of feet: sum of T' K T."""
+        on_parts: list[list[list[tuple[list[int], Array]]]] = [[[] for _ in range(3)] for _ in range(3)]
+        for group, own in said:
+            turn = [[entry[group.rows] for entry in row] for row in self._turn]
+            ways = [[p for p in range(len(own)) if turn[p][i].any()] for i in range(3)]
+            none = 0.0 * own[0][0]
+            for i in range(3):
+                for j in range(3):
+                    entry = sum((turn[p][i] * own[p][q] * turn[q][j] for p in ways[i] for q in ways[j]), none)
+                    on_parts[i][j].append((group.rows, self.pressure[group.rows] * entry))
+        return tuple(tuple(self._scatter @ self._in_order(pieces) for pieces in row) for row in on_parts)
 
     def stiffness(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        return self._blocks(self.law(friction).density_jacobian(*self.velocities(velocity), delta))
+        """Minus the derivative of the force on links with respect to (vs, vn, w), 3 x 3."""
+        of = (lambda law: law.density_jacobian, lambda law: line_integrals(law).jacobian)
+        return self._blocks(self._evaluated(friction, velocity, delta, of))
 
     def secant(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Matrix:
-        return self._blocks(self.law(friction).density_secant(*self.velocities(velocity), delta))
+        """The matrix of the paper's fixed point (`colloc.mechanics.law.Law.density_secant`)."""
+        of = (lambda law: law.density_secant, lambda law: line_integrals(law).secant)
+        return self._blocks(self._evaluated(friction, velocity, delta, of))
 
     def potential(self, friction: Law, velocity: LinkVelocities, delta: Array) -> Array:
-        return self.weight * self.law(friction).density_potential(*self.velocities(velocity), delta)
+        """The dissipation potential of the parts, row by row; of associated laws only."""
+        of = (lambda law: law.density_potential, lambda law: line_integrals(law).potential)
+        said = self._evaluated(friction, velocity, delta, of)
+        return self._in_order([(group.rows, self.pressure[group.rows] * own) for group, own in said])
 
     def laws(self, friction: Law, velocity: LinkVelocities, forces: Array, delta: Array) -> list[Array]:
-        """Forces less the law's, over the law's secant: velocities."""
-        law, at, n = self.law(friction), (*self.velocities(velocity), delta), len(self.feet)
-        own, secant = law.density(*at), law.density_secant(*at)
-        return [(forces[k * n : (k + 1) * n, :] / self.weight - own[k]) / secant[k][k] for k in range(2)]
+        """What vanishes where forces obey the law, scaled like velocities: on points, the difference over the law's secant."""
+        moves, n = self.velocities(velocity), len(self.parts)
+        found: list[list[tuple[list[int], Array]]] = [[], [], []]
+        for rows, law, pads in self._groups(friction):
+            vs, vn, w = (part[rows, :] for part in moves)
+            pressed = self.pressure[rows]
+            along, across = (forces[[k * n + row for row in rows], :] / pressed for k in range(2))
+            if pads:
+                couples = forces[[2 * n + self._pads.index(row) for row in rows], :] / pressed
+                left = line_integrals(law).scaled_laws(vs, vn, w, self.length[rows], delta, LinkForce(along, across, couples))
+            else:
+                there, secant = law.density(vs, vn, delta), law.density_secant(vs, vn, delta)
+                left = [(own - its) / secant[k][k] for k, (own, its) in enumerate(zip((along, across), there, strict=True))]
+            for pieces, piece in zip(found, left, strict=False):
+                pieces.append((rows, piece))
+        return [self._in_order(pieces) for pieces in found if pieces]
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        largest = [each.largest if each.degree == 0 else np.inf for each in self._each(self.law(friction))]
-        return np.tile(self.weight * np.array(largest)[:, None], (2, 1))
+        """Their largest magnitudes, ``(n_force, 1)``."""
+        found = np.full((3, len(self.parts), 1), np.inf)
+        for rows, law, pads in self._groups(friction):
+            if pads:
+                found[:, rows] = line_integrals(law).largest_forces(self.length[rows]).reshape(3, -1, 1)
+            elif law.degree == 0:
+                found[:, rows] = law.largest
+        found *= self.pressure
+        return np.concatenate([found[0], found[1], found[2, self._pads]])
 
     def slowest(self, velocity: LinkVelocities) -> np.ndarray:
-        speed, found = sum(np.abs(part) for part in self.velocities(velocity)), np.full(velocity.vs.shape, np.inf)
-        np.minimum.at(found, self.links, speed)
+        """How fast the slowest part of each link moves, ``(n_link, n_time)``; infinite for a carried link."""
+        vs, vn, w = map(np.abs, self.velocities(velocity))
+        found = np.full(velocity.vs.shape, np.inf)
+        np.minimum.at(found, self.links, vs + vn + 0.5 * self.length * w)
         return found
 
     def slowness(self, friction: Law, velocity: LinkVelocities) -> np.ndarray:
-        """Speed of each foot, or the one along it where directions differ."""
-        along, across = self.velocities(velocity)
-        return np.hypot(along, across) if friction.reversible else np.abs(along)
+        """What has to vanish for a kink of the velocities in time, ``(n_part, n_time)``: the speed of the slowest point of each
+        part, or the one along it where directions differ."""
+        vs, vn, w = map(np.abs, self.velocities(velocity))
+        return np.hypot(vs, np.maximum(vn - 0.5 * self.length * w, 0.0)) if self.law(friction).reversible else vs
 
     @cached_property
     def _of_kernel(self) -> dict[Law, KernelLaw]:
         return {}
 
     def kernel_law(self, friction: Law) -> KernelLaw:
-        """Feet under Coulomb's law or the elliptic one, each its own, or all under one law that is stated as formulas."""
+        """The law of all that touches, for the compiled kernel: parts under Coulomb's law or the elliptic one, each its own, or
+        all under one law that is stated as formulas."""
         if friction not in self._of_kernel:
             self._of_kernel[friction] = self._in_the_kernel(self.law(friction))
         return self._of_kernel[friction]
 
     def _in_the_kernel(self, law: Law) -> KernelLaw:
-        own, stated = [each.kernel for each in self._each(law)], law.kernel
-        if any(not each.numbers or each.own_law != stated.own_law for each in own):
+        own = self._each(law)
+        stated = own[0].kernel
+        alike = all(each.kernel.own_law == stated.own_law for each in own) and (not stated.own_law or len(set(own)) == 1)
+        if not alike or not all(each.kernel.numbers for each in own):
             return KernelLaw()
-        numbers = [each.numbers[:5] for each in own]
+        numbers = [each.kernel.numbers[:5] for each in own]
         degree, unit, speed_unit = numbers[0][1:4]  # of a law that is stated as formulas
         first = np.searchsorted(self.links, np.arange(len(self._scatter) + 1))
-        feet = np.hstack([self.along, self.offset, self.cos, self.sin, self.weight, numbers])
-        head = len(self._scatter), law.largest, float(law.associated), degree, unit, speed_unit
-        return KernelLaw((*head, *first, *feet.ravel()), ("FEET", *stated.defines), stated.own_law)
+        parts = np.hstack([self.along, self.offset, self.cos, self.sin, self.length, self.pressure, numbers])
+        head = len(self._scatter), len(self.parts), law.largest, float(law.associated), degree, unit, speed_unit
+        return KernelLaw((*head, *first, *parts.ravel()), stated.defines, stated.own_law)
 
     def speeds(self, velocity: LinkVelocities) -> tuple[str, np.ndarray]:
-        return FOOT, np.hypot(*self.velocities(velocity))
+        """Of what is drawn as sticking or sliding, and what it is called: of the middles of links; of feet, and of pads where
+        they are fastest."""
+        vs, vn, w = map(np.abs, self.velocities(velocity))
+        return self.called, np.hypot(vs, vn + 0.5 * self.length * w if self.called == FOOT else vn)
 
     def points(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return np.array(self.links), self.along[:, 0], self.offset[:, 0]
+        """Where friction is drawn, about `count` points along pads, and every foot: the part of each point, and its place from
+        the midpoint of that part's link, along and offset, ``(n,)``."""
+        many = max(2, count // max(len(self._pads), 1))
+        share = (np.arange(many) + 0.5) / many - 0.5
+        part = np.array([*self._points, *np.tile(self._pads, many).astype(int)])
+        ahead = np.concatenate([np.zeros(len(self._points)), np.repeat(share, len(self._pads))])
+        return part, self.along[part, 0] + ahead * self.length[part, 0], self.offset[part, 0]
 
     def at_points(self, friction: Law, velocity: LinkVelocities, delta: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        along, across = np.split(self.forces(friction, velocity, delta), 2)
-        return self.cos * along - self.sin * across, self.sin * along + self.cos * across
+        """Friction there, along and across the link: on a link that lies per length, ``(n, n_time)`` each; on a foot, and on
+        pads beside feet as if all of it moved like this."""
+        part, along, _ = self.points(count)
+        vs, vn, w = self.velocities(velocity)
+        each, turned = self._each(friction), vn[part] + (along - self.along[part, 0])[:, None] * w[part]
+        force = [each[k].density(vs[[k]], turned[[i]], delta) for i, k in enumerate(part)]
+        fs, fn = (np.concatenate([own[side] for own in force]) for side in (0, 1))
+        pressed = (self.weight if self.called == FOOT else self.pressure)[part]
+        cos, sin = self.cos[part], self.sin[part]
+        return pressed * (cos * fs - sin * fn), pressed * (sin * fs + cos * fn)

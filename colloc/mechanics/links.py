@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.feet import Foot, checked_feet, read_alike_from_both_ends
-from colloc.mechanics.floor_contact import FloorContact, LineContact, PointContact
+from colloc.mechanics.feet import Foot, checked_feet, read_alike_from_both_ends, whole_links
+from colloc.mechanics.floor_contact import FloorContact
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import STATED_IF_SET, is_number
@@ -89,9 +89,10 @@ class Links:
     @cached_property
     def contact(self) -> FloorContact:
         """What touches the floor."""
+        lengths = np.array(self.lengths)
         if feet := self.standing_on:
-            return PointContact(np.array(self.lengths), feet)
-        return LineContact(self.length_column(), self.pressure_column())
+            return FloorContact(lengths, feet)
+        return FloorContact(lengths, whole_links(self.weight_column()[:, 0]), "link")
 
     def law(self, friction: Law) -> Law:
         """The law of friction of what touches the floor, where the problem states `friction`."""

@@ -67,7 +67,7 @@ def numpy_instead() -> Iterator[None]:
 
 @cache
 def library(defines: tuple[str, ...] = (), own_law: str = "") -> ctypes.CDLL | None:
-    """The kernel, loaded, and compiled before if need be, by itself, for feet or with a law's own C; None if that
+    """The kernel, loaded, and compiled before if need be, by itself or with a law's own C; None if that
     cannot be, with a `SlowWarning` unless nobody wants it."""
     flags = (*FLAGS, *(f"-D{name}" for name in defines))
     headers = {"own_law.h": own_law} if own_law else {}

@@ -62,8 +62,8 @@ class _Scene:
         (self.joints,) = axes.plot([], [], "o", color="white", mec=INK, ms=5)
         (self.head,) = axes.plot([], [], "o", color=INK, ms=9)
         (self.centre,) = axes.plot([], [], "o", color=VERMILION, ms=5)
-        feet: dict[str, Any] = {"mec": VERMILION, "ms": 8, "zorder": 3}
-        self.sliding, self.holding = (axes.plot([], [], "s", color=colour, **feet)[0] for colour in ("white", VERMILION))
+        feet: dict[str, Any] = {"color": VERMILION, "ms": 8, "lw": 4, "zorder": 3}
+        self.sliding, self.holding = (axes.plot([], [], "s-", mfc=colour, **feet)[0] for colour in ("white", VERMILION))
         self.quiver: Any = None
         if arrows:
             base = shown.arrow_base[:, :, 0]
@@ -98,9 +98,10 @@ class _Scene:
             whole = [earlier.of(path) for earlier in shown.before[:period]]
             line.set_data(*np.concatenate([*whole, before.of(path[:, : k + 1])], axis=1))
         if len(shown.holding):
-            held, feet = shown.holding[:, k], before.of(shown.arrow_base[:, :, k])
-            self.sliding.set_data(*feet[:, ~held])
-            self.holding.set_data(*feet[:, held])
+            held, feet = shown.holding[:, k], before.of(shown.feet[..., k])
+            apart = np.concatenate([feet, np.full_like(feet[:, :1], np.nan)], axis=1)  # no line from foot to foot
+            for drawn, chosen in ((self.sliding, ~held), (self.holding, held)):
+                drawn.set_data(*apart[..., chosen].transpose(0, 2, 1).reshape(2, -1))
         if self.quiver is not None:
             self.quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
             self.quiver.set_UVC(*(shown.arrow_scale * turned(shown.arrow[:, :, k], before.rotation)))

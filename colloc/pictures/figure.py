@@ -46,7 +46,7 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     low = float(y.min()) - _MARGIN
     for k, colour in enumerate(snapshot_colours(count)):
         draw_body(axes, np.stack([x[:, k] + shift[k], y[:, k]]), colour, solution.problem.body)
-        draw_feet(axes, feet[:, :, k] * [[1], [higher]] + [[shift[k]], [0]], held[:, k])
+        draw_feet(axes, feet[..., k] * [[[1]], [[higher]]] + [[[shift[k]]], [[0]]], held[:, k])
         axes.plot(motion.centre[0, k] + shift[k], higher * motion.centre[1, k], "+", color=VERMILION, ms=6)
         below: Any = {"xycoords": "data", "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
         axes.annotate(f"{t[k]:.2g}", (middle[k], low), (0, -3), color=GREY, **below)
@@ -87,9 +87,9 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body
 
 
 def draw_feet(axes: Axes, places: np.ndarray, held: np.ndarray) -> None:
-    """Feet at places ``(2, n_foot)``, squares, those that hold filled."""
+    """Feet at places ``(2, 2, n_foot)``, squares, pads a line between two; those that hold filled."""
     for chosen, colour in ((~held, "white"), (held, VERMILION)):
-        axes.plot(*places[:, chosen], "s", color=colour, mec=VERMILION, ms=3.5)
+        axes.plot(*places[..., chosen], "s-", color=VERMILION, mfc=colour, ms=3.5, lw=2)
 
 
 def draw_lab(axes: Axes, solution: Solution) -> None:
@@ -111,7 +111,7 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
         axes.plot(*path, color=colour, lw=1.1, label=name)
     for k, shade in ((0, GREY), (-1, INK))[0 if apart else 1 :]:
         draw_body(axes, ends[:, :, k], shade, solution.problem.body)
-        draw_feet(axes, feet[:, :, k], held[:, k])
+        draw_feet(axes, feet[..., k], held[:, k])
         axes.plot(*fine.centre[:, [k]], "+", color=VERMILION, ms=7)
     axes.set_aspect("equal", "datalim")
     axes.set(xlabel="x  [body lengths]", ylabel="y  [body lengths]")

@@ -28,7 +28,9 @@ class Frames:
     arrow: np.ndarray
     """Where friction is shown, and the force per length there, in lab axes, ``(2, n_arrow, n_time)`` each."""
     holding: np.ndarray
-    """Of feet, which stand at the bases of the arrows: those that hold, ``(n_foot, n_time)``; no rows for a body without."""
+    """Of feet: those that hold, ``(n_foot, n_time)``; no rows for a body without."""
+    feet: np.ndarray
+    """Lab positions of their two ends, one of a point, ``(2, 2, n_foot, n_time)``."""
     before: tuple[RigidMotion, ...]
     """What the periods before do to each one that is shown, the first of which has none before."""
 
@@ -51,8 +53,8 @@ def lab_outline(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndar
 
 
 def lab_feet(body: Body, angles: np.ndarray, theta: np.ndarray, tail: np.ndarray) -> np.ndarray:
-    """Lab positions of the feet of a body, ``(2, n_foot, n_time)``; no rows where it has none."""
-    return tail[:, None] + turned(body.foot_places(angles), theta)
+    """Lab positions of both ends of the feet of a body, ``(2, 2, n_foot, n_time)``; none where it has none."""
+    return tail[:, None, None] + turned(body.footprints(angles), theta)
 
 
 def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: int = 3) -> Frames:
@@ -72,5 +74,6 @@ def frames(solution: Solution, count: int = 241, arrows: int = ARROWS, periods: 
         motion.tail[:, None] + turned(places, motion.theta),
         turned(forces, motion.theta),
         solution.holding(motion),
+        lab_feet(body, motion.angles, motion.theta, motion.tail),
         tuple(period.repeated(k) for k in range(periods)),
     )

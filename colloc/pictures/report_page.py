@@ -226,6 +226,7 @@ def motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     force = {"forceX": np.round(shown.arrow[0], 3).tolist(), "forceY": np.round(shown.arrow[1], 3).tolist()}
     return data | force | {
         "holding": shown.holding.astype(int).tolist(),
+        "feet": np.round(shown.feet, 4).tolist(),
         "hinges": body.hinges.indices(len(shown.ends[0]))[:2], "width": body.drawn_width,
         "before": [np.array([np.exp(1j * b.rotation), b.shift]).view(float).round(6).tolist() for b in shown.before],
         "arrowScale": shown.arrow_scale, "grid": grid,

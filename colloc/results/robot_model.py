@@ -88,8 +88,11 @@ def mjcf(robot: Robot, *, planar: bool = False) -> str:
         for number, foot in enumerate(chain.standing_on, 1):
             if foot.link == k:
                 place = f"{foot.place * length:.9g} {foot.offset * robot.length:.9g} 0"
-                ball = {"type": "sphere", "pos": place, "size": f"{half:.9g}", "mass": "0"}
-                SubElement(parent, "geom", ball | _touch(robot, not planar), name=f"foot_{number}")
+                pad = f"{foot.extent * length / 2:.9g} {half:.9g} {half:.9g}"
+                form = {"type": "box", "size": pad} if foot.extent else {"type": "sphere", "size": f"{half:.9g}"}
+                SubElement(
+                    parent, "geom", form | {"pos": place, "mass": "0"} | _touch(robot, not planar), name=f"foot_{number}"
+                )
         at = f"{length:.9g} 0 0"
     servos = SubElement(root, "actuator")
     for j, peak in enumerate(peaks, 1):
@@ -126,7 +129,11 @@ def urdf(robot: Robot) -> str:
             if foot.link == k - 1:
                 shape = SubElement(link, "collision")
                 SubElement(shape, "origin", xyz=f"{foot.place * length:.9g} {foot.offset * robot.length:.9g} 0")
-                SubElement(SubElement(shape, "geometry"), "sphere", radius=f"{height / 2:.9g}")
+                form = SubElement(shape, "geometry")
+                if foot.extent:
+                    SubElement(form, "box", size=f"{foot.extent * length:.9g} {height:.9g} {height:.9g}")
+                else:
+                    SubElement(form, "sphere", radius=f"{height / 2:.9g}")
     for j, (low, high) in enumerate(_ranges(robot), 1):
         joint = SubElement(root, "joint", name=f"joint_{j}", type="revolute")
         SubElement(joint, "parent", link=f"link_{j}")

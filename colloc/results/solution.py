@@ -247,14 +247,14 @@ class Solution:
         """Which feet of the body hold at instants of its motion, slower than 3 delta, ``(n_foot, n_time)``; no rows for a body
         that has none."""
         body = self.problem.body
-        if not body.foot_places(motion.angles).size:
+        if not body.footprints(motion.angles).size:
             return np.zeros((0, motion.t.size), dtype=bool)
         return body.speeds(motion.angles, motion.rates, motion.z)[1] < _HOLDS * self.delta_per_period
 
     @property
     def share_held(self) -> np.ndarray:
         """Of a period, for which each foot holds, ``(n_foot,)``, from the tail."""
-        stands = self.problem.body.foot_places(self.gait.angles(_INSTANTS[:1])).size
+        stands = self.problem.body.footprints(self.gait.angles(_INSTANTS[:1])).size
         return self.holding(self.sample(_INSTANTS)).mean(axis=1) if stands else np.empty(0)
 
     def power(self, motion: SampledMotion) -> np.ndarray:

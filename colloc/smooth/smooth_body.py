@@ -95,8 +95,8 @@ class SmoothBody:
         """None: a point at rest moves along the body, and does not come and go."""
         return np.empty((0, angles.shape[1]))
 
-    def foot_places(self, angles: np.ndarray) -> np.ndarray:
-        return np.zeros((2, 0, angles.shape[1]))
+    def footprints(self, angles: np.ndarray) -> np.ndarray:
+        return np.zeros((2, 2, 0, angles.shape[1]))
 
     def imbalance(self, angles: np.ndarray) -> np.ndarray:
         return np.zeros(angles.shape[1])

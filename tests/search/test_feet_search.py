@@ -98,11 +98,11 @@ def test_a_solution_on_feet_is_kept_and_verified(on_feet, tmp_path, capsys):
 def test_a_film_shows_which_feet_hold(on_feet):
     shown = frames(on_feet, 101)
     assert shown.holding.shape == (3, 101)
-    moved = np.hypot(*np.diff(shown.arrow_base, axis=2))
+    moved = np.hypot(*np.diff(shown.feet[:, 0], axis=2))
     both = shown.holding[:, 1:] & shown.holding[:, :-1]
     assert both.any()
     assert moved[both].max() < 0.02 * moved.max()
-    assert frames(on_feet, 11).arrow_base.shape[1] == 3
+    assert frames(on_feet, 11).feet.shape == (2, 2, 3, 11)
 
 
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():

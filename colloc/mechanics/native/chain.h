@@ -17,22 +17,7 @@ typedef struct {
     double load_x, load_y;   /* its share of an outside force on the body */
 } Link;
 
-#if defined FEET
-#include "feet.h"
-#elif defined OWN_LAW
-#include "link_quadrature.h"
-#else
-#include "link_friction.h"
-#endif
-
-#ifndef FEET
-/* How fast the link moves at most, up to a factor: the anchor is where that is least. */
-static inline double slowest_speed(const Sliding *k, const Law *law, const Link *link)
-{
-    (void)law;
-    return fabs(k->vs) + fabs(k->vn) + 0.5 * link->length * fabs(k->w);
-}
-#endif
+#include "parts.h"
 
 /* Net force and torque, and what a step has to reduce: the potential less the load's power, or half the squared residual
    without one. */

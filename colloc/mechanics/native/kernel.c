@@ -63,9 +63,10 @@ int colloc_balance(
     int method, double *z, double *residual, long long *iterations, long long *anchor, double *anchor_velocity)
 {
     Link *link = malloc((size_t)n * sizeof *link);
-    Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
+    const Law law = law_of(law_numbers);
+    Sliding *sliding = new_slidings(n, 2, &law);
     if (link && sliding) {
-        State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n};
+        State s = {.law = law, .link = link, .now = sliding, .trial = sliding + n};
         balance_instants(
             n, &s, length, pressure, mass, n_time, first, last, angles, rates, delta, load, start, tolerance, budget, method, z,
             residual, iterations, anchor, anchor_velocity);
@@ -86,7 +87,7 @@ int colloc_motion(
     const Law law = law_of(law_numbers);
     const int n_joint = n - 1, columns = 2 * n_joint + (load ? 2 : 0);
     Link *link = malloc((size_t)n * sizeof *link);
-    Sliding *k = malloc((size_t)n * sizeof *k);
+    Sliding *k = new_slidings(n, 1, &law);
     Matrix3 *K = malloc((size_t)n * sizeof *K);
     Change *d = malloc((size_t)n * sizeof *d);
     for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {

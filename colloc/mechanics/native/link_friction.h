@@ -1,4 +1,4 @@
-/* Friction on one link in closed form: what colloc/mechanics/link_friction.py states for arrays, for one link at one instant.
+/* Friction on a pad in closed form: what colloc/mechanics/link_friction.py states for arrays, for one at one instant.
    The names are those of that module; the formulas are derived and explained there. */
 
 #pragma once
@@ -8,37 +8,22 @@
 
 #include "vectors.h"
 
-typedef struct {
-    double mu_t, mu_f, mu_b;
-    double stretch_f, stretch_b; /* of the tangential velocity in the speed, forwards and backwards: 1 for Coulomb */
-    bool associated, reversible;
-    double largest;
-} Law;
-
-/* Velocities of a link and everything that its friction is expressed through; then the friction itself. */
+/* Velocities of a part and, of a pad, everything that its friction is expressed through; then the friction itself. */
 typedef struct {
     double vs, vn, w;
     double stretched; /* vs, as it counts in the speed */
     double a2, r0r1, S, Q, g, h;
     double fs, fn, couple;
-} Sliding;
+} PartSliding;
 
-/* Of `kernel_numbers` in colloc/mechanics/friction.py. */
-static Law law_of(const double number[6])
+static inline double tangential(const Part *p, double vs)
 {
-    const double *mu = number;
-    Law law = {mu[0], mu[1], mu[2], number[3], number[4], number[5] != 0, mu[1] == mu[2], fmax(mu[0], fmax(mu[1], mu[2]))};
-    return law;
+    return vs > 0 ? p->mu_f : p->mu_b;
 }
 
-static inline double tangential(const Law *law, double vs)
+static inline double stretch(const Part *p, double vs)
 {
-    return law->reversible || vs > 0 ? law->mu_f : law->mu_b;
-}
-
-static inline double stretch(const Law *law, double vs)
-{
-    return law->reversible || vs > 0 ? law->stretch_f : law->stretch_b;
+    return vs > 0 ? p->stretch_f : p->stretch_b;
 }
 
 /* (g - 1)/q: sum of q^j / (2 j + 3) below the limit of 0.1, where the closed form would cancel. */
@@ -57,10 +42,11 @@ static inline double h_series(double q)
 }
 
 /* Fill in a2 to h from vs, vn, w. */
-static inline void find_roots(Sliding *k, const Law *law, const Link *link, double delta)
+static inline void pad_roots(PartSliding *k, const Law *law, const Part *p, double delta)
 {
-    const double length = link->length;
-    const double vs = k->stretched = stretch(law, k->vs) * k->vs;
+    const double length = p->length;
+    (void)law;
+    const double vs = k->stretched = stretch(p, k->vs) * k->vs;
     const double a2 = vs * vs + delta * delta, half = 0.5 * length * k->w;
     const double y0 = k->vn - half, y1 = k->vn + half;
     const double r0 = sqrt(a2 + y0 * y0), r1 = sqrt(a2 + y1 * y1);
@@ -78,40 +64,30 @@ static inline void find_roots(Sliding *k, const Law *law, const Link *link, doub
     k->g = 1.0 + q * k->h;
 }
 
-/* Friction on the link from a2 to h; its pressure multiplies it, here and below. */
-static inline void find_force(Sliding *k, const Law *law, const Link *link)
+/* Friction on the pad from a2 to h; its pressure multiplies it, here and below. */
+static inline void pad_force(PartSliding *k, const Law *law, const Part *p)
 {
-    const double length = link->length, pressure = link->pressure;
-    const double per_S = 1.0 / k->S, l3 = length * length * length, mu_t = pressure * law->mu_t;
-    k->fs = -pressure * tangential(law, k->vs) * k->stretched * 2.0 * length * k->g * per_S;
+    const double length = p->length, pressure = p->pressure;
+    (void)law;
+    const double per_S = 1.0 / k->S, l3 = length * length * length, mu_t = pressure * p->mu_t;
+    k->fs = -pressure * tangential(p, k->vs) * k->stretched * 2.0 * length * k->g * per_S;
     k->fn = -mu_t * 2.0 * k->vn * length * per_S;
     k->couple = -mu_t * k->w * l3 * per_S * (0.5 * k->Q - k->a2 * k->h * per_S * per_S);
 }
 
-/* The speed in whose units balances are solved: the law is homogeneous once delta scales along. */
-static inline double speed_unit_of(double largest_rate)
+/* Dissipation potential of the pad: mu times the integral of r. */
+static inline double pad_dissipation(const PartSliding *k, const Law *law, const Part *p)
 {
-    return largest_rate;
-}
-
-/* Friction on a body that moves at unit speed, see `force_unit` in colloc/mechanics/damped_newton.py. */
-static inline double unit_of_force(const Law *law, double delta, double largest_rate)
-{
-    (void)largest_rate;
-    return law->largest / hypot(1.0, delta);
-}
-
-/* Dissipation potential of the link: mu times the integral of r. */
-static inline double dissipation(const Sliding *k, const Law *law, const Link *link)
-{
-    return link->pressure * (law->mu_t * link->length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g));
+    (void)law;
+    return p->pressure * (p->mu_t * p->length / k->S * (k->vn * k->vn + 0.25 * k->S * k->S + k->a2 * k->g));
 }
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w). */
-static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 slopes)
+static inline void pad_slopes(const PartSliding *k, const Law *law, const Part *p, double delta, Matrix3 slopes)
 {
-    const double vs = k->stretched, vn = k->vn, w = k->w, length = link->length, pressure = link->pressure;
-    const double mu_s = pressure * tangential(law, k->vs), mu_t = pressure * law->mu_t, more = stretch(law, k->vs);
+    (void)law;
+    const double vs = k->stretched, vn = k->vn, w = k->w, length = p->length, pressure = p->pressure;
+    const double mu_s = pressure * tangential(p, k->vs), mu_t = pressure * p->mu_t, more = stretch(p, k->vs);
     const double l3 = length * length * length, per_S = 1.0 / k->S, per_r = 1.0 / k->r0r1;
     const double a2J0 = length * k->S * k->Q * per_r;
     const double a2J1 = -vn * w * l3 * k->Q * per_r * per_S;
@@ -126,14 +102,14 @@ static inline void find_slopes(const Sliding *k, const Law *law, const Link *lin
 }
 
 /* Minus force over velocity with r frozen: the law of the paper's fixed point. */
-static inline void find_secants(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 secants)
+static inline void pad_secants(const PartSliding *k, const Law *law, const Part *p, double delta, Matrix3 secants)
 {
-    const double length = link->length, pressure = link->pressure;
-    const double mu_s = pressure * tangential(law, k->vs), mu_t = pressure * law->mu_t, S = k->S, l3 = length * length * length;
+    const double length = p->length, pressure = p->pressure;
+    const double mu_s = pressure * tangential(p, k->vs), mu_t = pressure * p->mu_t, S = k->S, l3 = length * length * length;
     const double I0 = 2.0 * length * k->g / S, I1 = -2.0 * k->vn * k->w * l3 * k->h / (S * S * S);
     const double I2 = l3 / S * (0.5 * k->Q + (2.0 * k->vn * k->vn - k->a2) * k->h / (S * S));
-    (void)delta;
-    secants[0][0] = stretch(law, k->vs) * mu_s * I0, secants[0][1] = 0.0, secants[0][2] = 0.0;
+    (void)law, (void)delta;
+    secants[0][0] = stretch(p, k->vs) * mu_s * I0, secants[0][1] = 0.0, secants[0][2] = 0.0;
     secants[1][0] = 0.0, secants[1][1] = mu_t * I0, secants[1][2] = mu_t * I1;
     secants[2][0] = 0.0, secants[2][1] = mu_t * I1, secants[2][2] = mu_t * I2;
 }

@@ -1,5 +1,5 @@
-/* Friction on one link by quadrature, for laws without closed forms: what colloc/mechanics/line_integrals.py states for arrays, and
-   explains. The law itself is in own_law.h, which colloc/laws/c_formula.py writes: `density`, `density_slopes`, `potential`. */
+/* Friction on a pad by quadrature, for laws without closed forms: what colloc/mechanics/line_integrals.py states for arrays,
+   and explains. The law itself is in own_law.h, which colloc/laws/c_formula.py writes: `density`, `density_slopes`, `potential`. */
 
 #pragma once
 
@@ -22,32 +22,17 @@ static const double WEIGHT[NODES] = {
     0.15275338713072628, 0.14917298647260424, 0.1420961093183824, 0.1316886384491769, 0.1181945319615186,
     0.1019301198172407, 0.08327674157670471, 0.06267204833410879, 0.040601429800386446, 0.017614007139150893};
 
-typedef struct {
-    double largest, degree; /* degree: not a number for none */
-    double unit, speed_unit;
-    bool associated, reversible;
-} Law;
-
-/* Velocities of a link; where its nodes lie, how fast they move across it, and their weights; then the friction. */
+/* Velocities of a part; of a pad, where its nodes lie, how fast they move across it, and their weights; then the friction. */
 typedef struct {
     double vs, vn, w, delta;
     double sigma[ALL_NODES], y[ALL_NODES], weight[ALL_NODES];
     double fs, fn, couple;
-} Sliding;
+} PartSliding;
 
-/* Of `kernel` in colloc/laws/formula_law.py. */
-static Law law_of(const double number[6])
+/* The nodes of the pad. */
+static inline void pad_roots(PartSliding *k, const Law *law, const Part *p, double delta)
 {
-    Law law = {number[0], number[1], number[2], number[3], number[4] != 0, number[5] != 0};
-    return law;
-}
-
-#include "own_units.h"
-
-/* The nodes of the link. */
-static inline void find_roots(Sliding *k, const Law *law, const Link *link, double delta)
-{
-    const double length = link->length;
+    const double length = p->length;
     (void)law;
     k->delta = delta;
     const double a = sqrt(k->vs * k->vs + delta * delta), half = 0.5 * length * k->w;
@@ -75,10 +60,10 @@ static inline void find_roots(Sliding *k, const Law *law, const Link *link, doub
     }
 }
 
-/* Friction on the link from its nodes; its pressure multiplies it, here and below. */
-static inline void find_force(Sliding *k, const Law *law, const Link *link)
+/* Friction on the pad from its nodes; its pressure multiplies it, here and below. */
+static inline void pad_force(PartSliding *k, const Law *law, const Part *p)
 {
-    const double pressure = link->pressure;
+    const double pressure = p->pressure;
     const double s = law->speed_unit;
     k->fs = k->fn = k->couple = 0.0;
     for (int i = 0; i < ALL_NODES; ++i) {
@@ -91,18 +76,18 @@ static inline void find_force(Sliding *k, const Law *law, const Link *link)
     }
 }
 
-static inline double dissipation(const Sliding *k, const Law *law, const Link *link)
+static inline double pad_dissipation(const PartSliding *k, const Law *law, const Part *p)
 {
     const double s = law->speed_unit;
     double total = 0.0;
     for (int i = 0; i < ALL_NODES; ++i)
         total += k->weight[i] * potential(s * k->vs, s * k->y[i], s * k->delta);
-    return link->pressure * (total / (s * law->unit));
+    return p->pressure * (total / (s * law->unit));
 }
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w); or, where `steep`, a multiple of 1 in its place that
    is no less: the trace in every direction. */
-static inline void add_slopes(const Sliding *k, const Law *law, double pressure, bool steep, Matrix3 total)
+static inline void add_pad_slopes(const PartSliding *k, const Law *law, double pressure, bool steep, Matrix3 total)
 {
     const double s = law->speed_unit;
     for (int j = 0; j < 9; ++j)
@@ -122,14 +107,14 @@ static inline void add_slopes(const Sliding *k, const Law *law, double pressure,
     }
 }
 
-static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 slopes)
+static inline void pad_slopes(const PartSliding *k, const Law *law, const Part *p, double delta, Matrix3 slopes)
 {
     (void)delta;
-    add_slopes(k, law, link->pressure, false, slopes);
+    add_pad_slopes(k, law, p->pressure, false, slopes);
 }
 
-static inline void find_secants(const Sliding *k, const Law *law, const Link *link, double delta, Matrix3 secants)
+static inline void pad_secants(const PartSliding *k, const Law *law, const Part *p, double delta, Matrix3 secants)
 {
     (void)delta;
-    add_slopes(k, law, link->pressure, true, secants);
+    add_pad_slopes(k, law, p->pressure, true, secants);
 }

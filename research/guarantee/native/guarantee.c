@@ -15,10 +15,11 @@ int colloc_loaded(
     double *power, double *forces, double *residual, double *leftover_power)
 {
     Link *link = malloc((size_t)n * sizeof *link);
-    Sliding *sliding = malloc(2 * (size_t)n * sizeof *sliding);
+    const Law law = law_of(law_numbers);
+    Sliding *sliding = new_slidings(n, 2, &law);
     const int middle = n / 2;
     if (link && sliding) {
-        State s = {.law = law_of(law_numbers), .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
+        State s = {.law = law, .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
         for (ptrdiff_t t = first; t < last; ++t) {
             Vector3 own = {load[t], load[n_time + t], load[2 * n_time + t]};
             find_directions(n, link, length, pressure, mass, angles + t, rates + t, 1.0, n_time);
