@@ -14,9 +14,10 @@ from colloc import Problem, ProblemError
 from colloc.gaits import gait_fields
 from colloc.gaits.gait import ClassOfGaits
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.mechanics.bodies import Body
+from colloc.mechanics.bodies import Body, Moved, Shaped
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.mechanics.law import Law
 from colloc.results.store import load, save
 from colloc.search.solve import solve
 
@@ -44,6 +45,23 @@ def test_a_body_of_your_own_is_solved_certified_kept_and_read(monkeypatch, tmp_p
     # the joints follow the belts, and move as those of the chain do
     joints = body.joint_angles(found.sample([0.3]).angles)
     np.testing.assert_allclose(body.outline(found.sample([0.3]).angles), Chain((0.2,) * 5).outline(joints), atol=1e-14)
+
+
+@pytest.mark.parametrize("part", [Moved, Shaped, Body, Law])
+def test_no_part_is_asked_more_than_fifteen_questions(part):
+    assert 10 <= len([name for name in vars(part) if not name.startswith("_")]) <= 15
+
+
+def test_a_body_that_says_its_outline_alone_looks_like_one_that_says_everything():
+    """The defaults, asked of a chain that answers better."""
+    body, rng = Chain((0.2, 0.5, 0.3)), np.random.default_rng(3)
+    angles, rates, z = rng.normal(size=(2, 6)), rng.normal(size=(2, 6)), rng.normal(size=(3, 6))
+    np.testing.assert_allclose(Body.centre(body, angles), body.centre(angles), atol=1e-14)
+    np.testing.assert_allclose(Body.speeds(body, angles, rates, z)[1], body.speeds(angles, rates, z)[1], atol=1e-8)
+    places, force = Body.rubbing(body, Friction(), angles, rates, 1e-9, z, 3)
+    x, y = body.outline(angles)
+    np.testing.assert_allclose(places, np.stack([0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])]), atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, atol=1e-12)  # dry, and alike in all directions
 
 
 @pytest.mark.slow

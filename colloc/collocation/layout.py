@@ -55,7 +55,7 @@ def layout_of(control: ControlProblem, mesh: Mesh, knots: np.ndarray | None = No
         "rates": (n_joint, n_point),
         "z": (3, n_point),
         "momenta": (len(STATES) if control.dynamics.froude else 0, mesh.n_site),
-        "forces": (body.n_force if full else 0, n_point),
+        "forces": (len(body.force_names) if full else 0, n_point),
         "length": (int(control.aims.uses("length")), 1),
         "driven_work": (int(control.aims.uses("driven_work")), 1),
     }

@@ -89,7 +89,7 @@ def full_path_point(body: Body, friction: Law, kind: Callable[[int], Piece]) -> 
     link forces, shape."""
     piece, n_joint = kind(body.n_joint), body.n_joint
     theta, delta, z = ca.SX.sym("theta"), ca.SX.sym("delta"), ca.SX.sym("z", 3)
-    angles, rates, forces = ca.SX.sym("q", n_joint), ca.SX.sym("r", n_joint), ca.SX.sym("forces", body.n_force)
+    angles, rates, forces = ca.SX.sym("q", n_joint), ca.SX.sym("r", n_joint), ca.SX.sym("forces", len(body.force_names))
     lifted = body.with_forces(friction, angles, rates, z, forces, delta)
     place = ca.vertcat(angles - piece.angles, rates - piece.direction)
     gained = piece.speed * ca.vertcat(z[2], forward(theta, lifted.centre), lifted.power)

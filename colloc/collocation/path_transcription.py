@@ -190,7 +190,7 @@ def transcribe_path(
 
 def _full_groups(body: Body, n_out: int, n_point: int, n: int) -> list[Group]:
     """The equations of every point where nothing is eliminated."""
-    n_joint, n_law = body.n_joint, body.n_force
+    n_joint, n_law = body.n_joint, len(body.force_names)
     ends = np.cumsum([0, n_joint, n_joint, n_law, 3])
     names = ("angles", "rates", "force law", "balance")
     return [output_group(name, range(a, b), n_out, n_point, n) for name, a, b in zip(names, ends, ends[1:], strict=False)]

@@ -73,7 +73,7 @@ def forward(theta: ca.SX, centre: ca.SX) -> ca.SX:
 
 def _full_point(body: Body, friction: Law, slope: Slope | None) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
-    forces = ca.SX.sym("forces", body.n_force)
+    forces = ca.SX.sym("forces", len(body.force_names))
     laws, balance, centre, power = body.with_forces(friction, angles, rates, z, forces, delta)
     ahead = forward(theta, centre)
     if slope is not None:
@@ -86,7 +86,11 @@ def _full_point(body: Body, friction: Law, slope: Slope | None) -> LocalFunction
 
 def _point_with_inertia(body: Chain, friction: Law, froude: float) -> LocalFunction:
     theta, angles, rates, z, delta = _symbols(body)
-    forces, states, posture = ca.SX.sym("forces", body.n_force), ca.SX.sym("momenta", len(STATES)), body.posture(angles)
+    forces, states, posture = (
+        ca.SX.sym("forces", len(body.force_names)),
+        ca.SX.sym("momenta", len(STATES)),
+        body.posture(angles),
+    )
     laws, force, centre, power = body.with_forces(friction, angles, rates, z, forces, delta)
     own = momenta(body, posture, body.velocity(posture, rates, z))
     changes = about_centre(body, angles, force) / froude + turning(z, states)
@@ -144,7 +148,7 @@ def driven_point(
     """Driven power at a point of a full program, from joint angles, rates and forces; times a gain that depends on more
     locals, `shape`, and on what is `given`."""
     _, angles, rates, _, delta = _symbols(body)
-    forces = ca.SX.sym("forces", body.n_force)
+    forces = ca.SX.sym("forces", len(body.force_names))
     out = gain * driven_power(body, friction, angles, rates, forces, delta)
     local = ca.vertcat(angles, rates, forces, *([] if shape is None else [shape]))
     return local_function("driven", local, ca.SX(0, 1) if given is None else given, delta, out)
@@ -160,7 +164,7 @@ def actuator_rows(
     if not limits.names:
         return {}
     _, angles, rates, _, delta = _symbols(body)
-    forces = ca.SX.sym("forces", body.n_force)
+    forces = ca.SX.sym("forces", len(body.force_names))
     shares = limits.shares(body, friction, angles, unit * rates, forces, delta)
     function = local_function(ACTUATORS, ca.vertcat(angles, rates, forces), ca.SX(0, 1), delta, shares)
     gather, n_point = np.concatenate([layout.angles, layout.rates, layout.forces]), layout.angles.shape[1]

@@ -18,7 +18,7 @@ from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.sloped import Slope, check_asked, class_on, slope_from
 from colloc.gaits.symmetry import NONE, check_symmetric
 from colloc.mechanics.actuators import ActuatorLimits
-from colloc.mechanics.bodies import FULL, Body
+from colloc.mechanics.bodies import FULL, Body, formulations
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
@@ -160,7 +160,7 @@ class Problem:
         object.__setattr__(self, "grade", 0.0 if slope is None else slope.grade)
         usual = self.body.usual
         start = (self.gait.delta_start or usual.delta_start) if self.law.regularised else usual.delta
-        self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=self.body.formulations[0])
+        self._fill(delta=usual.delta, delta_start=start, joint_limit=usual.limit, formulation=formulations(self.body)[0])
         self._fill(intervals=self.gait.intervals(self.body.n_joint))
         self._check_numbers()
         self._check_aims()
@@ -209,8 +209,8 @@ class Problem:
             raise ProblemError(f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}.")
         if self.smallest_shape_speed <= 0:
             raise ProblemError(f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}.")
-        if self.formulation not in self.body.formulations:
-            known = ", ".join(self.body.formulations)
+        if self.formulation not in formulations(self.body):
+            known = ", ".join(formulations(self.body))
             raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
         if not is_whole(self.intervals):
             raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")

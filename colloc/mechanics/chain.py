@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Self
 
 import numpy as np
 
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution, Branches, Lifted, Sliding
-from colloc.mechanics.bodies import ARROWS, FULL, IMPLICIT, Pairs, Stretch, Usual
+from colloc.mechanics.bodies import ARROWS, Body, Pairs
 from colloc.mechanics.chain_motion import chain_motion, chain_slopes
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
@@ -36,7 +35,7 @@ BALANCED = 1e-9
 
 
 @named_arguments
-class Chain(Links):
+class Chain(Links, Body):
     """A chain of straight links joined end to end; its shape coordinates are the joint angles.
 
     Parameters
@@ -66,36 +65,12 @@ class Chain(Links):
     2
     """
 
-    formulations = (FULL, IMPLICIT)
-    coordinate, quantity = "joint", "joint angle"
-    schedule: tuple[float, ...] = ()
-    stretches: tuple[Stretch, ...] = ()
-    panels = 0
     looks_for_all_velocities = True
-    usual = Usual(
-        delta=1e-4, delta_start=0.1, limit=float(np.pi), largest_limit=float(np.pi), limit_name="joint limits", excess=1e-6,
-        delta_influence=1e-2,
-    )  # fmt: skip
-    """The influence of delta that is allowed is the paper's own claim: less than 1 % below delta = 1e-4."""
-
-    @property
-    def n_force(self) -> int:
-        """Those of what touches the floor."""
-        return self.contact.n_force
 
     @property
     def force_names(self) -> tuple[str, ...]:
+        """Those of what touches the floor."""
         return self.contact.force_names
-
-    @property
-    def symmetries(self) -> tuple[str, ...]:
-        return ("none", "bilateral", "antipodal") if self.symmetric else ("none", "antipodal")
-
-    def swapped(self, shape: np.ndarray) -> np.ndarray:
-        return -shape[::-1]
-
-    def on_panels(self, panels: int) -> Self:
-        return self
 
     def describe(self) -> str:
         wide = f", {self.width:.4g} wide" if self.width else ""
@@ -157,17 +132,6 @@ class Chain(Links):
         dry."""
         law, velocity = self.law(friction), self.velocity(self.posture(angles), rates, z)
         return self.contact.slowness(law, velocity) if law.regularised else velocity.vs[:0]
-
-    @property
-    def limited(self) -> np.ndarray:
-        return np.eye(self.n_joint)
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        return tuple(f"joint {j + 1}" for j in range(self.n_joint))
-
-    def largest_angles(self, angles: np.ndarray) -> np.ndarray:
-        return np.abs(angles).max(axis=0)
 
     def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
         """All links two apart, bending to either side, the pairs `far` of links farther apart, and what a width asks of all."""
@@ -271,10 +235,6 @@ class Chain(Links):
         """With joint j at s_j along the body: ``q_j = sin(2 pi t - 2 pi waves (s_j - 1/2))``."""
         phase = 2 * np.pi * waves * (np.cumsum(self.lengths)[:-1] - 0.5)
         return -np.sin(phase), np.cos(phase)
-
-    @property
-    def bending(self) -> np.ndarray:
-        return np.eye(self.n_joint)
 
     def laid(self, lengths: np.ndarray) -> np.ndarray:
         """Every link gets the mean tangent angle of the part of the other chain it covers."""

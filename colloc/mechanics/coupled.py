@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.balance_results import BalanceSolution
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import Contact
 from colloc.mechanics.law import Law
@@ -49,7 +50,7 @@ def _under_friction(name: str) -> Callable[..., Any]:
 
 @named_arguments
 @dataclass(frozen=True)
-class Coupled:
+class Coupled(Body):
     """A chain some of whose joints hang on one motor, or are stuck; its shape coordinates are the angles of the motors.
 
     Parameters
@@ -81,9 +82,8 @@ class Coupled:
     gears: tuple[tuple[float, ...], ...] = ()
     stuck: tuple[tuple[int, float], ...] = field(default=())
 
-    coordinate, quantity = "motor", "motor angle"
-    formulations, usual, looks_for_all_velocities = Chain.formulations, Chain.usual, Chain.looks_for_all_velocities
-    schedule, panels, stretches = Chain.schedule, Chain.panels, Chain.stretches
+    coordinate = "motor"
+    looks_for_all_velocities = True
 
     def __post_init__(self) -> None:
         if type(self.chain) is not Chain:
@@ -103,7 +103,7 @@ class Coupled:
         if self.chain.crossing_depth(self._rest).any():
             raise ProblemError("links cross where joints are stuck.")
 
-    n_force, force_names, law, largest_forces = map(_of_chain, ("n_force", "force_names", "law", "largest_forces"))
+    force_names, law, largest_forces = map(_of_chain, ("force_names", "law", "largest_forces"))
     drawn_width, hinges, far_pairs = map(_of_chain, ("drawn_width", "hinges", "far_pairs"))
 
     sliding, with_forces, forces, solve = map(_under_friction, ("sliding", "with_forces", "forces", "solve"))
@@ -156,13 +156,7 @@ class Coupled:
     def symmetries(self) -> tuple[str, ...]:
         if self._rest.any():  # no mirror image of such a shape is one
             return ("none",)
-        return ("none", "bilateral", "antipodal") if self.symmetric else ("none", "antipodal")
-
-    def swapped(self, shape: np.ndarray) -> np.ndarray:
-        return -shape[::-1]
-
-    def on_panels(self, panels: int) -> Coupled:
-        return self
+        return super().symmetries
 
     def describe(self) -> str:
         broken = "".join(f", joint {joint + 1} stuck at {angle:.4g} rad" for joint, angle in self.stuck)
@@ -185,9 +179,6 @@ class Coupled:
     @property
     def limit_names(self) -> tuple[str, ...]:
         return tuple(name for name, moves in zip(self.chain.limit_names, self._moved, strict=True) if moves)
-
-    def largest_angles(self, angles: np.ndarray) -> np.ndarray:
-        return np.abs(self.limited @ angles).max(axis=0)
 
     def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
         return [contact.after(self.joint_angles) for contact in self.chain.contacts(far)]

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.mechanics.actuators import joint_moments
-from colloc.mechanics.bodies import FULL
 from colloc.mechanics.inertia import GRAVITY, checked_mass, inertial_moments, momenta, momentum_rates, tail_velocity
 from colloc.mechanics.law import rate_independent
 from colloc.mechanics.links import LinkVelocity
@@ -51,7 +50,7 @@ def joint_torques(solution: Solution, t: np.ndarray) -> np.ndarray:
         If the body has no joints that forces on its parts would turn or it is on a slope.
     """
     problem = solution.problem
-    if FULL not in problem.body.formulations:
+    if not problem.body.force_names:
         raise ProblemError(f"{problem.name} is a smooth body: it has no joints whose torques could be told.")
     if problem.slope is not None:
         raise ProblemError(f"{problem.name} is on a slope: torques of joints that lift weight are not worked out.")

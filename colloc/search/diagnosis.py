@@ -55,7 +55,7 @@ def row_meaning(transcription: GaitProgram, row: int) -> tuple[str, float]:
         point, component = divmod(index, 3)
         return f"the balance of {_COMPONENTS[component]}", float(mesh.times[point])
     if name == "force law":
-        point, which = divmod(index, body.n_force)
+        point, which = divmod(index, len(body.force_names))
         return f"the friction law of the {body.force_names[which]}", float(mesh.times[point])
     if name == ACTUATORS:
         point, which = divmod(index, len(transcription.control.actuators.names))

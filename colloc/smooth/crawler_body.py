@@ -60,7 +60,6 @@ class CrawlerBody(PanelBody):
     order: int = 6
 
     coordinate, quantity = "coordinate", "bump coordinate"
-    symmetric = False
     usual = PanelBody.usual._replace(delta=5e-5, delta_start=5e-5, instants_a_point=2)
     """A part at rest that slips costs a cliff, which a large delta turns into another landscape. The replay adapts anyway."""
 

@@ -26,14 +26,12 @@ class PrescribedBody(SmoothBody):
 
     n_joint = 2
     coordinate, quantity = "coordinate", "phase coordinate"
-    symmetric = False
     usual = Usual(
         delta=1e-4, delta_start=1e-4, limit=0.5 * np.pi, largest_limit=np.pi, limit_name="tangent angle", excess=1e-9,
         delta_influence=2e-2, instants=96, instants_a_point=2,
     )  # fmt: skip
     """Nobody optimised the motion, so a replay need not look at it ten times as closely as the mesh; it adapts anyway."""
     limited = np.empty((0, 2))
-    limit_names: tuple[str, ...] = ()
     bending = np.empty((0, 2))
 
     def prescribed(self) -> Motion:
@@ -45,7 +43,7 @@ class PrescribedBody(SmoothBody):
         return ("antipodal",) if self.prescribed().antipodal else ("none",)
 
     @property
-    def schedule(self) -> tuple[float, ...]:  # type: ignore[override]
+    def schedule(self) -> tuple[float, ...]:
         return self.prescribed().stages
 
     def tangent(self, s: np.ndarray, angles: np.ndarray) -> np.ndarray:
@@ -84,9 +82,6 @@ class PrescribedBody(SmoothBody):
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         return np.array([1.0, 0.0]), np.array([0.0, 1.0])
-
-    def laid(self, lengths: np.ndarray) -> np.ndarray:
-        raise ProblemError("no gait of a chain can be laid into a prescribed motion.")
 
 
 def _phase(angles: np.ndarray) -> np.ndarray:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Self
-
 import numpy as np
 
-from colloc.mechanics.balance_results import BalancedMotion, Lifted
-from colloc.mechanics.bodies import ARROWS, IMPLICIT, Pairs, Stretch
-from colloc.mechanics.contact import Contact
+from colloc.mechanics.balance_results import BalancedMotion
+from colloc.mechanics.bodies import ARROWS, Body
 from colloc.mechanics.law import Law
-from colloc.numerics.arrays import Array
 from colloc.smooth.balance import SmoothSolution, solve_smooth
 from colloc.smooth.curve import Curve, PanelGrid, curve, node_velocity
 from colloc.smooth.motion import Motion
@@ -25,29 +20,11 @@ _REPLAYED = 1e-8
 """Largest difference of a panel's force, torque or power from those of its halves, where a motion is replayed."""
 
 
-class SmoothBody:
-    """A curve of unit length by its tangent angle; below pi/2 it cannot cross itself."""
+class SmoothBody(Body):
+    """A curve of unit length by its tangent angle. Below pi/2 it cannot cross itself, and a point at rest moves along it and
+    makes no kinks; forces on all nodes as variables would be too many for a full program."""
 
-    formulations: tuple[str, ...] = (IMPLICIT,)
-    """Forces on all nodes as variables would be too many for a full program."""
-    n_force = 0
-    force_names: tuple[str, ...] = ()
-    looks_for_all_velocities = False
-    hinges = slice(0, 0)
-    drawn_width = 0.0
-    far_pairs: Pairs = ()
-    schedule: tuple[float, ...] = ()
     first_panels = 16
-    panels: int = 0
-    """Where nothing is searched for, panels adapt."""
-
-    @property
-    def stretches(self) -> tuple[Stretch, ...]:
-        """None unless a body says so."""
-        return ()
-
-    def on_panels(self, panels: int) -> Self:
-        return self
 
     def tangent(self, s: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """Theta ``(n_node, n_time)`` at arc lengths s ``(n_node, n_time)`` of shapes ``(n_joint, n_time)``."""
@@ -88,44 +65,9 @@ class SmoothBody:
         solved = self.on_adaptive_panels(friction, angles, rates, delta).require()
         return BalancedMotion(solved.z, solved.centre, solved.power, solved.bending_power), solved.residual
 
-    def all_velocities(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float) -> None:
-        """Not looked for."""
-
-    def slowness(self, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray) -> np.ndarray:
-        """None: a point at rest moves along the body, and does not come and go."""
-        return np.empty((0, angles.shape[1]))
-
-    def footprints(self, angles: np.ndarray) -> np.ndarray:
-        return np.zeros((2, 2, 0, angles.shape[1]))
-
-    def imbalance(self, angles: np.ndarray) -> np.ndarray:
-        return np.zeros(angles.shape[1])
-
-    def law(self, friction: Law) -> Law:
-        return friction
-
-    def with_forces(self, friction: Law, angles: Array, rates: Array, z: Array, forces: Array, delta: Array) -> Lifted:
-        raise NotImplementedError("a smooth body has no full program.")
-
-    def forces(self, friction: Law, angles: np.ndarray, rates: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
-        return np.empty((0, angles.shape[1]))
-
-    def largest_forces(self, friction: Law) -> np.ndarray:
-        return np.empty((0, 1))
-
     def largest_angles(self, angles: np.ndarray) -> np.ndarray:
         places = np.repeat(np.linspace(0.0, 1.0, _FINE_PLACES)[:, None], angles.shape[1], axis=1)
         return np.abs(self.tangent(places, angles)).max(axis=0)
-
-    def contacts(self, far: Sequence[tuple[int, int]] = ()) -> list[Contact]:
-        """None: the bound on the tangent angle excludes them."""
-        return []
-
-    def crossing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> np.ndarray:
-        return np.zeros(angles.shape[1])
-
-    def passing_depth(self, angles: np.ndarray, pairs: Sequence[tuple[int, int]] | None = None) -> float:
-        return 0.0
 
     def _curve(self, n: int, order: int, angles: np.ndarray, rates: np.ndarray) -> tuple[PanelGrid, Curve]:
         """The body on n equal panels."""
@@ -158,9 +100,6 @@ class SmoothBody:
     def speeds(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[str, np.ndarray]:
         """At equal steps from tail to head."""
         return "part", np.hypot(*node_velocity(self._at_equal_steps(_SHOWN, angles, rates), z))
-
-    def seen_from_head(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        raise NotImplementedError("gaits of a smooth body are never bilateral.")
 
 
 def _places(now: Curve) -> tuple[np.ndarray, np.ndarray]:

@@ -136,7 +136,7 @@ def test_slopes_are_differences(feet):
 def test_casadi_says_the_same(feet):
     body, law, (angles, rates) = Chain(LENGTHS, feet=feet), Friction(1.7, 1, 1.3), random_instants(1)
     rng = np.random.default_rng(3)
-    given = angles, rates, rng.normal(size=(3, 1)), rng.normal(size=(body.n_force, 1)), np.array([[0.01]])
+    given = angles, rates, rng.normal(size=(3, 1)), rng.normal(size=(len(body.force_names), 1)), np.array([[0.01]])
     symbols = [ca.SX.sym("x", len(part)) for part in given]
 
     def said(q, r, z, f, delta):

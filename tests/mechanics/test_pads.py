@@ -121,7 +121,7 @@ def test_joints_do_the_work_that_friction_takes_on_pads(law, feet):
 def test_casadi_says_the_same_of_pads(law, feet):
     body, (angles, rates) = Chain(LENGTHS, feet=feet), random_instants(1)
     rng = np.random.default_rng(3)
-    given = angles, rates, rng.normal(size=(3, 1)), rng.normal(size=(body.n_force, 1)), np.array([[0.01]])
+    given = angles, rates, rng.normal(size=(3, 1)), rng.normal(size=(len(body.force_names), 1)), np.array([[0.01]])
     symbols = [ca.SX.sym("x", len(part)) for part in given]
 
     def said(q, r, z, f, delta):

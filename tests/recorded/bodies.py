@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from colloc.mechanics.bodies import formulations
+
 
 def shapes(body, count, seed, size):
     """Angles, rates and tail velocities."""
@@ -12,9 +14,10 @@ def shapes(body, count, seed, size):
 def form(body, size, seed=3, count=7):
     """What it says of its shapes."""
     angles, rates, z = shapes(body, count, seed, size)
-    names = ("n_joint", "coordinate", "quantity", "formulations", "n_force", "symmetries", "usual", "schedule", "panels")
-    names += ("looks_for_all_velocities", "limited", "limit_names", "drawn_width", "bending")
-    found = {name: getattr(body, name) for name in names}
+    names = ("symmetries", "usual", "schedule", "panels", "looks_for_all_velocities", "limited", "limit_names", "drawn_width")
+    found = {name: getattr(body, name) for name in ("n_joint", "coordinate", "quantity")}
+    found |= {"formulations": formulations(body), "n_force": len(body.force_names)}
+    found |= {name: getattr(body, name) for name in (*names, "bending")}
     found |= {"describe": body.describe(), "hinges": [body.hinges.start, body.hinges.stop], "pairs": np.array(body.far_pairs)}
     found |= {
         "largest": body.largest_angles(angles),
@@ -46,6 +49,6 @@ def mechanics(body, law, delta, size, seed=4, count=6):
     }
     if body.schedule == ():
         found["slopes"] = body.slopes(law, angles, rates, delta, solved)
-    if body.n_force:
+    if body.force_names:
         found["lifted"] = body.with_forces(law, angles, rates, z, found["forces"] + 0.1, delta)
     return found
