@@ -30,20 +30,18 @@ from colloc.search.certify import ADMISSIBLE, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
 from colloc.search.ipopt import NlpResult, Solver
-from colloc.search.optimum import Optimum
+from colloc.search.optimum import ROUGH, Optimum
 from colloc.search.run import this_run
 from colloc.search.spaces import heading, space_near, transcribed, with_far
 
 RADIUS = 0.01
 """How far the gait may move [rad]: a solution farther away would be another gait."""
-_OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60, "max_cpu_time": 20.0}
+_OPTIONS: dict[str, object] = {"mu_init": 1e-8, "max_iter": 60}
 _ROUNDS = 4
 """Times that the shape checks are moved after IPOPT. What may be beyond them is what SQP allows; at the end, where the worst
 instant swings between two, what a certificate lets pass."""
 _MOST_PARAMETERS = 150
 """Curvature is measured for so many parameters at most: it takes two gradients for each."""
-_NEAR = 1e-2
-"""Largest gradient, over the value, at which a curvature means anything."""
 
 
 class Verdict(Enum):
@@ -225,7 +223,7 @@ def second_order(answer: Answer) -> SecondOrder:
     program = ReducedProgram(with_far(space, problem.body.far_pairs), answer.delta)
     program.place_rows(v)
     found, size = curvature(program, v), abs(answer.value / program.stated(-1.0))
-    if not found.kkt_error < _NEAR * size:
+    if not found.kkt_error < ROUGH.kkt_error * size:  # elsewhere a curvature means nothing
         return replace(NOT_MEASURED, why_not="not measured, where the gradient of the reduced program does not vanish")
     return SecondOrder(found.smallest / size, found.error / size, found.n_free)
 

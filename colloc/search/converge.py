@@ -23,7 +23,8 @@ from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
-from colloc.search.optimum import ITERATIONS, ROUGH, SKETCH, VIOLATION, Effort, Optimum, replace_keeping_space
+from colloc.search.certify import ADMISSIBLE
+from colloc.search.optimum import ITERATIONS, ROUGH, SKETCH, Effort, Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.search.spaces import with_far
 from colloc.system.errors import NotConvergedError
@@ -217,7 +218,7 @@ def conditions_on_kink(program: NonlinearProgram, v: np.ndarray, effort: Effort)
     conditions = stationarity(program, v)
     radius = min(max(KINK_RADIUS, _MISSED / conditions.kkt_error), _WIDEST)
     around = stationarity_around(program, v, conditions, radius, enough=effort.kkt_error)
-    holds = max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < VIOLATION
+    holds = max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < ADMISSIBLE
     return around if holds else None
 
 

@@ -21,8 +21,6 @@ FACTOR = 0.2
 """Of one delta to the one before."""
 _STEPS = (0.1, 0.01)
 """Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
-_GAIN = 1e-7
-"""The part of the objective that leaving a saddle has to gain."""
 _LOST = 0.5
 """A gait that loses this part of its value at the next delta owes it to delta."""
 
@@ -84,7 +82,7 @@ def below_saddle(optimum: Optimum) -> Optimum | None:
             if lagrangian.value(beside) >= value:
                 continue
             other = converged(optimum.space, beside, optimum.delta, NEXT_RADIUS, ROUGH)
-            if other.objective < optimum.objective - _GAIN * abs(optimum.objective):
+            if other.objective < optimum.objective - ROUGH.accuracy * abs(optimum.objective):
                 return other.after(*optimum.history)
     return None
 

@@ -8,9 +8,9 @@ from scipy import sparse
 from colloc.collocation.point_equations import ACTUATORS
 from colloc.collocation.program import GaitProgram
 from colloc.numerics.multiplier_estimate import quasi_definite_factors
+from colloc.search.certify import VIOLATION
 from colloc.search.ipopt import NlpResult, Solver
 
-_SATISFIED = 1e-8
 SMALLEST_DELTA = 1e-9
 """Below it the Lagrangian's gradient cannot be told from zero: a link at stick moves at the order of delta, the tail velocity
 that is solved for resolves 1e-16, so the gradient is known to about 1e-16/delta. Measured on one harmonic of three links: a KKT
@@ -87,7 +87,7 @@ def time_window(transcription: GaitProgram, excess: np.ndarray, group: str) -> t
 def explanation(transcription: GaitProgram, result: NlpResult, delta: float) -> str:
     """One or two sentences: what failed where, and what to try next."""
     worst = int(np.argmax(result.excess))
-    if result.excess[worst] > _SATISFIED:
+    if result.excess[worst] > VIOLATION:
         what, when = row_meaning(transcription, worst)
         group = next(n for n, s in transcription.groups.items() if s.start <= worst < s.stop)
         first, last = time_window(transcription, result.excess, group)

@@ -35,17 +35,17 @@ from colloc.search.small_starts import small_loops
 from colloc.search.spaces import space_about, space_near
 from colloc.system.errors import CollocError, NotConvergedError
 
-STARTS, _ENOUGH, _MOST = 32, 8, 3
+STARTS, ENOUGH, _MOST = 32, 8, 3
 """Starts where no number is asked for, at most unless they lead on; then the search also ends once so many have met the best
 gait. In any case it goes on until as many in a row have led nowhere better, and ends at so many times the starts asked for. On
 the zoo that ends 44 of 99 searches early and loses no best gait (`python -m benchmarks.zoo`; with `--starts 32`)."""
 FOLLOWED, PROMISING, CLOSE = 3, 0.8, 0.01
 """How many gaits are followed to the final delta, and of small loops; the share of the best value that they need at the coarse
 one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
-_TURN, _HOP_SIZES = 16, (0.2, 0.4, 0.8)
-"""Starts and hops from the best gait known take turns of so many, and how far hops go [rad], in turn. At 0.2 a hop mostly falls
-back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start k is depends on
-what came before alone: more starts go wherever fewer do."""
+_HOP_SIZES = 0.2, 0.4, 0.8
+"""How far hops from the best gait known go [rad], in turn; half as many as usual starts take turns with as many hops. At 0.2 a
+hop mostly falls back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start
+k is depends on what came before alone: more starts go wherever fewer do."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction: without them one harmonic of other bodies is missed at
 times, as that of `problems/purcell.py`."""
@@ -181,17 +181,17 @@ def candidates(problem: Problem, asked: int | None, goes_on: Callable[[], bool])
     for loop in run.kept("small loops", (problem,), lambda: small_loops(problem)):
         with suppress(CollocError):
             _follow(*space_about(coarse, closed_gait(coarse, loop, dry)), [dry], [loops])
-    starts, tried, better, best = starting_gaits(problem), 0, -_ENOUGH, 0.0
+    starts, tried, better, best = starting_gaits(problem), 0, -ENOUGH, 0.0
 
     def knows() -> bool:
-        enough = tried >= count or (asked is None and _met_best(known[-1]) >= _ENOUGH)
-        return enough and tried > better + _ENOUGH
+        enough = tried >= count or (asked is None and _met_best(known[-1]) >= ENOUGH)
+        return enough and tried > better + ENOUGH
 
     while tried == 0 or (tried < _MOST * count and not knows() and goes_on()):
         start, tried = tried, tried + 1
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
-            if start // _TURN % 2 == 0 or not known[-1]:
+            if start // (STARTS // 2) % 2 == 0 or not known[-1]:
                 _follow(*space_about(coarse, closed_gait(coarse, next(starts), deltas[0])), deltas, known)
             else:
                 shaken = _shaken(problem, min((c.optimum for c in known[-1]), key=lambda f: f.objective).gait, start)
@@ -267,7 +267,7 @@ def _followed_to_the_end(
     least = -known[0].dry - (1 - PROMISING) * abs(known[0].dry)
     promising = [c for c in known if -c.dry >= least]
     queue = [c for c in promising if not c.is_loop][:FOLLOWED] + [c for c in promising if c.is_loop][:FOLLOWED]
-    spare = [c for c in known if is_finite(c.optimum) and c not in queue][:_ENOUGH]
+    spare = [c for c in known if is_finite(c.optimum) and c not in queue][:ENOUGH]
     for number, candidate in enumerate((*queue, *spare), 1):
         if (ends and not goes_on()) or (candidate in spare and any(is_finite(optimum) for optimum, _ in ends)):
             break

@@ -12,6 +12,7 @@ from scipy import sparse
 from colloc.collocation.program import GaitProgram
 from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
+from colloc.search.certify import KKT
 from colloc.search.stop_request import StopRequest
 from colloc.system.interruption import interruptible
 
@@ -68,11 +69,10 @@ class NlpResult:
 
     @property
     def optimal(self) -> bool:
-        """First-order conditions hold to 1e-6, by our own measure."""
-        return max(self.kkt_error, self.violation, self.complementarity) < OPTIMAL_TOLERANCE
+        """First-order conditions hold as a certificate asks for, by our own measure."""
+        return max(self.kkt_error, self.violation, self.complementarity) < KKT
 
 
-OPTIMAL_TOLERANCE = 1e-6
 _REGIONS = 20
 """Trust regions that may follow each other. Paths of three joints, whose basins end between deltas, go 2 rad and more."""
 _INSIDE = 0.999

@@ -13,6 +13,7 @@ from colloc.gaits.problem import Problem
 from colloc.reduced.given import Given
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
+from colloc.search.certify import ADMISSIBLE, KKT
 from colloc.search.spaces import space_of
 
 
@@ -39,12 +40,10 @@ SKETCH = Effort(1e-5, 1e-1, 2)
 """Enough to tell gaits apart. A start that needs more is told apart as it is."""
 ROUGH = Effort(1e-8, 1e-3, 12)
 """On the way: delta, or the mesh, will move the gait by more."""
-FINE = Effort(1e-14, 1e-6, 12)
+FINE = Effort(1e-14, KKT, 12)
 """At the final delta on the final mesh."""
 ITERATIONS = 150
 """Of SQP in a round, at most."""
-VIOLATION = 1e-6
-"""By how much an optimum may break a row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +122,7 @@ class Optimum:
     @property
     def optimal(self) -> bool:
         """Whether the first-order conditions hold, as far as the effort asks for."""
-        return max(self.kkt_error, self.complementarity) < self.effort.kkt_error and self.violation < VIOLATION
+        return max(self.kkt_error, self.complementarity) < self.effort.kkt_error and self.violation < ADMISSIBLE
 
     def after(self, *before: Step) -> Optimum:
         """The same with steps that led to it."""

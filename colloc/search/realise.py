@@ -14,10 +14,9 @@ from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.search.certify import VIOLATION, gait_certificate
+from colloc.search.optimum import ROUGH
 from colloc.system.errors import NotConvergedError
 
-STATIONARY = 1e-3
-"""Largest slope of the Lagrangian of the reduced program at a relaxed optimum: the efficiency is off by about its square."""
 _NEAR, _MOST_CORNERS = 5e-3, 10_000
 """Relative loss of a finite gait that is near enough, and corners over a period, at most, of one."""
 _GRID = 2000
@@ -39,10 +38,10 @@ def relaxed_certificate(
         problem, gait, problem.delta * gait.delta_unit, gait.corner_phases, instants, tolerance,
         claimed=optimality.efficiency,
         before=(
-            Check("KKT error", optimality.kkt_error, STATIONARY, "gradient of the Lagrangian of the relaxed program"),
+            Check("KKT error", optimality.kkt_error, ROUGH.kkt_error, "gradient of the Lagrangian of the relaxed program"),
             Check("constraint violation", optimality.violation, VIOLATION, "largest violated equation or bound"),
             Check(
-                "other directions", min(optimality.price, 0.0), STATIONARY,
+                "other directions", min(optimality.price, 0.0), ROUGH.kkt_error,
                 "most that time in any other direction gains, per radian",
             ),
         ),

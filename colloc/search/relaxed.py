@@ -27,20 +27,18 @@ from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, converged
 from colloc.search.descend import levels
-from colloc.search.explore import FOLLOWED, PROMISING, Exploration, starting_gaits
+from colloc.search.explore import ENOUGH, FOLLOWED, PROMISING, Exploration, starting_gaits
 from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum
 from colloc.search.prescribed import realised
 from colloc.search.realise import kept_inside, realised_gaits, relaxed_certificate
 from colloc.search.run import this_run
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 
-RELAXED_STARTS = 8
-"""Starts where none are asked for."""
 _COARSE, _MOST = 0.4, 0.7
 """Pieces on which starts are told apart, and are followed, as shares of those of the answer."""
 _SAME = 4e-3
 """Relative difference of efficiencies below which two gaits on few pieces are the same."""
-_DIRECTIONS, _SEED = 72, 1
+_DIRECTIONS = 72
 _IDLE = 1e-7
 _MESHES, _GAIN = 3, 2e-5
 """At the final delta, and what one must gain to be followed by another."""
@@ -53,7 +51,7 @@ def directions_tried(n_joint: int) -> np.ndarray:
     if n_joint == 2:
         turn = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         return np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    points = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * (n_joint - 1), n_joint))
+    points = np.random.default_rng(1).standard_normal((_DIRECTIONS * (n_joint - 1), n_joint))
     return points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
@@ -98,7 +96,7 @@ def with_turned_directions(found: Optimum, pieces: int) -> tuple[MixtureSpace, n
 
 def explore_relaxed(
     problem: Problem,
-    starts: int = RELAXED_STARTS,
+    starts: int = ENOUGH,
     goes_on: Callable[[], bool] = lambda: True,
     first: tuple = (),
     least_extent: float = 0.0,

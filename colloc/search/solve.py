@@ -25,12 +25,12 @@ from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is
 from colloc.search.descend import FACTOR, below_saddle, descend
-from colloc.search.explore import CLOSE, Exploration, begin_at, explore, is_finite
+from colloc.search.explore import CLOSE, ENOUGH, Exploration, begin_at, explore, is_finite
 from colloc.search.literal import literal_answer
 from colloc.search.optimum import Optimum
 from colloc.search.prescribed import prescribed_answer
 from colloc.search.refine import refine
-from colloc.search.relaxed import RELAXED_STARTS, explore_relaxed, realised_solution, unrefined
+from colloc.search.relaxed import explore_relaxed, realised_solution, unrefined
 from colloc.search.run import Progress, Run, this_run
 from colloc.search.spaces import space_about
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -114,7 +114,7 @@ def _solved(problem: Problem, starts: int | None, search: str, until: float) -> 
     if search == FULL:
         return solution_of(problem, certified(literal_answer(problem)))
     if problem.gait.mixes:
-        explored = explore_relaxed(problem, starts or RELAXED_STARTS, goes_on)
+        explored = explore_relaxed(problem, starts or ENOUGH, goes_on)
         solution = realised_solution(explored.optima[0])
     else:
         explored = _explored(problem, starts, goes_on)
