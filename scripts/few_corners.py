@@ -23,7 +23,8 @@ from colloc.reduced.mixture_space import MixtureSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.search.converge import NEXT_RADIUS, converged
-from colloc.search.optimum import ROUGH, Optimum
+from colloc.search.effort import ROUGH
+from colloc.search.optimum import Optimum
 from colloc.search.relaxed import realised_solution
 
 _IDLE = 1e-9

@@ -29,8 +29,9 @@ from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
 from colloc.search.certify import ADMISSIBLE, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
+from colloc.search.effort import ROUGH
 from colloc.search.ipopt import NlpResult, Solver
-from colloc.search.optimum import ROUGH, Optimum
+from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
 from colloc.search.spaces import heading, space_near, transcribed, with_far
 

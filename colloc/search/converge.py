@@ -24,7 +24,8 @@ from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stati
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
 from colloc.search.certify import ADMISSIBLE
-from colloc.search.optimum import ITERATIONS, ROUGH, SKETCH, Effort, Optimum, replace_keeping_space
+from colloc.search.effort import ITERATIONS, ROUGH, SKETCH, Effort
+from colloc.search.optimum import Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.search.spaces import with_far
 from colloc.system.errors import NotConvergedError

@@ -14,7 +14,8 @@ from colloc.gaits.problem import Problem
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import Lagrangian, curvature
 from colloc.search.converge import NEXT_RADIUS, converged
-from colloc.search.optimum import ROUGH, Effort, Optimum
+from colloc.search.effort import ROUGH, Effort
+from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
 
 FACTOR = 0.2

@@ -29,7 +29,8 @@ from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
 from colloc.search.closure import closed_gait
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, as_it_is, converged
 from colloc.search.descend import FACTOR, descend, is_viscous, levels
-from colloc.search.optimum import ROUGH, SKETCH, Optimum
+from colloc.search.effort import ROUGH, SKETCH
+from colloc.search.optimum import Optimum
 from colloc.search.run import this_run
 from colloc.search.small_starts import small_loops
 from colloc.search.spaces import space_about, space_near

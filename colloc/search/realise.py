@@ -14,7 +14,7 @@ from colloc.gaits.relaxed import Mixture
 from colloc.results.checks import Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation
 from colloc.search.certify import VIOLATION, gait_certificate
-from colloc.search.optimum import ROUGH
+from colloc.search.effort import ROUGH
 from colloc.system.errors import NotConvergedError
 
 _NEAR, _MOST_CORNERS = 5e-3, 10_000

@@ -13,7 +13,8 @@ import numpy as np
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.search.certify import NOWHERE
 from colloc.search.converge import NEXT_RADIUS, converged
-from colloc.search.optimum import FINE, ROUGH, Optimum, replace_keeping_space
+from colloc.search.effort import FINE, ROUGH
+from colloc.search.optimum import Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.search.spaces import space_of
 from colloc.system.errors import NotConvergedError

@@ -27,8 +27,9 @@ from colloc.results.relaxation import Optimality, Relaxation
 from colloc.results.solution import Solution
 from colloc.search.converge import FIRST_RADIUS, NEXT_RADIUS, converged
 from colloc.search.descend import levels
+from colloc.search.effort import ROUGH, SKETCH, Effort
 from colloc.search.explore import ENOUGH, FOLLOWED, PROMISING, Exploration, starting_gaits
-from colloc.search.optimum import ROUGH, SKETCH, Effort, Optimum
+from colloc.search.optimum import Optimum
 from colloc.search.prescribed import realised
 from colloc.search.realise import kept_inside, realised_gaits, relaxed_certificate
 from colloc.search.run import this_run

@@ -23,7 +23,8 @@ from colloc.reduced.given import Given
 from colloc.results.answer import Answer, SecondOrder, Step
 from colloc.results.checks import Certificate, Check
 from colloc.results.relaxation import Optimality, Realised, Relaxation
-from colloc.search.optimum import Effort, Optimum
+from colloc.search.effort import Effort
+from colloc.search.optimum import Optimum
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.interruption import interruptible, time_limit
 from colloc.system.plain_values import Codec, Own

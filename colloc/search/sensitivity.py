@@ -28,7 +28,7 @@ from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
 from colloc.search.choose import solution_of
 from colloc.search.converge import NEXT_RADIUS, converged
-from colloc.search.optimum import FINE, ROUGH
+from colloc.search.effort import FINE, ROUGH
 from colloc.search.solve import finished
 from colloc.search.spaces import space_about, space_near, space_of, with_far
 from colloc.system.errors import ProblemError

@@ -12,7 +12,7 @@ from colloc.mechanics.inertia import kinetic_energy, momentum_rates, momentum_sl
 from colloc.motion.kinds import WithInertia
 from colloc.reduced.program import ReducedProgram
 from colloc.search.converge import converged
-from colloc.search.optimum import ROUGH
+from colloc.search.effort import ROUGH
 from colloc.search.small_starts import small_loops
 from colloc.search.spaces import space_near
 from colloc.verification.inertial_motion import GaitWithInertia

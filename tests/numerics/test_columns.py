@@ -6,6 +6,7 @@ import pytest
 
 from colloc import Chain, FreePath, Friction, Polygon, Problem
 from colloc.collocation.path_transcription import transcribe_fit
+from colloc.gaits.control_problem import control_problem
 from colloc.numerics.blocks import oracles
 from colloc.numerics.columns import ChosenRows, ColumnFunction
 
@@ -27,7 +28,7 @@ def test_a_function_of_columns_takes_any_number_of_them():
 def test_chosen_rows_are_those_of_the_program(body, gait, seed):
     """Every other row, at a point that keeps none of them."""
     problem, rng = Problem("rows", body=body, friction=Friction(2, 1, 1), gait=gait), np.random.default_rng(seed)
-    fit = transcribe_fit(problem, problem.guess, None, ())
+    fit = transcribe_fit(control_problem(problem), problem.guess)
     x = rng.uniform(0.5, 1.5, fit.assembly.n)
     given = [block.parameters for block in fit.assembly.blocks]
     program = oracles(fit.assembly)

@@ -14,7 +14,6 @@ import pytest
 
 from colloc.commands.report import main
 from colloc.gaits.free_path import FreePath
-from colloc.gaits.gait_fields import BODIES
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.path_samples import arcs_through
 from colloc.gaits.problem import Problem
@@ -29,6 +28,7 @@ from colloc.results.solution import Solution
 from colloc.results.store import save
 from colloc.search import certify as certificate
 from colloc.search.certify import certify
+from colloc.smooth.modal_body import ModalBody
 
 BROWSER = next((path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path), None)
 VOID = {"meta", "br", "hr", "input", "img", "link"}
@@ -156,7 +156,7 @@ def test_every_check_of_a_certificate_is_put_in_plain_words(page, three_link):
     for check in three_link.certificate.checks:
         assert PLAIN[check.name] in unescape(page)
     source = Path(certificate.__file__).read_text(encoding="utf-8")
-    limits = {kind.usual.limit_name for kind in BODIES}
+    limits = {body.usual.limit_name for body in (Chain(), ModalBody(2))}
     path = arcs_through(ellipse(0.0, 1.0, 1.0), FreePath(), np.linspace(0.0, 1.0, 41))
     limits |= {name for name, *_ in FreePath().own_checks(path)}
     assert set(re.findall(r'Check\(\s*"([^"]+)"', source)) | limits == set(PLAIN)

@@ -12,7 +12,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is, converged
-from colloc.search.optimum import FINE
+from colloc.search.effort import FINE
 from colloc.search.spaces import space_near, transcribed
 from tests.shared.stages import answer_near
 

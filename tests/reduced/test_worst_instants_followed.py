@@ -10,7 +10,7 @@ from colloc.gaits.starts import latin_hypercube_gait
 from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.search.converge import at_rest
-from colloc.search.optimum import FINE
+from colloc.search.effort import FINE
 from colloc.search.spaces import space_near
 
 BODIES = {"none": Chain((0.3, 0.2, 0.15, 0.35)), "bilateral": Chain((0.3, 0.2, 0.2, 0.3)), "antipodal": Chain()}

@@ -10,7 +10,7 @@ from colloc.reduced.path_space import PathSpace
 from colloc.reduced.program import ReducedProgram
 from colloc.search.confirm import RADIUS, confirm
 from colloc.search.converge import at_rest, conditions_on_kink
-from colloc.search.optimum import FINE
+from colloc.search.effort import FINE
 from tests.shared.stages import optimum_near
 
 PROBLEM = Problem("plain", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 2.0, 1.0), intervals=40, mesh_tolerance=0)

@@ -11,7 +11,7 @@ from colloc.reduced.mixture_space import MixtureSpace
 from colloc.results.relaxation import Optimality
 from colloc.search import realise
 from colloc.search.converge import as_it_is, converged
-from colloc.search.optimum import SKETCH
+from colloc.search.effort import SKETCH
 from colloc.search.realise import finite_certificate, kept_inside, realised_gaits, relaxed_certificate
 from colloc.search.relaxed import prices, with_turned_directions
 from scripts import few_corners

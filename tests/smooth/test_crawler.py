@@ -14,7 +14,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.converge import converged
-from colloc.search.optimum import SKETCH
+from colloc.search.effort import SKETCH
 from colloc.search.prescribed import realised
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
