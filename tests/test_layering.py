@@ -206,6 +206,8 @@ ADAPTIVE = (
     "heading_map",
     "inertial_motion",
     "inertial_replay",
+    "dry_balance",
+    "dry_friction",
 )
 
 

@@ -27,7 +27,8 @@ CasADi is not needed: the gait in the file is replayed with the NumPy solver on 
 replay used. KKT error and constraint violation are the solver's own record.
 
   colloc verify results/three_link.h5
-  colloc verify results/three_link.h5 --tolerance 1e-8"""
+  colloc verify results/three_link.h5 --tolerance 1e-8
+  colloc verify results/three_link.h5 --dry"""
 _TOLERANCE = 1e-6
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
 """Certified and rechecked numbers may differ by so many times the sum of their estimated errors, and 1e-9; these errors by so
@@ -53,6 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--tolerance", type=float, default=_TOLERANCE, metavar="TOL", help="of the replayed efficiency, relative"
     )
+    parser.add_argument("--dry", action="store_true", help="also bounds under dry friction, with no delta")
     add_printing(parser)
     return parser
 
@@ -157,5 +159,9 @@ def _verify(options: argparse.Namespace) -> int:
         lines.append(f"  {complaint}")
     if solution.status != "solved" and certificate.passed:
         lines.append(f"  the solve itself ended as: {solution.status}. {solution.message}")
+    if options.dry:
+        dry = solution.dry()
+        facts["dry"] = dry.facts()
+        lines.append(f"  dry friction: {dry}")
     tell(options, {**facts, **certificate.facts()}, lines)
     return OK if good else FAILED

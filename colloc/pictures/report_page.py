@@ -120,6 +120,7 @@ def report_page(solution: Solution, reference: Reference | None = None, gap: str
             solved=solution.status == SOLVED,
             headline=_headline(solution),
             pace=_pace(solution),
+            dry=_dry(solution),
             gap=gap.strip(),
             reference=_comparison(solution, reference),
             relaxed=[] if solution.relaxed is None else solution.relaxed.lines(),
@@ -175,6 +176,14 @@ def _pace(solution: Solution) -> str:
         f"changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of {froude:.2g}: a robot of 1 m on a "
         f"floor with {_ANY_FLOOR:g} of this friction, from {period:.2g} s a period"
     )
+
+
+def _dry(solution: Solution) -> str:
+    """Bounds of the efficiency under dry friction, where there are any."""
+    try:
+        return str(solution.dry())
+    except (ProblemError, NotConvergedError):
+        return ""
 
 
 def _comparison(solution: Solution, reference: Reference | None) -> str:

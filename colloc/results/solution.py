@@ -26,6 +26,7 @@ from colloc.results.relaxation import Relaxation
 from colloc.system.errors import ProblemError
 from colloc.system.late_binding import bound
 from colloc.system.versions import versions
+from colloc.verification.dry_friction import DryFriction, dry_friction
 from colloc.verification.replay import replay
 
 if TYPE_CHECKING:
@@ -196,6 +197,29 @@ class Solution:
             raise ProblemError("on a slope it is not known how slow is slow enough.")
         at = self.problem.body, self.problem.law, self.gait, self.answer.delta_per_period
         return slow_enough(*at, loss, breaks=self.gait.corner_phases)
+
+    def dry(self) -> DryFriction:
+        """Distance, work and efficiency at delta = 0, between bounds: the same gait under friction that is not smoothed.
+
+        Raises
+        ------
+        ProblemError
+            Unless a chain crawls slowly on the level, under a law whose dry balance minimises the dissipation: isotropic
+            friction or `Elliptic`.
+
+        Examples
+        --------
+        >>> import colloc
+        >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+        >>> solution = colloc.solve(problem, starts=1)
+        >>> least, most = solution.dry().efficiency
+        >>> most - least < 1e-4
+        True
+        """
+        p = self.problem
+        if p.slope is not None or p.froude:
+            raise ProblemError("bounds for dry friction are there for slow gaits on the level.")
+        return dry_friction(p.body, p.law, self.gait, breaks=self.gait.corner_phases)
 
     @property
     def standing(self) -> list[str]:

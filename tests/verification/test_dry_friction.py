@@ -1,0 +1,148 @@
+"""Motion at delta = 0, between bounds: against cone programs by another solver, against small delta, and by what must hold."""
+
+import clarabel
+import numpy as np
+import pytest
+from scipy import sparse
+
+import colloc
+from colloc import Chain, Elliptic, Foot, Friction
+from colloc.system.errors import ProblemError
+from colloc.verification.dry_balance import dry_balance
+from colloc.verification.dry_friction import dry_friction
+
+ISOTROPIC, ELLIPTIC = Friction(), Elliptic(2.0, 1.0, 1.0)
+UNEVEN = Chain((0.3, 0.2, 0.5), feet=(Foot(0, 0.4, weight=0.2), Foot(1, 0.5, weight=0.3), Foot(2, 0.1), Foot(2, 0.9)))
+
+
+def instants(body, seed, count=20):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1.5, 1.5, (body.n_joint, count)), rng.normal(size=(body.n_joint, count))
+
+
+def places(body, each):
+    """Link, place along and beside its middle, and weight of the points that stand for a body: its feet, or many on a line."""
+    if body.feet:
+        for foot in body.standing_on:
+            yield foot.link, (foot.place - 0.5) * body.lengths[foot.link], foot.offset, foot.weight
+        return
+    for link, length in enumerate(body.lengths):
+        for place in (np.arange(each) + 0.5) / each - 0.5:
+            yield link, place * length, 0.0, length / each
+
+
+def least_power(body, mu_t, angles, rates, each=1):
+    """Of one instant, by Clarabel: the least sum of weights times |(v along, mu_t v across)| over velocities of the tail."""
+    turn = np.concatenate([[0.0], np.cumsum(angles)])
+    spin = np.concatenate([[0.0], np.cumsum(rates)])
+    hinges = np.concatenate([[0.0], np.cumsum(np.array(body.lengths) * np.exp(1j * turn))])
+    moving = np.zeros(len(turn), dtype=complex)
+    for k in range(1, len(turn)):
+        moving[k] = moving[k - 1] + 1j * spin[k - 1] * body.lengths[k - 1] * np.exp(1j * turn[k - 1])
+    rows, offsets, weights = [], [], []
+    for link, along, beside, weight in places(body, each):
+        axis = np.exp(1j * turn[link])
+        at = hinges[link] + (0.5 * body.lengths[link] + along + 1j * beside) * axis
+        own = moving[link] + 1j * spin[link] * (at - hinges[link])
+        parts = [(value * np.conj(axis)) for value in (1.0, 1j, 1j * at, own)]
+        rows += [[p.real for p in parts[:3]], [mu_t * p.imag for p in parts[:3]]]
+        offsets += [parts[3].real, mu_t * parts[3].imag]
+        weights.append(weight)
+    n, m = 3, len(weights)
+    table = np.zeros((3 * m, n + m))
+    for k in range(m):
+        table[3 * k, n + k] = -1.0
+        table[3 * k + 1 : 3 * k + 3, :n] = -np.array(rows[2 * k : 2 * k + 2])
+    right = np.zeros(3 * m)
+    right[1::3], right[2::3] = offsets[::2], offsets[1::2]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    cost, cones = np.concatenate([np.zeros(n), weights]), [clarabel.SecondOrderConeT(3)] * m
+    nothing = sparse.csc_matrix((n + m, n + m))
+    return clarabel.DefaultSolver(nothing, cost, sparse.csc_matrix(table), right, cones, settings).solve().obj_val
+
+
+@pytest.mark.parametrize(
+    ("body", "law", "mu_t"),
+    [
+        (Chain(feet=1), ISOTROPIC, 1.0),
+        (UNEVEN, ISOTROPIC, 1.0),
+        (UNEVEN, ELLIPTIC, 2.0),
+        (Chain((0.4, 0.6), feet=2), ELLIPTIC, 2.0),
+    ],
+)
+def test_on_feet_the_least_power_of_a_cone_program_lies_between_the_bounds(body, law, mu_t):
+    angles, rates = instants(body, 1)
+    found = dry_balance(body, law, angles, rates)
+    power = np.array([least_power(body, mu_t, *at) for at in zip(angles.T, rates.T, strict=True)])
+    assert np.all(found.least <= power + 1e-8)
+    assert np.all(power <= found.most + 1e-8)
+    assert np.all(found.most - found.least < 1e-8)
+
+
+def test_on_a_line_it_is_what_cone_programs_on_ever_more_points_come_to():
+    angles, rates = instants(Chain(), 2, 4)
+    found = dry_balance(Chain(), ISOTROPIC, angles, rates)
+    few, many = (
+        np.array([least_power(Chain(), 1.0, *at, each) for at in zip(angles.T, rates.T, strict=True)]) for each in (40, 160)
+    )
+    assert np.abs(few - found.most).max() < 2e-3
+    assert np.abs(many - found.most).max() < 0.25 * np.abs(few - found.most).max()
+
+
+@pytest.mark.parametrize("body", [Chain(), Chain((0.2, 0.3, 0.1, 0.4)), UNEVEN])
+@pytest.mark.parametrize("law", [ISOTROPIC, ELLIPTIC])
+def test_the_ordinary_balance_tends_to_what_lies_between_the_bounds(body, law):
+    angles, rates = instants(body, 3, 50)
+    found = dry_balance(body, law, angles, rates)
+    size = np.abs(rates).max(axis=0)
+    assert np.all(found.least <= found.most)
+    assert np.all(found.most - found.least <= 1e-8 * size)
+    off = []
+    for delta in (1e-4, 1e-6):
+        solved = body.solve(body.law(law), angles, rates, delta)
+        power = body.motion(body.law(law), angles, rates, delta, solved).power
+        off.append(np.maximum(found.least - power, power - found.most).max())
+    assert off[1] < 0.05 * off[0] < 1e-4
+
+
+def test_bounds_are_proportional_to_rates_and_to_friction_and_nothing_moves_at_rest():
+    angles, rates = instants(Chain(), 4)
+    one, faster = (dry_balance(Chain(), ISOTROPIC, angles, factor * rates) for factor in (1.0, 1e3))
+    np.testing.assert_allclose(faster.most, 1e3 * one.most, rtol=1e-12)
+    rough = dry_balance(Chain(), Friction(3.0, 3.0, 3.0), angles, rates)
+    np.testing.assert_allclose(rough.most, 3.0 * one.most, rtol=1e-9)
+    still = dry_balance(Chain(), ISOTROPIC, angles, 0.0 * rates)
+    assert not np.any([still.least, still.most])
+    assert not np.any(still.apart)
+
+
+def test_the_interval_of_a_period_holds_what_a_certificate_states_for_delta_to_zero(three_link):
+    dry, stated = three_link.dry(), three_link.certificate
+    least, most = dry.efficiency
+    assert least - stated.error_at_zero_delta <= stated.efficiency_at_zero_delta <= most + stated.error_at_zero_delta
+    assert most - least < 1e-5
+    assert dry.open == 0.0
+    # nothing that smooths friction is left in it: a solve at a large delta is off by far more
+    assert three_link.problem.delta > 1e-5
+
+
+def test_unequal_coefficients_drag_and_curved_bodies_have_no_bounds():
+    gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    with pytest.raises(ProblemError, match="no bounds for delta = 0"):
+        dry_friction(Chain(), Friction(2.0, 1.0, 1.5), gait)
+    with pytest.raises(ProblemError, match="no bounds for delta = 0"):
+        dry_friction(Chain(), colloc.Viscous(), gait)
+    with pytest.raises(ProblemError, match="not for a ModalBody"):
+        dry_friction(colloc.ModalBody(2), ISOTROPIC, gait)
+
+
+def test_verify_tells_the_interval_on_demand(three_link, tmp_path, capsys):
+    from colloc.commands.verify import main
+
+    file = str(colloc.save(three_link, tmp_path / "x.h5"))
+    assert main([file, "--dry", "--quiet"]) == 0
+    assert "dry friction: d/W between 0.26002" in capsys.readouterr().out
+    assert main([file, "--quiet"]) == 0
+    assert "dry" not in capsys.readouterr().out
