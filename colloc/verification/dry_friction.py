@@ -104,7 +104,7 @@ def dry_friction(
     return DryFriction(
         distance=Between(max(replayed.distance - off_distance, 0.0), replayed.distance + off_distance),
         work=Between(work - error - integral(power - found.least), work + error + integral(found.most - power)),
-        open=float(step @ (np.maximum(*found.apart[1:]) > OPEN * largest)),
+        open=float(step @ (found.apart.max(axis=0) > OPEN * largest)),
         instants=t.size,
     )
 

@@ -146,3 +146,10 @@ def test_verify_tells_the_interval_on_demand(three_link, tmp_path, capsys):
     assert "dry friction: d/W between 0.26002" in capsys.readouterr().out
     assert main([file, "--quiet"]) == 0
     assert "dry" not in capsys.readouterr().out
+
+
+def test_where_either_foot_may_hold_the_motion_is_bounded_only_loosely():
+    """One joint between two single feet: either may rest and the other move, or both move, with the same dissipation."""
+    found = dry_balance(Chain((0.5, 0.5), feet=1), ISOTROPIC, np.array([[0.8]]), np.array([[1.0]]))
+    assert found.most - found.least < 1e-8
+    assert found.apart.max() > 1e-2
