@@ -99,6 +99,7 @@ def test_the_ordinary_balance_tends_to_what_lies_between_the_bounds(body, law):
     size = np.abs(rates).max(axis=0)
     assert np.all(found.least <= found.most)
     assert np.all(found.most - found.least <= 1e-8 * size)
+    assert np.all(found.apart <= 1e-4 * size)
     off = []
     for delta in (1e-4, 1e-6):
         solved = body.solve(body.law(law), angles, rates, delta)
