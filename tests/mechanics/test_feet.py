@@ -7,7 +7,7 @@ from scipy.optimize import root
 from shared.instants import random_instants
 from shared.kernels import by_both
 
-from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, PowerLaw, Problem, ProblemError, Viscous, Wheel, solve_balance
+from colloc import Chain, Elliptic, Foot, Friction, OwnLaw, Pad, PowerLaw, Problem, ProblemError, Viscous, Wheel, solve_balance
 from colloc.mechanics.native_kernel import native_kernel
 
 LENGTHS = (0.3, 0.45, 0.25)
@@ -15,6 +15,10 @@ PAIR = (Foot(0, 0.2), Foot(1, 0.3, offset=0.05), Foot(1, 0.3, offset=-0.05), Foo
 WHEELS = tuple(Wheel(link, 0.4, rolling=0.1) for link in range(3))
 MIXED = (Foot(0), Wheel(1, 0.7, rolling=0.2, sideways=2.0), Foot(2, 0.1, friction=Elliptic(2, 1, 1.5)))
 STANDS = {"middles": 1, "three": 3, "offset": PAIR, "wheels": WHEELS, "mixed": MIXED}
+PADDED = {
+    "pads": tuple(Pad(link, 0.25, 0.75) for link in range(3)),
+    "pads and a wheel": (Pad(0, 0.2, 0.8), Pad(1, 0, 1), Wheel(2, 0.5)),
+}
 LAWS = [Friction(), Friction(1.7, 1, 1.3), Elliptic(2, 1, 1.5), Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")]
 
 
@@ -65,7 +69,7 @@ def test_many_feet_are_a_line_to_second_order_in_their_distance(law):
     assert errors[2] < 0.3 * errors[1] < 1e-3 * law.largest
 
 
-@pytest.mark.parametrize("feet", STANDS.values(), ids=STANDS)
+@pytest.mark.parametrize("feet", {**STANDS, **PADDED}.values(), ids={**STANDS, **PADDED})
 @pytest.mark.parametrize("law", LAWS[:3], ids=["isotropic", "unequal", "elliptic"])
 def test_joints_do_the_work_that_friction_takes(law, feet):
     body, (angles, rates) = Chain(LENGTHS, feet=feet), random_instants(30)
