@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import balance_jacobian
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.coupled import Coupled, JointPath
@@ -105,27 +104,6 @@ def momentum_rates(
     z = tail_velocity(body, angles, rates, states)
     slides = body.sliding(friction, angles, rates, z, delta)
     return MomentumRates(about_centre(body, angles, slides.force) / froude + turning(z, states), z, slides.power)
-
-
-def momentum_slopes(
-    body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarray, now: MomentumRates, *, delta: float, froude: float
-) -> np.ndarray:
-    """Derivatives of the rates of the momenta along these, ``(3, 3, n_time)``, where `momentum_rates` says `now`; NumPy.
-
-    The tail velocity is affine in the momenta, its derivative T, and the force about the centre of mass is C times that about
-    the tail, whose derivative along the tail velocity is -K. So the derivative is -C K T / Fr, and that of the turning axes.
-    """
-    posture = body.posture(angles)
-    x, y, inertia = (row[0] for row in (*body.centre_of_mass(posture), moment_of_inertia(body, posture)))
-    velocity = body.velocity(posture, rates, now.z)
-    vx, vy = (row[0] for row in body.centre_velocity(posture, velocity))
-    omega, one, zero = now.z[2], np.ones_like(x), np.zeros_like(x)
-    T = np.array([[one, zero, y / inertia], [zero, one, -x / inertia], [zero, zero, 1 / inertia]])
-    C = np.array([[one, zero, zero], [zero, one, zero], [y, -x, one]])
-    axes = np.array([[zero, omega, vy / inertia], [-omega, zero, -vx / inertia], [zero, zero, zero]])
-    K = balance_jacobian(body, friction, posture, velocity, np.full((1, x.size), delta))
-    by_friction = -C.transpose(2, 0, 1) @ K @ T.transpose(2, 0, 1) / froude
-    return axes + by_friction.transpose(1, 2, 0)
 
 
 def about_centre(body: Chain, angles: Array, force: Array) -> Array:

@@ -41,6 +41,7 @@ BODY = (ctypes.c_int, _ARRAY, _ARRAY, _ARRAY, _ARRAY, _COUNT, _COUNT, _COUNT)
 _SIGNATURES = {
     "colloc_balance": (*BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _ARRAY, _REAL, ctypes.c_longlong, ctypes.c_int, *[_ARRAY] * 5),
     "colloc_motion": (*BODY, _ARRAY, _ARRAY, _REAL, *[_ARRAY] * 5),
+    "colloc_momenta": (*BODY, _ARRAY, _ARRAY, _REAL, _ARRAY, _REAL, _ARRAY, ctypes.c_int, _ARRAY, _ARRAY),
 }
 
 
@@ -150,4 +151,17 @@ def compiled_motion(
     values, slopes = np.empty((7, n_time)), np.empty((6 if with_slopes else 0, columns, n_time))
     after = map(address, (load, anchor, anchor_velocity, values, slopes if with_slopes else None))
     call_for_all(library.colloc_motion, body, friction, n_time, *map(address, (angles, rates)), delta, *after)
+    return values, slopes
+
+
+def kernel_momenta(
+    library: ctypes.CDLL, moving: Moving, states: np.ndarray, froude: float, *, columns: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """What `colloc.motion.compiled_momenta` speaks of: values ``(9, n_time)``, and derivatives ``(9, columns, n_time)``."""
+    body, friction, angles, rates, delta, _ = moving
+    n_time = angles.shape[1]
+    angles, rates, states = (np.ascontiguousarray(a, dtype=float) for a in (angles, rates, states))
+    spin, values, slopes = body.inertia_column().ravel(), np.empty((9, n_time)), np.empty((9, columns, n_time))
+    how = address(spin), froude, address(states), columns, address(values), address(slopes)
+    call_for_all(library.colloc_momenta, body, friction, n_time, address(angles), address(rates), delta, *how)
     return values, slopes

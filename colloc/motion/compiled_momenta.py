@@ -1,27 +1,28 @@
-"""How a chain's momenta change (`colloc.mechanics.inertia`), compiled from its symbolic statement: at many instants with exact
-derivatives, and at one instant after another.
-
-Apart from those who use it, since it loads CasADi, which nothing slow needs.
-"""
+"""How a chain's momenta change (`colloc.mechanics.inertia`), with exact derivatives at many instants, by the compiled kernel;
+and at one instant after another, by its symbolic statement, which does where there is no kernel."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from colloc.mechanics.balance import Moving
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import STATES, momentum_rates
 from colloc.mechanics.law import Law
+from colloc.mechanics.native_kernel import kernel_momenta, native_kernel
 
 N_OUT = 9
 """Tail velocity, velocity of the centre of mass, power, rates of the momenta."""
 
 
 @lru_cache(maxsize=32)
-def _function(body: Chain, friction: Law, *, differentiated: bool) -> ca.Function:
+def _function(body: Chain, friction: Law, *, differentiated: bool) -> Any:
     """(angles, rates, momenta, delta, Froude number) to the outputs, and their derivatives along the first three."""
+    import casadi as ca  # which nothing slow needs, nor a search
+
     sizes = {"angles": body.n_joint, "rates": body.n_joint, "momenta": len(STATES)}
     given = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
     delta, froude = ca.SX.sym("delta"), ca.SX.sym("froude")
@@ -31,11 +32,10 @@ def _function(body: Chain, friction: Law, *, differentiated: bool) -> ca.Functio
     return ca.Function("momenta", [*given.values(), delta, froude], [out, slopes], {"cse": True})
 
 
-def all_slopes(
+def momenta_at(
     body: Chain, friction: Law, shapes: tuple[np.ndarray, np.ndarray, float], states: np.ndarray, froude: float
-) -> np.ndarray:
-    """Derivatives ``(9, 2 n_joint + 3, n_time)`` of tail velocity, velocity of the centre of mass, power and rates of the
-    momenta along angles, rates and momenta.
+) -> tuple[np.ndarray, np.ndarray]:
+    """The outputs ``(9, n_time)``, and their derivatives ``(9, 2 n_joint + 3, n_time)`` along angles, rates and momenta.
 
     Parameters
     ----------
@@ -45,9 +45,29 @@ def all_slopes(
     states : (3, n_time)
     froude : float
     """
-    angles, rates, delta = shapes
-    _, slopes = _function(body, friction, differentiated=True)(angles, rates, states, delta, froude)
-    return np.asarray(slopes.full()).reshape(N_OUT, -1, states.shape[1])
+    return _momenta(body, friction, shapes, states, froude, 2 * body.n_joint + len(STATES))
+
+
+def momenta_along_states(
+    body: Chain, friction: Law, shapes: tuple[np.ndarray, np.ndarray, float], states: np.ndarray, froude: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same with derivatives along the momenta alone, ``(9, 3, n_time)``."""
+    return _momenta(body, friction, shapes, states, froude, len(STATES))
+
+
+def _momenta(
+    body: Chain,
+    friction: Law,
+    shapes: tuple[np.ndarray, np.ndarray, float],
+    states: np.ndarray,
+    froude: float,
+    columns: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    library, (angles, rates, delta) = native_kernel(body, friction), shapes
+    if library is not None:
+        return kernel_momenta(library, Moving(body, friction, angles, rates, delta, None), states, froude, columns=columns)
+    out, slopes = _function(body, friction, differentiated=True)(angles, rates, states, delta, froude)
+    return np.asarray(out.full()), np.asarray(slopes.full()).reshape(N_OUT, -1, states.shape[1])[:, -columns:]
 
 
 class MomentaAt:

@@ -23,9 +23,10 @@ from colloc.gaits.symmetry import fraction
 from colloc.mechanics.balance_results import BalancedMotion, BalanceSolution
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.inertia import STATES, checked_mass, momenta, momentum_rates, momentum_slopes
+from colloc.mechanics.inertia import STATES, checked_mass, momenta
 from colloc.mechanics.law import Law
 from colloc.motion.collocated import CollocatedPose, stage_weights, sums
+from colloc.motion.compiled_momenta import momenta_along_states, momenta_at
 from colloc.motion.heading import heading, heading_shares, momenta_image
 from colloc.motion.on_slope import balance_on_slope
 from colloc.motion.states import CollocatedStates, Rates
@@ -299,11 +300,8 @@ class WithInertia(SlowOnLevel):
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
-            at, pace = (self._chain, self.friction, shapes.angles, shapes.rates), self._froude_at(shapes)
-            now = momentum_rates(*at, states, delta=shapes.delta, froude=pace)
-            slopes = momentum_slopes(*at, now, delta=shapes.delta, froude=pace)
-            out = np.concatenate([now.z, states[:2], now.power, now.rates])
-            return Rates(now.rates, slopes, bool(np.isfinite(out).all()))
+            out, slopes = momenta_along_states(self._chain, self.friction, shapes[:3], states, self._froude_at(shapes))
+            return Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
         return states, out, held
@@ -316,9 +314,7 @@ class WithInertia(SlowOnLevel):
         return self._froude * shapes.unit**2
 
     def slopes(self, shapes: Shapes, along: Along) -> tuple[np.ndarray, np.ndarray]:
-        from colloc.motion.compiled_momenta import all_slopes
-
-        slopes = all_slopes(self._chain, self.friction, shapes[:3], along.states, self._froude_at(shapes))
+        _, slopes = momenta_at(self._chain, self.friction, shapes[:3], along.states, self._froude_at(shapes))
         return slopes[:, : -len(STATES)], slopes[:, -len(STATES) :]
 
     def through_pose(

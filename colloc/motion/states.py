@@ -133,14 +133,11 @@ class CollocatedStates:
     def _newton(self, on_states: np.ndarray, left_over: np.ndarray, open_by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Changes of the states and of their start that the equations, to first order, differ by."""
         within = _Linear(self._a, self._b, on_states)
-        step, gained = within.solved(left_over)
-        start = np.zeros_like(open_by)
-        if self._free.size:
-            free = self._free
-            through = np.stack([within.handed_on(unit) for unit in np.eye(len(start))], axis=1)
-            start[free] = np.linalg.solve(self._open(through), open_by[free] - gained[free])
-            step, _ = within.solved(left_over, start)
-        return step, start
+        own, through, gained = within.handed_on(left_over)
+        start, free = np.zeros_like(open_by), self._free
+        if free.size:
+            start[free] = np.linalg.solve(self._open(through[-1]), open_by[free] - gained[-1, free])
+        return within.at_points(own, through[:-1] @ start + gained[:-1]), start
 
     def _open(self, through: np.ndarray) -> np.ndarray:
         """Of the free states ``d s_end / d s_0 - M``."""
@@ -201,22 +198,22 @@ class _Linear:
             *by_interval.shape[:-2], k, n * s
         )
 
-    def handed_on(self, begin: np.ndarray) -> np.ndarray:
-        """States at the end of all intervals, ``(k,)``, from those at their begin, to first order."""
-        for through in self._through:
-            begin = through @ begin
-        return begin
+    def handed_on(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """``(I - H R) x = begin + right``: what stages have of the right side ``(k, n_point)`` alone, ``(n, s k)``, and the
+        states at the edges as ``through @ begin + gained``, ``(n + 1, k, k)`` and ``(n + 1, k)``."""
+        n, _, k = self._shape
+        own = (self._inverse @ self._by_interval(right)[:, :, None])[:, :, 0]
+        more, edges = self._gain @ own[:, :, None], np.empty((n + 1, k, k + 1))
+        edges[0] = now = np.eye(k, k + 1)
+        for interval, through in enumerate(self._through):
+            now = through @ now
+            now[:, -1:] += more[interval]
+            edges[interval + 1] = now
+        return own, edges[:, :, :-1], edges[:, :, -1]
 
-    def solved(self, right: np.ndarray, begin: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """x with ``(I - H R) x = begin + right``, ``(k, n_point)``, and ``begin + sum of h b R x``, ``(k,)``."""
-        own = np.einsum("nij,nj->ni", self._inverse, self._by_interval(right))
-        gained = np.einsum("nai,ni->na", self._gain, own)
-        begins = np.empty_like(gained)
-        now = np.zeros(gained.shape[1]) if begin is None else begin
-        for k, (through, more) in enumerate(zip(self._through, gained, strict=True)):
-            begins[k] = now
-            now = through @ now + more
-        return self._by_point(own + np.einsum("nia,na->ni", self._response, begins)), now
+    def at_points(self, own: np.ndarray, begins: np.ndarray) -> np.ndarray:
+        """x ``(k, n_point)``, from the states at the begins of the intervals, ``(n, k)``."""
+        return self._by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
 
     def pulled_back(self, of_states: np.ndarray, of_end: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Of numbers with derivatives ``(m, k, n_point)`` with respect to the states and ``(m, k)`` to those at the end: to

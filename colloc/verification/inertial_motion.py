@@ -22,6 +22,7 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_inertia, momenta
 from colloc.mechanics.law import Law
+from colloc.motion.compiled_momenta import MomentaAt
 from colloc.motion.follow import Course, followed
 from colloc.system.arguments import check_finite, is_whole
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -89,8 +90,6 @@ class GaitWithInertia:
     def __init__(
         self, body: Chain, friction: Law, path: Path, delta: float, *, froude: float, breaks: tuple[float, ...] = ()
     ) -> None:
-        from colloc.motion.compiled_momenta import MomentaAt
-
         self.body, self.friction, self.path, self.delta, self.froude, self.breaks = body, friction, path, delta, froude, breaks
         self._momenta = MomentaAt(body, friction, delta, froude)
 

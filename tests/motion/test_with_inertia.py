@@ -8,7 +8,9 @@ from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.summary import summary_lines
 from colloc.gaits.control_problem import control_problem
 from colloc.gaits.objective import objective_from
-from colloc.mechanics.inertia import kinetic_energy, momentum_rates, momentum_slopes
+from colloc.mechanics.inertia import kinetic_energy, momentum_rates
+from colloc.mechanics.native_kernel import numpy_instead
+from colloc.motion.compiled_momenta import momenta_at
 from colloc.motion.kinds import WithInertia
 from colloc.reduced.program import ReducedProgram
 from colloc.search.converge import converged
@@ -38,23 +40,33 @@ def program(stated):
     ("body", "friction"),
     [
         (colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(1.7, 1.0, 1.3)),
-        (colloc.Chain((0.2, 0.3, 0.1, 0.4), weights=(0.4, 0.2, 0.2, 0.2)), colloc.Friction(0.4)),
+        (colloc.Chain((0.2, 0.3, 0.5), masses=(0.5, 0.1, 0.4), inertias=(0.01, 0.02, 0.03)), colloc.Friction(0.4)),
         (STANDING, colloc.Friction(3.0, 0.5, 1.0)),
         (colloc.Chain((0.5, 0.5)), colloc.Viscous(2.0)),
     ],
 )
-def test_derivatives_along_the_momenta_are_those_of_differences(body, friction):
+def test_the_kernel_and_the_symbolic_statement_have_the_derivatives_of_differences(body, friction):
     """Of fourth order, at random shapes, rates and momenta."""
     rng, law, step = np.random.default_rng(4), body.law(friction), 1e-4
-    angles, rates, states = (rng.normal(size=(n, 50)) for n in (body.n_joint, body.n_joint, 3))
-    settings = {"delta": 0.3, "froude": 0.1}
+    given, n_joint, at = rng.normal(size=(2 * body.n_joint + 3, 50)), body.n_joint, {"delta": 0.3, "froude": 0.1}
 
-    def at(states):
-        return momentum_rates(body, law, angles, rates, states, **settings)
+    def stated(given):
+        angles, rates, states = np.split(given, [n_joint, 2 * n_joint])
+        now = momentum_rates(body, law, angles, rates, states, **at)
+        return np.concatenate([now.z, states[:2], now.power, now.rates])
 
-    found = momentum_slopes(body, law, angles, rates, at(states), **settings)
-    for k, unit in enumerate(np.eye(3)[:, :, None]):
-        near, far = ((at(states + n * step * unit).rates - at(states - n * step * unit).rates) / (2 * n) for n in (1, 2))
+    def compiled():
+        angles, rates, states = np.split(given, [n_joint, 2 * n_joint])
+        return momenta_at(body, law, (angles, rates, at["delta"]), states, at["froude"])
+
+    value, found = compiled()
+    with numpy_instead():
+        symbolic = compiled()
+    np.testing.assert_allclose(value, stated(given), rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(symbolic[0], value, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(symbolic[1], found, rtol=1e-9, atol=1e-9)
+    for k, unit in enumerate(np.eye(len(given))[:, :, None]):
+        near, far = ((stated(given + n * step * unit) - stated(given - n * step * unit)) / (2 * n) for n in (1, 2))
         np.testing.assert_allclose(found[:, k], (4 * near - far) / (3 * step), rtol=1e-7, atol=1e-7)
 
 

@@ -6,7 +6,7 @@
 
 #include <stdlib.h>
 
-#include "motion.h"
+#include "momenta.h"
 
 /* Or `least`, if it is larger: under a load the body creeps at the speed delta, though its joints rest. */
 static inline double largest_rate_of(const int n, const double *rate, ptrdiff_t stride, double least)
@@ -124,6 +124,53 @@ int colloc_motion(
             value_changes(n, link, k, K, d, change);
             for (int row = 0; row < DIFFERENTIATED_ROWS; ++row)
                 slopes[(row * columns + column) * n_time + t] = of_rate ? change[row] : change[row] * speed;
+        }
+    }
+    const bool done = link && k && K && d;
+    free(link);
+    free(k);
+    free(K);
+    free(d);
+    return done ? 0 : 1;
+}
+
+/* Of chains with momenta `states` (3, n_time) and moments of inertia `spin` of the links: rows (MOMENTA_ROWS, n_time), and their
+   derivatives (MOMENTA_ROWS, columns, n_time) with respect to the states alone, 3 columns, or to joint angles, rates and states,
+   2 (n - 1) + 3. */
+int colloc_momenta(
+    int n, const double *length, const double *pressure, const double *mass, const double *law_numbers, ptrdiff_t n_time,
+    ptrdiff_t first, ptrdiff_t last, const double *angles, const double *rates, double delta, const double *spin, double froude,
+    const double *states, int columns, double *values, double *slopes)
+{
+    const Law law = law_of(law_numbers);
+    const int n_joint = n - 1, n_shape = columns - 3;
+    const double own_delta = scaled_delta_of(delta, 1.0);
+    Link *link = malloc((size_t)n * sizeof *link);
+    Sliding *k = new_slidings(n, 1, &law);
+    Matrix3 *K = malloc((size_t)n * sizeof *K);
+    Change *d = malloc((size_t)n * sizeof *d);
+    for (ptrdiff_t t = first; t < last && link && k && K && d; ++t) {
+        const Vector3 p = {states[t], states[n_time + t], states[2 * n_time + t]};
+        double value[MOMENTA_ROWS], change[MOMENTA_ROWS];
+        find_directions(n, link, length, pressure, mass, angles + t, rates + t, 1.0, n_time);
+        find_midpoints(n, link, 0);
+        const Centre centre = find_centre(n, link, spin);
+        const Total total = find_momentum_rates(n, link, k, &centre, spin, p, &law, own_delta, froude, value);
+        for (int row = 0; row < MOMENTA_ROWS; ++row)
+            values[row * n_time + t] = value[row];
+        for (int i = 0; i < n; ++i)
+            find_slopes(&k[i], &law, &link[i], own_delta, K[i]);
+        for (int column = 0; column < columns; ++column) {
+            Vector3 dp = {0.0, 0.0, 0.0};
+            if (column < n_shape)
+                find_changes(n, link, k, 0, column % n_joint, column >= n_joint, d);
+            else {
+                memset(d, 0, (size_t)n * sizeof *d);
+                dp[column - n_shape] = 1.0;
+            }
+            momentum_rate_changes(n, link, k, K, &centre, spin, p, total.force, froude, d, dp, change);
+            for (int row = 0; row < MOMENTA_ROWS; ++row)
+                slopes[(row * columns + column) * n_time + t] = change[row];
         }
     }
     const bool done = link && k && K && d;
