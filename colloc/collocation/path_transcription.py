@@ -71,10 +71,6 @@ def _geometry(
     return side_geometry(admissible, mesh, parameters, n, near, far)
 
 
-def _knots(path: ArcPath | Corners) -> np.ndarray | None:
-    return path.edges if isinstance(path, ArcPath) else None
-
-
 def path_through(
     control: ControlProblem, gait: Gait, edges: np.ndarray | None, scheme: str = ""
 ) -> tuple[ArcPath | Corners, Mesh]:
@@ -131,7 +127,7 @@ def transcribe_path(
     Edges are phases; by default graded by the turns of the gait (free paths), or evenly spread over the sides (polygons).
     """
     near, mesh = path_through(control, gait, edges, scheme)
-    layout = layout_of(control, mesh, _knots(near))
+    layout = layout_of(control, mesh, near.knots)
     body, law, aims, fraction = *control.dynamics[:2], control.aims, control.admissible.gait.fraction
     geometry = _geometry(control.admissible, mesh, layout.parameters[:, 0], layout.n, near, far)
     kind = arc if isinstance(near, ArcPath) else side
@@ -185,7 +181,7 @@ def transcribe_path(
         groups.append(group)
     implicit: Implicit = {} if full else {"point": balanced}
     objective = objective_block(aims.objective, layout, fraction)
-    return _program(control, mesh, _knots(near), layout, geometry, groups, objective, implicit, velocity)
+    return _program(control, mesh, near.knots, layout, geometry, groups, objective, implicit, velocity)
 
 
 def _full_groups(body: Body, n_out: int, n_point: int, n: int) -> list[Group]:
@@ -205,7 +201,7 @@ def transcribe_fit(
     """
     near, mesh = path_through(control, gait, edges, scheme)
     admissible = control.admissible
-    size = layout_of(control, mesh, _knots(near)).parameters.size
+    size = layout_of(control, mesh, near.knots).parameters.size
     own, none = np.arange(size)[:, None], np.empty((1, 0), dtype=int)
     layout = Layout(own, *10 * (none,), size)
     geometry = _geometry(admissible, mesh, own[:, 0], size, near, far)
@@ -213,7 +209,7 @@ def transcribe_fit(
     shapes = (shapes[-1] if isinstance(near, ArcPath) else shapes).ravel(order="F")
     target = admissible.gait.parameters(near)[shapes]
     objective = Block(squared_distance(shapes.size), shapes[:, None], sparse.eye(1, format="csr"), target[:, None])
-    return _program(control, mesh, _knots(near), layout, geometry, geometry.groups, objective, {}, None)
+    return _program(control, mesh, near.knots, layout, geometry, geometry.groups, objective, {}, None)
 
 
 def _program(

@@ -85,6 +85,10 @@ class ArcPath(UnitSpeedGait):
     def n_joint(self) -> int:
         return self.shapes.shape[0]
 
+    @property
+    def knots(self) -> np.ndarray:
+        return self.edges
+
     def _at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)[k]

@@ -79,6 +79,11 @@ class GaitFunction:
         """Phases in (0, 1) where the rates jump: by default none."""
         return np.empty(0)
 
+    @property
+    def knots(self) -> np.ndarray | None:
+        """Phases where the arcs of a free path meet, ``(n_arc + 1,)``; None for other gaits."""
+        return None
+
     def lines(self) -> list[str]:
         """The gait in words or as a formula."""
         raise NotImplementedError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,19 +16,14 @@ from colloc.gaits.limits import widest
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import remembered
+from colloc.reduced.constraints import Constraints, Function
 from colloc.reduced.given import Given
 
 
 class LinearSpace:
     """Members of a linear class by their parameters v, in which angles and rates are linear, on a mesh (by default the
     first one), with pairs of links `far` apart that are kept from crossing; what it answers is
-    told by `colloc.reduced.program.SearchSpace`.
-
-    Rows: shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed.
-    """
-
-    knots: np.ndarray | None = None
-    _follows: Callable[[np.ndarray], list[_Placed]] | None
+    told by `colloc.reduced.program.SearchSpace`."""
 
     def __init__(self, control: ControlProblem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()) -> None:
         self.control, self.given = control, Given(None, edges, scheme, far)
@@ -42,7 +38,6 @@ class LinearSpace:
         self.upper = gait.largest_parameters(body, widest(limit))
         self.lower = -self.upper
         self.own = np.arange(self.n)
-        self.move_checks(np.zeros(self.n))
 
     def member(self, v: np.ndarray) -> AnyGait:
         return self._admissible.member(v)
@@ -60,10 +55,6 @@ class LinearSpace:
         """The mesh in phases of a member: it is the same for all."""
         return self.mesh
 
-    def remeshed(self, gait: AnyGait, edges: np.ndarray, scheme: str) -> LinearSpace:
-        """The class on another mesh."""
-        return type(self)(self.control, edges, scheme, self.given.far)
-
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, rates per period ``(n_joint, n_point)`` and the pace, 1."""
         angles, rates = np.split((self._matrix @ v).T, 2)
@@ -72,56 +63,55 @@ class LinearSpace:
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         return np.einsum("ktj,tjp->kp", on_shape, self._matrix)
 
-    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
-        """Place the checks at the worst instants of the gait v, or later; how far the gait exceeds any bound there [rad, or of
-        a largest speed]."""
+    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+        """Shape checks at their worst instants in the mesh cells in which they might bind, then the mean square shape speed."""
         gait, n_joint, limit = self.member(v), self._admissible.n_joint, self._admissible.joint_limit
-        self._placed, self._follows, self.watched, low, high, excess = [], None, {}, [], [], -np.inf
+        placed, kinds, low, high, excess = list[_Placed](), dict[str, np.ndarray](), [], [], -np.inf
         for check, (cells, times) in zip(self.checks, near_peaks(gait, self.mesh, self.checks, limit), strict=True):
-            self.watched[check.name] = cells
+            kinds[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
             values, matrix = check_values(check, gait, times), check.matrix(self._admissible.gait, times, n_joint)
             may_move = moving(values, check, limit, times, self.mesh, cells)
-            self._placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move))
+            placed.append(_Placed(check, held_shares(check, gait, times), matrix, times, cells, may_move))
             excess, (lower, upper) = max(excess, float(check.excess(values, limit).max())), check.nearer_bounds(values, limit)
             low.append(lower)
             high.append(upper)
-        self.watched["shape speed"] = np.zeros(1, dtype=int)
-        self.row_lower = np.concatenate([*low, [self._admissible.smallest_shape_speed**2]])
-        self.row_upper = np.concatenate([*high, [np.inf]])
-        return excess
+        kinds["shape speed"] = np.zeros(1, dtype=int)
+        lower, upper = np.concatenate([*low, [self._admissible.smallest_shape_speed**2]]), np.concatenate([*high, [np.inf]])
+        at_worst = remembered(partial(self._at_worst, placed))
 
-    def follow_worst(self) -> None:
-        self._follows = remembered(self._at_worst)
+        def moving_on() -> Constraints:
+            return Constraints(kinds, lower, upper, excess, *self._rows(at_worst))
 
-    def _at_worst(self, v: np.ndarray) -> list[_Placed]:
+        return Constraints(kinds, lower, upper, excess, *self._rows(lambda v: placed), moving_on)
+
+    def _rows(self, placed: Callable[[np.ndarray], list[_Placed]]) -> tuple[Function, Function]:
+        """Values and slopes of the rows, with checks where they stand for parameters v."""
+        square = self._square
+        return (
+            lambda v: np.concatenate([*(each.value(v) for each in placed(v)), [v @ square @ v]]),
+            lambda v: np.vstack([*(each.slope(v) for each in placed(v)), 2 * square @ v]),
+        )
+
+    def _at_worst(self, placed: list[_Placed], v: np.ndarray) -> list[_Placed]:
+        """Checks at the worst instants of v, in the cells where they were placed."""
         gait, found = self.member(v), []
-        for placed in self._placed:
-            which, matrix = placed.moving, placed.matrix
+        for each in placed:
+            which, matrix = each.moving, each.matrix
             if which.size:
-                cells = placed.cells[which]
+                cells = each.cells[which]
                 where, matrix = (self.mesh.edges[cells], self.mesh.h[cells]), matrix.copy()
-                at = placed.check, placed.shares[which], gait, placed.times[which]
+                at = each.check, each.shares[which], gait, each.times[which]
                 worst = followed(*at, cells=where, limit=self._admissible.joint_limit)
-                matrix[which] = placed.check.matrix(self._admissible.gait, worst, self._admissible.n_joint)
-            found.append(placed._replace(matrix=matrix))
+                matrix[which] = each.check.matrix(self._admissible.gait, worst, self._admissible.n_joint)
+            found.append(each._replace(matrix=matrix))
         return found
-
-    def _rows_at(self, v: np.ndarray) -> list[_Placed]:
-        return self._placed if self._follows is None else self._follows(v)
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """None: parameters are alike."""
         return None
-
-    def rows(self, v: np.ndarray) -> np.ndarray:
-        values = [placed.value(v) for placed in self._rows_at(v)]
-        return np.concatenate([*values, [v @ self._square @ v]])
-
-    def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        return np.vstack([*(placed.slope(v) for placed in self._rows_at(v)), 2 * self._square @ v])
 
 
 class _Placed(NamedTuple):

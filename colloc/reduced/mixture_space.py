@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.collocation.shape_checks import shape_checks
+from colloc.collocation.shape_checks import ShapeCheck, shape_checks
 from colloc.gaits.control_problem import ControlProblem
 from colloc.gaits.path_samples import Gait, symmetric_samples
 from colloc.gaits.relaxed import Mixture
 from colloc.gaits.symmetry import end_conditions
 from colloc.mechanics.bodies import Pairs
 from colloc.numerics.mesh import Mesh
+from colloc.reduced.constraints import Constraints
 from colloc.reduced.given import Given
 
 _NEAR = 0.6
@@ -30,8 +31,6 @@ _SAMPLES = 2000
 class MixtureSpace:
     """Relaxed gaits of a number of pieces by their parameters; attributes as `colloc.reduced.program.SearchSpace`.
 
-    Rows: what closes the path, checks on shapes where pieces meet and in their middle, and the path's length.
-
     Parameters
     ----------
     control : ControlProblem
@@ -42,8 +41,6 @@ class MixtureSpace:
     directions : int, optional
         Other than those of the class, to see what more would be worth.
     """
-
-    knots: np.ndarray | None = None
 
     def __init__(self, control: ControlProblem, pieces: int, far: Pairs = (), scheme: str = "", directions: int = 0) -> None:
         self.control, self.pieces, admissible = control, pieces, control.admissible
@@ -68,9 +65,6 @@ class MixtureSpace:
         ends = np.eye(pieces + 1)
         self._watch = np.vstack([ends, 0.5 * (ends[:-1] + ends[1:])])
         self._least = 2 * np.pi * admissible.smallest_shape_speed * admissible.gait.fraction
-        self._placed: list[np.ndarray] = []
-        self.watched: dict[str, np.ndarray] = {}
-        self.row_lower = self.row_upper = np.empty(0)
 
     def _split(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Durations ``(n_piece, n_direction)``, directions as they are parametrised, and as unit vectors."""
@@ -120,10 +114,6 @@ class MixtureSpace:
         """The pieces in phases of a member."""
         return Mesh(self.mesh.scheme, gait.phases[: self.pieces + 1])
 
-    def remeshed(self, gait: Mixture, edges: np.ndarray, scheme: str) -> MixtureSpace:
-        """The class with as many pieces as there are intervals between the edges."""
-        return MixtureSpace(self.control, edges.size - 1, self.given.far, scheme)
-
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, directions and durations at the points of the mesh: a block of columns for each direction."""
         durations, _, directions = self._split(v)
@@ -169,53 +159,53 @@ class MixtureSpace:
         since = np.cumsum(weights[:, ::-1], axis=1)[:, ::-1]
         return self._on_parameters(since[:, 0], since[:, 1:], np.zeros(1), np.zeros(1), *self._split(v))
 
-    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
-        """Choose the instants at which checks may bind; how far the gait exceeds any bound [rad, or body lengths].
+    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+        """What closes the path, checks on shapes where pieces meet and in their middle, and the path's length.
 
-        They are ends and middles of pieces, and move with those alone: `later` changes nothing.
+        Ends and middles of pieces move with those alone: `later` changes nothing.
         """
         angles, limit = self.member(v).shapes @ self._watch.T, self._limit
-        self._placed, self.watched, low, high, excess = [], {}, [], [], -np.inf
+        kinds, watched, low, high, excess = dict[str, np.ndarray](), [], [], [], -np.inf
         closing = np.zeros(len(self._first))
         for check in self._checks:
             values = check.along(angles)
             beyond = check.excess(values, limit)
             at = np.flatnonzero(beyond > -_NEAR)
             lower, upper = check.nearer_bounds(values[at], limit)
-            self._placed.append(at)
-            self.watched[check.name] = at
+            kinds[check.name] = at
+            if at.size:
+                watched.append((check, self._watch[at]))
             low.append(lower)
             high.append(upper)
             excess = max(excess, float(beyond.max()))
-        self.row_lower = np.concatenate([closing, *low, [self._least]])
-        self.row_upper = np.concatenate([closing, *high, [np.inf]])
-        return excess
-
-    def follow_worst(self) -> None:
-        """Nothing: ends and middles of pieces move with those alone."""
+        return Constraints(
+            kinds,
+            np.concatenate([closing, *low, [self._least]]),
+            np.concatenate([closing, *high, [np.inf]]),
+            excess,
+            lambda v: self._rows(watched, v),
+            lambda v: self._row_slopes(watched, v),
+        )
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """None: parameters are alike."""
         return None
 
-    def rows(self, v: np.ndarray) -> np.ndarray:
+    def _rows(self, watched: list[tuple[ShapeCheck, np.ndarray]], v: np.ndarray) -> np.ndarray:
         shapes = self.member(v).shapes
-        values = [
-            check.along(shapes @ self._watch[at].T) for check, at in zip(self._checks, self._placed, strict=True) if at.size
-        ]
+        values = [check.along(shapes @ at.T) for check, at in watched]
         return np.concatenate([self._first @ shapes[:, 0] + self._last @ shapes[:, -1], *values, [v[self.time].sum()]])
 
-    def row_slopes(self, v: np.ndarray) -> np.ndarray:
+    def _row_slopes(self, watched: list[tuple[ShapeCheck, np.ndarray]], v: np.ndarray) -> np.ndarray:
         shapes = self.member(v).shapes
         closing = np.zeros((len(self._first), self.pieces + 1, self.n_joint))
         closing[:, 0] += self._first
         closing[:, -1] += self._last
         weights = [closing]
-        for check, at in zip(self._checks, self._placed, strict=True):
-            if at.size:
-                there = shapes @ self._watch[at].T
-                slope = check.slope(there, check.itself(there)[None]).full()
-                weights.append(np.einsum("jw,wn->wnj", slope, self._watch[at]))
+        for check, at in watched:
+            there = shapes @ at.T
+            slope = check.slope(there, check.itself(there)[None]).full()
+            weights.append(np.einsum("jw,wn->wnj", slope, at))
         length = np.zeros((1, self.n))
         length[0, self.time] = 1.0
         return np.vstack([self._through_shapes(v, np.concatenate(weights)), length])

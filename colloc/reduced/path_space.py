@@ -23,6 +23,7 @@ from colloc.numerics.columns import ChosenRows, ColumnFunction
 from colloc.numerics.constraint_rows import selector
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import minimised, remembered
+from colloc.reduced.constraints import Constraints
 from colloc.reduced.given import Given
 from colloc.reduced.place_slopes import along_arcs, along_shape
 from colloc.system.errors import NotConvergedError
@@ -48,7 +49,7 @@ class PathSpace:
     ) -> None:
         self.control, self.given = control, Given(near, edges, scheme, far)
         self._fit = fit = transcribe_fit(control, near, edges, scheme, far)
-        self.mesh, self.knots, self._geometry = fit.mesh, fit.knots, fit.geometry
+        self.mesh, self._geometry = fit.mesh, fit.geometry
         free = fit.lower < fit.upper
         self._fixed = np.where(free, 0.0, fit.lower)
         gait, n_joint = control.admissible.gait, control.admissible.n_joint
@@ -72,7 +73,6 @@ class PathSpace:
         self._fixed_rows = {n: np.arange(r.stop - r.start) for n, r in fit.groups.items() if n not in (*dropped, *checked)}
         self._place()
         self._followed, self._steep = remembered(self._follow), remembered(self._chord_jacobian)
-        self.move_checks(self.laid(near))
 
     def _place(self) -> None:
         """Where the collocation points lie, as functions of the parameters."""
@@ -151,13 +151,13 @@ class PathSpace:
         laid = self._through(gait)
         v, target, accuracy = laid[self.own], laid, _NEAR
         for _ in range(_ROUNDS):
-            excess = self.move_checks(v)
-            values = self.rows(v)
-            outside = max((self.row_lower - values).max(), (values - self.row_upper).max(), excess)
+            asked = self.constraints(v)
+            values = asked.values(v)
+            outside = max((asked.lower - values).max(), (values - asked.upper).max(), asked.excess)
             if outside < _EXACT and (accuracy == _FITTED or np.abs(self.full_parameters(v) - laid).max() < _EXACT):
                 return v
             # the first round goes near the gait, later ones the shortest way into the class, which moves with its checks
-            nearest = _Nearest(self, target)
+            nearest = _Nearest(self, asked, target)
             v = minimised(nearest, v, np.inf, accuracy, curvature=nearest.curvature(v)).v
             target, accuracy = self.full_parameters(v), _FITTED
         if outside < _SETTLED:
@@ -173,16 +173,12 @@ class PathSpace:
     def _through(self, gait: AnyGait) -> np.ndarray:
         """Full parameters of a path through a gait; it need not keep every constraint."""
         kind = self.control.admissible.gait
-        if self.knots is not None:
-            return kind.parameters(arcs_through(gait, kind, self.knots))
+        if self._fit.knots is not None:
+            return kind.parameters(arcs_through(gait, kind, self._fit.knots))
         return kind.parameters(path_through(self.control, gait, self.mesh.edges)[0])
 
     def phase_mesh(self, gait: ArcPath | Corners) -> Mesh:
         return self._fit.phase_mesh(gait)
-
-    def remeshed(self, gait: ArcPath | Corners, edges: np.ndarray, scheme: str) -> PathSpace:
-        """The class near a member on another mesh; its intervals are arcs, unless those are too many."""
-        return PathSpace(self.control, self.control.admissible.gait.laid_on(gait, edges), edges, scheme, self.given.far)
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, unit tangents ``(n_joint, n_point)`` and the length of path per unit of phase ``(n_point,)``."""
@@ -194,13 +190,15 @@ class PathSpace:
         on_local = self._pulled(self.full_parameters(v)[self._gather], self._given, on_shape, on_pace)
         return self.from_full(v, on_local.reshape(len(on_local), -1) @ self._scatter)
 
-    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+        """The rows of the class, and checks where they might bind. They stay where they are placed: no path was seen to swing,
+        and rows that follow cost as much as all else."""
         p, fit = self.full_parameters(v), self._fit
         gait, limit = fit.member(p), self.control.admissible.joint_limit
-        mesh, excess, self.watched = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
+        mesh, excess, kinds = fit.phase_mesh(gait), -np.inf, dict(self._fixed_rows)
         given = {name: block.parameters.copy() for name, block in zip(self._geometry.blocks, fit.assembly.blocks, strict=True)}
         for check, (cells, times) in zip(fit.checks, near_peaks(gait, mesh, fit.checks, limit), strict=True):
-            self.watched[check.name] = cells
+            kinds[check.name] = cells
             if not cells.size:
                 continue
             times = times + later * mesh.h[cells]
@@ -209,13 +207,16 @@ class PathSpace:
             given[check.name][:-1] = self._geometry.given(tau)
             given[check.name][-1, cells] = held_shares(check, gait, times)
             excess = max(excess, float(check.excess(values, limit).max()))
-        kept = np.concatenate([fit.groups[name].start + rows for name, rows in self.watched.items()])
-        self.row_lower, self.row_upper = fit.constraint_lower[kept], fit.constraint_upper[kept]
-        self._rows = ChosenRows(fit.assembly, kept, list(given.values()))
-        return excess
-
-    def follow_worst(self) -> None:
-        """Nothing: no path was seen to swing, and rows that follow cost as much as all else."""
+        kept = np.concatenate([fit.groups[name].start + rows for name, rows in kinds.items()])
+        rows = ChosenRows(fit.assembly, kept, list(given.values()))
+        return Constraints(
+            kinds,
+            fit.constraint_lower[kept],
+            fit.constraint_upper[kept],
+            excess,
+            lambda v: rows.values(self.full_parameters(v)),
+            lambda v: self.from_full(v, rows.slopes(self.full_parameters(v))),
+        )
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """The mean squared distance that a step of the parameters moves the shapes, and a little for every parameter.
@@ -229,20 +230,14 @@ class PathSpace:
         metric = frame.T @ frame / len(self.shapes.T)
         return np.asarray(metric + _SOFT * metric.diagonal().max() * np.eye(self.n))
 
-    def rows(self, v: np.ndarray) -> np.ndarray:
-        return self._rows.values(self.full_parameters(v))
-
-    def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        return self.from_full(v, self._rows.slopes(self.full_parameters(v)))
-
 
 class _Nearest:
     """The program of the member nearest to a given vector of full parameters."""
 
-    def __init__(self, space: PathSpace, target: np.ndarray) -> None:
+    def __init__(self, space: PathSpace, asked: Constraints, target: np.ndarray) -> None:
         self.space, self._target = space, target
-        self.lower, self.upper, self.row_lower, self.row_upper = space.lower, space.upper, space.row_lower, space.row_upper
-        self.rows, self.row_slopes = space.rows, space.row_slopes
+        self.lower, self.upper, self.row_lower, self.row_upper = space.lower, space.upper, asked.lower, asked.upper
+        self.rows, self.row_slopes = asked.values, asked.slopes
         self._shapes = space.shapes.ravel(order="F")
 
     def objective(self, v: np.ndarray) -> float:

@@ -13,24 +13,19 @@ from colloc.gaits.symmetry import NONE
 from colloc.motion.kinds import kind_of_motion
 from colloc.numerics.mesh import Mesh
 from colloc.reduced.actuator_rows import ActuatorRows
+from colloc.reduced.constraints import Constraints
 from colloc.reduced.given import Given
 from colloc.reduced.motion import ReducedMotion, Shapes
 
 
 class SearchSpace(Shapes, Protocol):
-    """A class of gaits on a mesh: its members by parameters v, and the rows and bounds that keep them in the class."""
+    """A class of gaits on a mesh: its members by parameters v, and what keeps them in the class."""
 
     control: ControlProblem
     mesh: Mesh
     lower: np.ndarray
     upper: np.ndarray
-    row_lower: np.ndarray
-    row_upper: np.ndarray
-    watched: dict[str, np.ndarray]
-    """The rows in order: of each kind, those of the full program's rows of that name that are among them."""
     given: Given
-    knots: np.ndarray | None
-    """Phases where the arcs of a free path meet; None for other gaits."""
     own: np.ndarray
     """``(n,)``: which of the full program's gait parameters are v."""
 
@@ -49,23 +44,12 @@ class SearchSpace(Shapes, Protocol):
     def phase_mesh(self, gait: AnyGait) -> Mesh:
         """The mesh in phases of a member."""
 
-    def remeshed(self, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
-        """The class near a member on another mesh, in the member's phases."""
-
-    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
-        """Place every check at the worst instants of the gait v, or later by a share of its mesh cell; how far the gait exceeds
-        any bound there [rad]."""
-
-    def follow_worst(self) -> None:
-        """Until they are placed again, the rows of checks are those at the worst instants of whatever gait they are
-        asked for, in the cells where they stand. As long as such an instant is not on an edge, their slopes are the same."""
+    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+        """What keeps gaits in the class, with every check at the worst instants of the gait v, or later by a share of its mesh
+        cell."""
 
     def metric(self, v: np.ndarray) -> np.ndarray | None:
         """How far parameters move the shapes, ``(n, n)``: a first guess of second derivatives near an optimum; None for 1."""
-
-    def rows(self, v: np.ndarray) -> np.ndarray: ...
-
-    def row_slopes(self, v: np.ndarray) -> np.ndarray: ...
 
 
 FORCES = ("work", "driven_work")
@@ -85,7 +69,11 @@ class ReducedProgram:
         In the units of the class; may be changed.
     actuators : ActuatorRows, optional
         Where they are limited.
+    constraints : Constraints
+        The space's, as they were placed last: there are no rows before.
     """
+
+    constraints: Constraints
 
     def __init__(self, space: SearchSpace, delta: float) -> None:
         self.space, self.delta = space, delta
@@ -113,12 +101,12 @@ class ReducedProgram:
     @property
     def row_lower(self) -> np.ndarray:
         """Lower bounds of the rows; they change as the checks move."""
-        return np.concatenate([self._own_lower, self._of_actuators[0], self.space.row_lower])
+        return np.concatenate([self._own_lower, self._of_actuators[0], self.constraints.lower])
 
     @property
     def row_upper(self) -> np.ndarray:
         """Upper bounds of the rows."""
-        return np.concatenate([self._own_upper, self._of_actuators[1], self.space.row_upper])
+        return np.concatenate([self._own_upper, self._of_actuators[1], self.constraints.upper])
 
     @property
     def _of_actuators(self) -> tuple[np.ndarray, np.ndarray]:
@@ -130,11 +118,17 @@ class ReducedProgram:
         own = [("period", k) for k in range(self._own_lower.size)]
         if self.actuators is not None:
             own += [(f"actuators, share {share}", int(point)) for share, point in self.actuators.placed.T]
-        return own + [(kind, int(cell)) for kind, cells in self.space.watched.items() for cell in cells]
+        return own + [(kind, int(cell)) for kind, cells in self.constraints.kinds.items() for cell in cells]
 
     def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
-        """As `SearchSpace.move_checks`; rows of actuators stay where they are."""
-        return self.space.move_checks(v, later)
+        """Place the space's constraints for v, or later by a share of a mesh cell; how far it exceeds any bound there. Rows of
+        actuators stay where they are."""
+        self.constraints = self.space.constraints(v, later)
+        return self.constraints.excess
+
+    def follow_worst(self) -> None:
+        """Until they are placed again, checks move with the worst instants of whatever gait they are asked for."""
+        self.constraints = self.constraints.following()
 
     def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray:
         """What limits on actuators add to the second derivatives ``(n, n)`` of multipliers times rows, as their largest values
@@ -177,10 +171,10 @@ class ReducedProgram:
         values = self.motion.values(v, self.delta) if self._own_lower.size else {}
         own = [values[name] for name in self._held]
         done = np.empty(0) if self.actuators is None else self.actuators.values(v, self.delta)
-        return np.concatenate([own, [aim(values) for aim in self._reached], done, self.space.rows(v)])
+        return np.concatenate([own, [aim(values) for aim in self._reached], done, self.constraints.values(v)])
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
         """Derivatives of the rows, ``(n_row, n)``."""
         own = [self._slopes(v)[name] for name in self._held]
         done = np.empty((0, v.size)) if self.actuators is None else self.actuators.slopes(v, self.delta)
-        return np.vstack([*own, *(self._slope(aim, v) for aim in self._reached), *done, self.space.row_slopes(v)])
+        return np.vstack([*own, *(self._slope(aim, v) for aim in self._reached), *done, self.constraints.slopes(v)])

@@ -70,10 +70,11 @@ class Lagrangian:
     Attributes
     ----------
     conditions : colloc.numerics.sqp.Stationarity
-        At v, where the checks have to be placed.
+        At v, where the checks are placed.
     """
 
     def __init__(self, program: CheckedProgram, v: np.ndarray) -> None:
+        program.move_checks(v)
         self._program, self._v, self.conditions = program, v, stationarity(program, v)
         rows, slopes, on_rows = program.rows(v), program.row_slopes(v), self.conditions.on_rows
         self._held = [(name, on_rows[k], rows[k], slopes[k]) for k, name in enumerate(program.row_names) if on_rows[k]]

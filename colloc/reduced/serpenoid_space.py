@@ -6,6 +6,7 @@ import numpy as np
 
 from colloc.gaits.control_problem import ControlProblem
 from colloc.mechanics.bodies import Pairs
+from colloc.reduced.constraints import Constraints
 from colloc.reduced.linear_space import LinearSpace
 
 
@@ -31,8 +32,5 @@ class SerpenoidSpace(LinearSpace):
     def pulled_back(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:
         return super().pulled_back(self.full_parameters(v), on_shape, on_pace) @ self._slopes(v)
 
-    def rows(self, v: np.ndarray) -> np.ndarray:
-        return super().rows(self.full_parameters(v))
-
-    def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        return super().row_slopes(self.full_parameters(v)) @ self._slopes(v)
+    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+        return super().constraints(v, later).through(self.full_parameters, self._slopes)

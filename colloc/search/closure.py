@@ -64,4 +64,5 @@ def closed_gait(problem: Problem, gait: AnyGait, delta: float | None = None) -> 
     own = problem.gait.seeds
     space, v = space_near(problem.with_(gait=own, guess=gait, intervals=_INTERVALS + 4 * own.harmonics, **_ELSE_FREE), gait)
     program, area = ReducedProgram(space, delta), own.enclosed_area(problem.body.n_joint)
+    program.place_rows(np.zeros_like(v))  # near no limit of the angles: those are kept by the search that begins here
     return space.member(minimised(_Nearest(program, v, area), v, np.inf, _ACCURACY, _STEPS).v)

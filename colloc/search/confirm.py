@@ -184,7 +184,7 @@ def answer_of(program: GaitProgram, result: NlpResult, delta: float) -> Answer:
 def unconfirmed(optimum: Optimum) -> Answer:
     """The gait as the search found it, every other variable following from its balance: where there is no time for more."""
     space, control = optimum.space, optimum.space.control
-    mesh, layout = space.phase_mesh(optimum.gait), layout_of(control, space.mesh, space.knots)
+    mesh, layout = space.phase_mesh(optimum.gait), layout_of(control, space.mesh, optimum.gait.knots)
     x = balanced_variables(control.dynamics, layout, mesh, optimum.gait, space.full_parameters(optimum.v), optimum.delta)
     return Answer(
         optimum.problem,
@@ -192,7 +192,7 @@ def unconfirmed(optimum: Optimum) -> Answer:
         optimum.delta,
         edges=mesh.edges,
         scheme=space.mesh.scheme.name,
-        knots=space.knots,
+        knots=optimum.gait.knots,
         x=x,
         lam_x=np.zeros_like(x),
         lam_g=np.empty(0),
@@ -238,7 +238,7 @@ def _multipliers(reduced: ReducedProgram, conditions: Stationarity, program: Gai
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.layout.n), np.zeros(program.constraint_lower.size)
     space, reached = reduced.space, len(reduced.space.control.aims.at_least)
-    of_period, on_rows = np.split(conditions.on_rows, [conditions.on_rows.size - space.row_lower.size])
+    of_period, on_rows = np.split(conditions.on_rows, [conditions.on_rows.size - reduced.constraints.lower.size])
     if reduced.actuators is not None:
         limited = reduced.actuators
         of_period, on_actuators = np.split(of_period, [of_period.size - limited.placed.shape[1]])
@@ -246,7 +246,7 @@ def _multipliers(reduced: ReducedProgram, conditions: Stationarity, program: Gai
     if reached:
         lam_g[program.groups["at least"]] = of_period[-reached:]
     at = 0
-    for name, rows in space.watched.items():
+    for name, rows in reduced.constraints.kinds.items():
         lam_g[program.groups[name].start + rows] = on_rows[at : at + rows.size]
         at += rows.size
     lam_x[program.layout.parameters[space.own, 0]] = conditions.on_bounds

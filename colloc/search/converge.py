@@ -58,6 +58,9 @@ class Placed(NonlinearProgram, Protocol):
     def place_rows(self, v: np.ndarray) -> float:
         """Place them for v; how far it exceeds any bound there."""
 
+    def follow_worst(self) -> None:
+        """Until then, they move with the worst instants."""
+
 
 class Rested(NamedTuple):
     """Where a program came to rest: parameters, objective, first-order conditions, counts, and what is known of curvature."""
@@ -86,7 +89,7 @@ def at_rest(
         fresh = curvature is None
         if len(ends) > 1:
             # with the instants held, every round overshoots where they move far with the gait
-            program.space.follow_worst()
+            program.follow_worst()
         if fresh and effort.accuracy < SKETCH.accuracy:
             curvature = program.space.metric(v)
         result = minimised(program, v, radius, effort.accuracy, ITERATIONS, curvature)

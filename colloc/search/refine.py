@@ -16,7 +16,7 @@ from colloc.search.converge import NEXT_RADIUS, converged
 from colloc.search.effort import FINE, ROUGH
 from colloc.search.optimum import Optimum, replace_keeping_space
 from colloc.search.run import this_run
-from colloc.search.spaces import space_of
+from colloc.search.spaces import remeshed, space_of
 from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, MeshPlan, planned_mesh
 
@@ -88,7 +88,7 @@ def refine(optimum: Optimum) -> Optimum:
             (space, v), effort = finer, ROUGH
         if plan is not None:
             meshes.count, meshes.kept = meshes.count + 1, np.concatenate([meshes.kept, plan.kept])
-            space = space.remeshed(optimum.gait, plan.edges, plan.scheme)
+            space = remeshed(space, optimum.gait, plan.edges, plan.scheme)
             effort = FINE if meshes.count > _SAME_AIM else ROUGH
             try:
                 v = space.parameters(optimum.gait)

@@ -72,9 +72,9 @@ def prices(found: Optimum) -> tuple[np.ndarray, np.ndarray]:
     )
     wide = MixtureSpace(space.control, space.pieces, space.given.far, directions=more.durations.shape[1])
     w = wide.parameters(more)
-    wide.move_checks(w)
     on_rows = stationarity(found.program(), found.v).on_rows
     program = ReducedProgram(wide, found.delta)
+    program.place_rows(w)
     slopes = program.gradient(w) + on_rows @ program.row_slopes(w)
     return slopes[wide.time].reshape(more.durations.shape)[:, space.n_direction :], tried
 

@@ -30,7 +30,7 @@ from colloc.search.choose import solution_of
 from colloc.search.converge import NEXT_RADIUS, converged
 from colloc.search.effort import FINE, ROUGH
 from colloc.search.solve import finished
-from colloc.search.spaces import space_about, space_near, space_of, with_far
+from colloc.search.spaces import remeshed, space_about, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import Replay
 from colloc.verification.replayer import replayer
@@ -318,7 +318,7 @@ def _on_its_mesh(answer: Answer) -> _Lagrangian:
 def _on_halved_mesh(answer: Answer, own: _Lagrangian) -> _Lagrangian:
     """With every interval halved, and the gait optimal there: multipliers go with their mesh."""
     edges = np.sort(np.concatenate([answer.edges, 0.5 * (answer.edges[1:] + answer.edges[:-1])]))
-    space = own.space.remeshed(answer.gait, edges, answer.scheme)
+    space = remeshed(own.space, answer.gait, edges, answer.scheme)
     found = converged(space, space.parameters(answer.gait), answer.delta, _NEAR, FINE)
     return _lagrangian(found.space, found.v, answer.delta)
 

@@ -124,6 +124,12 @@ def with_far(space: SearchSpace, far: Pairs) -> SearchSpace:
     return space_of(space.control.problem, *space.given._replace(far=far))
 
 
+def remeshed(space: SearchSpace, gait: AnyGait, edges: np.ndarray, scheme: str) -> SearchSpace:
+    """The same class near a member on another mesh, in the member's phases."""
+    near = space.control.admissible.gait.laid_on(gait, edges)
+    return space_of(space.control.problem, near, edges, scheme, space.given.far)
+
+
 def space_about(problem: Problem, gait: AnyGait) -> tuple[SearchSpace, np.ndarray]:
     """The class of a problem on its first mesh, and parameters about a gait that need not keep every row: ten times as fast for
     free paths."""

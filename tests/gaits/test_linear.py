@@ -92,6 +92,7 @@ def test_reduced_gradients_are_those_of_differences(gait_class):
     )
     space, v = space_near(problem, problem.guess)
     program, h = ReducedProgram(space, 1e-2), 1e-6
+    program.place_rows(v)
     along = np.random.default_rng(3).normal(size=v.size)
     numeric = (program.objective(v + h * along) - program.objective(v - h * along)) / (2 * h)
     assert program.gradient(v) @ along == pytest.approx(numeric, rel=1e-5, abs=1e-8)

@@ -25,7 +25,6 @@ def begun(symmetry, links=3, directions=3, pieces=5, far=()):
     space = MixtureSpace(control_problem(problem), pieces, far)
     v = space.parameters(problem.guess) + 0.1 * np.random.default_rng(1).standard_normal(space.n)
     v[space.time] = np.abs(v[space.time])
-    space.move_checks(v)
     return space, v
 
 
@@ -36,7 +35,8 @@ def test_slopes_of_what_a_period_comes_to_and_of_rows_are_those_of_differences(s
     program, h = ReducedProgram(space, DELTA), 1e-6
     kind = SlowOnLevel(*space.control.dynamics[:2], symmetry)
     program.motion = ReducedMotion(kind, space.mesh, space, ["length"])
-    slopes, rows = program.motion.gradients(v, DELTA), space.row_slopes(v)
+    asked = space.constraints(v)
+    slopes, rows = program.motion.gradients(v, DELTA), asked.slopes(v)
     for k in np.random.default_rng(2).choice(space.n, 8, replace=False):
         step = np.zeros(space.n)
         step[k] = h
@@ -44,7 +44,7 @@ def test_slopes_of_what_a_period_comes_to_and_of_rows_are_those_of_differences(s
         assert list(slopes) == list(up) == ["distance", "work", "rotation", "length"]
         for name, slope in slopes.items():
             assert np.allclose(slope[k], (up[name] - down[name]) / (2 * h), atol=1e-7), name
-        assert np.allclose(rows[:, k], (space.rows(v + step) - space.rows(v - step)) / (2 * h), atol=2e-8)
+        assert np.allclose(rows[:, k], (asked.values(v + step) - asked.values(v - step)) / (2 * h), atol=2e-8)
 
 
 @pytest.mark.parametrize("symmetry", ["bilateral", "both"])
@@ -73,6 +73,6 @@ def test_a_mixture_of_one_direction_is_a_polygon(symmetry):
 def test_a_gait_beyond_its_limits_is_seen_between_the_pieces_too():
     space, v = begun("bilateral")
     v[:2] = 1.9, -1.9
-    excess = space.move_checks(v)
+    excess = space.constraints(v).excess
     angles = space.member(v).angles(np.linspace(0, 1, 4001))
     assert excess == pytest.approx(np.abs(angles).max() - 2.0, abs=1e-3)

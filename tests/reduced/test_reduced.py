@@ -13,7 +13,7 @@ from colloc.results.solution import Solution
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is, converged
 from colloc.search.effort import FINE
-from colloc.search.spaces import space_near, transcribed
+from colloc.search.spaces import remeshed, space_near, transcribed
 from tests.shared.stages import answer_near
 
 FOUR = {"body": Chain((0.25,) * 4), "guess": Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])}
@@ -46,13 +46,16 @@ def near_start(case, shake=1e-2):
         edges = space.mesh.edges
         space, v = space_near(problem, space.member(v), np.sort([*edges, *(0.5 * (edges[1:] + edges[:-1]))]))
     v = v + shake * np.random.default_rng(0).normal(size=v.size)
-    space.move_checks(v)
-    return space, v, ReducedProgram(space, DELTA)
+    program = ReducedProgram(space, DELTA)
+    program.place_rows(v)
+    return space, v, program
 
 
 def test_least_values_and_the_rotation_are_asked_for_as_they_are_stated():
     stated = Problem("p", ellipse(0.1, 1.6, 1.1), gait=Harmonic(1), rotation=0.3, at_least={"distance": 0.21, "-work": -0.4})
-    program = ReducedProgram(space_near(stated, stated.guess)[0], DELTA)
+    space, v = space_near(stated, stated.guess)
+    program = ReducedProgram(space, DELTA)
+    program.place_rows(v)
     np.testing.assert_array_equal(program.row_lower[:3], [0.3, 0.21, -0.4])
     np.testing.assert_array_equal(program.row_upper[:3], [0.3, np.inf, np.inf])
 
@@ -129,7 +132,7 @@ def test_the_answer_is_on_the_mesh_of_the_search_though_sides_have_grown_since()
     space, v = space_near(problem, problem.guess)
     ends = space.member(v).phases
     graded = np.concatenate([a + (b - a) * np.linspace(0, 1, 9)[:-1] ** 2 for a, b in pairwise(ends)] + [ends[-1:]])
-    space = space.remeshed(space.member(v), graded, "gauss-3")
+    space = remeshed(space, space.member(v), graded, "gauss-3")
     found = converged(space, space.parameters(space.member(v)), 3e-2, 0.5, FINE)
     answer = confirm(found)
     assert answer.message == ""

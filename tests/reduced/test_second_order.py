@@ -17,7 +17,6 @@ SADDLE = ellipse(0.0, 0.30734, 0.76781)
 def program_at(problem, gait):
     """The reduced program, with its checks placed, and the parameters of a gait."""
     space, v = space_near(problem, gait)
-    space.move_checks(v)
     return ReducedProgram(space, problem.delta), v
 
 
@@ -168,7 +167,6 @@ def test_the_gait_between_two_ways_of_bending_is_a_saddle():
 def test_an_optimum_is_better_than_its_neighbours():
     answer = answer_near(PROBLEM.with_(friction=Friction(10, 1, 1), intervals=20))
     space, v = space_near(answer.problem, answer.gait, answer.edges, answer.scheme)
-    space.move_checks(v)
     program = ReducedProgram(space, answer.delta)
     found = curvature(program, v)
     assert found.n_free == v.size

@@ -7,7 +7,7 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem
 from colloc.gaits.starts import latin_hypercube_gait
-from colloc.reduced.linear_space import LinearSpace
+from colloc.reduced.constraints import Constraints
 from colloc.reduced.program import ReducedProgram
 from colloc.search.converge import at_rest
 from colloc.search.effort import FINE
@@ -23,28 +23,20 @@ def placed(request):
     gait = latin_hypercube_gait(free, 0, 2)
     limit = float(np.abs(gait.angles(np.linspace(0, 1, 1000))).max())
     space, v = space_near(free.with_(joint_limit=limit + 1e-4, guess=gait), gait)
-    space.move_checks(v)
     return space, v, v + 0.01 * np.random.default_rng(1).standard_normal(v.size)
 
 
-def worst(space, v):
-    """Rows as they are when the checks are placed anew, by name."""
-    space.move_checks(v)
-    return names(space), space.rows(v)
-
-
-def names(space):
-    return [(kind, int(cell)) for kind, cells in space.watched.items() for cell in cells]
+def names(constraints):
+    return [(kind, int(cell)) for kind, cells in constraints.kinds.items() for cell in cells]
 
 
 def test_rows_near_their_bounds_are_those_of_the_worst_instants_of_any_gait(placed):
     """Held rows are off by what is of second order in the step; rows that are far from their bounds are not followed."""
-    space, _, near = placed
-    here, held = names(space), space.rows(near)
-    space.follow_worst()
-    moving = dict(zip(here, space.rows(near), strict=True))
-    anew = dict(zip(*worst(space, near), strict=True))
-    before = {name: abs(value - anew[name]) for name, value in zip(here, held, strict=True) if name in anew}
+    space, v, near = placed
+    held, there = space.constraints(v), space.constraints(near)
+    moving = dict(zip(names(held), held.following().values(near), strict=True))
+    anew = dict(zip(names(there), there.values(near), strict=True))
+    before = {name: abs(value - anew[name]) for name, value in zip(names(held), held.values(near), strict=True) if name in anew}
     after = {name: abs(moving[name] - anew[name]) for name in before}
     assert all(after[name] <= before[name] + 1e-12 for name in after)
     followed = [name for name in after if after[name] != before[name]]
@@ -53,28 +45,19 @@ def test_rows_near_their_bounds_are_those_of_the_worst_instants_of_any_gait(plac
 
 
 def test_their_slopes_are_those_of_the_rows_that_move(placed):
-    space, _, near = placed
-    space.follow_worst()
-    slopes, step = space.row_slopes(near), 1e-6
-    for direction in np.random.default_rng(2).standard_normal((3, near.size)):
-        along = (space.rows(near + step * direction) - space.rows(near - step * direction)) / (2 * step)
-        np.testing.assert_allclose(slopes @ direction, along, atol=2e-6 * np.abs(slopes).max() + 2e-6)
-
-
-def test_placing_the_checks_anew_ends_it(placed):
     space, v, near = placed
-    held = space.rows(near)
-    space.follow_worst()
-    space.rows(near)
-    space.move_checks(v)
-    np.testing.assert_array_equal(space.rows(near), held)
+    moving = space.constraints(v).following()
+    slopes, step = moving.slopes(near), 1e-6
+    for direction in np.random.default_rng(2).standard_normal((3, near.size)):
+        along = (moving.values(near + step * direction) - moving.values(near - step * direction)) / (2 * step)
+        np.testing.assert_allclose(slopes @ direction, along, atol=2e-6 * np.abs(slopes).max() + 2e-6)
 
 
 @pytest.mark.parametrize("follows", [True, False])
 def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, monkeypatch):
     """With the instants held it swings: every round is optimal for the instants of the one before."""
     if not follows:
-        monkeypatch.setattr(LinearSpace, "follow_worst", lambda space: None)
+        monkeypatch.setattr(Constraints, "following", lambda held: held)
     body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(0.4, 1, 1)
     problem = Problem("touch", body=body, friction=friction, gait=Harmonic(4), joint_limit=2.5, intervals=20)
     space, v = space_near(problem, latin_hypercube_gait(problem, 0, 0))

@@ -73,6 +73,7 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
     problem = stated(case)
     space, v = space_near(problem, problem.guess)
     reduced, delta = ReducedProgram(space, DELTA), DELTA
+    reduced.place_rows(v)
     full = transcribed(problem, space.member(v), space.mesh.edges)
     x = feasible_point(full, space.full_parameters(v), delta)
     found = oracles(full.assembly)
@@ -84,7 +85,6 @@ def test_the_full_program_has_the_same_value_and_exact_derivatives(case):
         own = reduced.rows(v)[first : first + len(problem.at_least)]
         np.testing.assert_allclose(g[full.groups["at least"]], own, atol=1e-11)
     if problem.actuator_limits.names:
-        reduced.place_rows(v)
         share, point = reduced.actuators.placed
         shares = g[full.groups["actuators"]].reshape(-1, len(problem.actuator_limits.names))
         assert share.size > 10
