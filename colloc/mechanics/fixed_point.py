@@ -9,7 +9,7 @@ The steps are stated here in NumPy, for batches; the kernel (`colloc.mechanics.n
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
@@ -197,27 +197,28 @@ def _balanced(
     found = solved(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 
-    def again(begun: Callable[[Moving], np.ndarray | None], how: str = "direct") -> None:
-        """Try anew where nothing was found yet."""
-        failed = np.flatnonzero(~(found[1] <= enough))
-        if failed.size:
-            there = moving.at(failed)
-            new = solved(there, begun(there), tolerance, max_iterations, how)
-            better = new[1] < found[1][failed]
-            for old, some in zip(found, new, strict=True):
-                old[..., failed[better]] = some[..., better]
-
     def smoother(there: Moving) -> np.ndarray:
         return _balanced(solved, there._replace(delta=_SMOOTHER * there.delta), None, tolerance, max_iterations, "direct")[0]
 
-    # unequal coefficients: the balance may have folds, beside which steps end; one of the links, or feet, rests nearly
-    for rest in (*contact.rests, *contact.further_rests):
-        again(partial(Moving.at_rest, rest=rest))
-    if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
-        # several rest nearly, each where the others let it
-        again(smoother)
-    if method != "direct":
-        again(lambda there: None, method)
+    def ways() -> Iterator[tuple[Callable[[Moving], np.ndarray | None], str]]:
+        # unequal coefficients: the balance may have folds, beside which steps end; one of the links, or feet, rests nearly
+        for rest in (*contact.rests, *contact.further_rests):
+            yield partial(Moving.at_rest, rest=rest), "direct"
+        if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
+            # several rest nearly, each where the others let it
+            yield smoother, "direct"
+        if method != "direct":
+            yield lambda there: None, method
+
+    for begun, how in ways():
+        failed = np.flatnonzero(~(found[1] <= enough))
+        if not failed.size:
+            break
+        there = moving.at(failed)
+        new = solved(there, begun(there), tolerance, max_iterations, how)
+        better = new[1] < found[1][failed]
+        for old, some in zip(found, new, strict=True):
+            old[..., failed[better]] = some[..., better]
     return found
 
 
