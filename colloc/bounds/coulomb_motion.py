@@ -22,8 +22,8 @@ from colloc.mechanics.solution_branches import all_balanced_velocities
 
 DELTA = 1e-9
 """Regularisation speed at unit shape speed: small enough for Coulomb friction to 1e-8, large enough for the solver."""
-
-
+MOST_LINKS = 5
+"""Samples fill all of shape space, which has a dimension a joint."""
 _MAX_ITERATIONS = 300
 """Steps of an attempt: the few motions that need more are left out, as the samples are many."""
 _CLOSED = 1e-9

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
 
 from colloc.bounds.coulomb_motion import (
     CoulombMotion,
@@ -25,6 +24,7 @@ from colloc.bounds.coulomb_motion import (
 )
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from colloc.numerics.linear_program import linear_maximum
 from colloc.system.errors import NotConvergedError
 
 _EDGE = 1e-9
@@ -67,10 +67,7 @@ def best_mixture(motion: CoulombMotion, heading: float) -> tuple[float, np.ndarr
     closed = np.vstack([motion.rates, motion.spin, motion.power])
     right = np.zeros(len(closed))
     right[-1] = 1.0
-    program = linprog(-along, A_eq=closed, b_eq=right, bounds=(0, None), method="highs-ds")
-    if program.status != 0:
-        raise NotConvergedError(f"the linear program of the small gait failed: {program.message}")
-    return -program.fun, program.x, -program.eqlin.marginals
+    return linear_maximum(along, closed, right)
 
 
 def heading_of(motion: CoulombMotion, weights: np.ndarray) -> float:

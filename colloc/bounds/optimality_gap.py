@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from colloc.bounds.sampled import MOST_LINKS, Bound, efficiency_bound, known_bound
+from colloc.bounds.coulomb_motion import MOST_LINKS
 from colloc.gaits.limits import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
@@ -14,6 +14,9 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import rate_independent
 from colloc.system.errors import ChangedFileWarning, ProblemError, StoreError
+
+if TYPE_CHECKING:
+    from colloc.bounds.sampled import Bound
 
 CACHE = "bounds.sqlite"
 """Where bounds are kept, beside the results."""
@@ -47,6 +50,10 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
         return None
     domain: tuple[Any, Any, float] = (problem.body, problem.friction, widest(problem.joint_limit))
     cache = folder / CACHE
+    if not compute and not cache.exists():
+        return None
+    from colloc.bounds.sampled import efficiency_bound, known_bound
+
     try:
         return efficiency_bound(*domain, cache=cache) if compute else known_bound(*domain, cache=cache)
     except StoreError as error:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.bounds.coulomb_motion import swaps_ends
+from colloc.bounds.coulomb_motion import MOST_LINKS, swaps_ends
 from colloc.bounds.cutting_plane import exchanged_optimum
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampling import Domain
@@ -75,8 +75,6 @@ THOROUGH = Budget(intervals=18, shapes=28, rounds=80, starts=400, tolerance=3e-4
 FOUR_LINKS = Budget(5, None, 6, 40, 80, starts=400, tolerance=1e-3, first=5, smoothing=1e-4, together=2)
 """Functions of two joint angles at a time: 81 unknowns do better than 108 that are products of three."""
 FIVE_LINKS = replace(FOUR_LINKS, intervals=3, first=3, tolerance=3e-3)
-MOST_LINKS = 5
-"""Samples fill all of shape space, which has a dimension a joint."""
 
 
 def usual_budget(body: Chain) -> Budget:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline as Piecewise
 
 from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.linear import LinearClass
@@ -74,6 +73,8 @@ class BSpline(LinearClass):
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """``(knots, n_time)``: the B-splines at phases t, or their derivatives per period."""
+        from scipy.interpolate import BSpline as Piecewise
+
         one = Piecewise.basis_element(np.arange(self.degree + 2), extrapolate=False)
         since = (self.knots * t - np.arange(self.knots)[:, None] + 0.5 * (self.degree + 1)) % self.knots
         return self.knots**derivative * np.nan_to_num(one(since, nu=derivative), nan=0.0)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from colloc.gaits.harmonic import Harmonic, harmonics_within
 from colloc.gaits.linear import LinearClass
@@ -128,6 +127,8 @@ class Basis(LinearClass):
 @lru_cache(maxsize=32)
 def _splines(kind: Basis) -> tuple[Any, float, int]:
     """A spline through the columns, the relative error of it, and how many harmonics they have."""
+    from scipy.interpolate import make_interp_spline
+
     values = np.array(kind.columns)
     values = values.reshape(-1, values.shape[-1]).T
     n, largest = len(values), np.abs(values).max()

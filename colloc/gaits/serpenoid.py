@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from colloc.gaits.harmonic import Fourier, Harmonic, shifted
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
@@ -162,6 +161,7 @@ class Serpenoid(Harmonic):
 
     def _nearest_lag(self, gait: Fourier) -> float:
         """The lag at which the joints agree best on what wave they are part of."""
+        from scipy.optimize import minimize_scalar
 
         def agreed(lag: float) -> float:
             wave = _at_the_middle(gait, lag)

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import OdeSolution, solve_ivp
 
 from colloc.system.errors import NotConvergedError
+
+if TYPE_CHECKING:
+    from scipy.integrate import OdeSolution
 
 STEP = 1 / 100
 """Error of a step, over that of a run. Stick and slip make kinks, and methods of long steps now and then skip one unnoticed
@@ -70,6 +72,8 @@ def followed(
     >>> bool(abs(ran.states[0, -1] - np.cos(1)) < 1e-8)
     True
     """
+    from scipy.integrate import solve_ivp
+
     near: Any = None
     first = last = 0.0
 

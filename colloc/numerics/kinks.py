@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import nnls
 
+from colloc.numerics.nonnegative import nonnegative
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, binding
 
 _LOWER = 0.1
@@ -114,7 +114,7 @@ class _Hull:
         m, k = len(self._gradients), self._columns.shape[1]
         # the weight of the last row does not matter: shares and multipliers are divided by the sum of the shares
         matrix = np.vstack([np.hstack([self._gradients.T, self._columns]), np.repeat([self._size, 0.0], [m, k])])
-        parts, _ = nnls(matrix, np.append(np.zeros(len(matrix) - 1), self._size), maxiter=30 * (m + k))
+        parts = nonnegative(matrix, np.append(np.zeros(len(matrix) - 1), self._size))
         self._shares = parts[:m] / parts[:m].sum()
         self.multipliers = parts[m:] / parts[:m].sum()
         self.nearest = self._gradients.T @ self._shares + self._columns @ self.multipliers

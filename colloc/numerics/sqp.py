@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
-from scipy.optimize import nnls
 
+from colloc.numerics.nonnegative import nonnegative
 from colloc.numerics.quadratic_step import quadratic_step
 from colloc.system.interruption import interrupted, interruptible
 
@@ -85,7 +85,7 @@ def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
     high, low, columns = binding(program, v)
     multipliers, on = np.zeros(values.size), np.zeros(0)
     if columns.size and np.isfinite(columns).all() and np.isfinite(gradient).all():
-        on, _ = nnls(columns, -gradient, maxiter=30 * columns.shape[1])
+        on = nonnegative(columns, -gradient)
         np.add.at(multipliers, high, on[: high.size])
         np.add.at(multipliers, low, -on[high.size :])
     slack = np.where(multipliers > 0, upper - values, values - lower)

@@ -89,7 +89,8 @@ def draw_body(axes: Axes, ends: np.ndarray, colour: str | np.ndarray, body: Body
 def draw_feet(axes: Axes, places: np.ndarray, held: np.ndarray) -> None:
     """Feet at places ``(2, 2, n_foot)``, squares, pads a line between two; those that hold filled."""
     for chosen, colour in ((~held, "white"), (held, VERMILION)):
-        axes.plot(*places[..., chosen], "s-", color=VERMILION, mfc=colour, ms=3.5, lw=2)
+        if chosen.any():
+            axes.plot(*places[..., chosen], "s-", color=VERMILION, mfc=colour, ms=3.5, lw=2)
 
 
 def draw_lab(axes: Axes, solution: Solution) -> None:

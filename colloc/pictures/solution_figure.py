@@ -22,8 +22,7 @@ def solution_figure(solution: Solution) -> Figure:
     """Filmstrip and lab paths of a solution; shape space, speeds and power, or of a relaxed gait the mixture it comes near."""
     panels = _of_motion(solution) if solution.relaxed is None else _of_mixture(solution)
     with styled():
-        figure = Picture(figsize=(11, 8.2))
-        figure.set_layout_engine("none")  # the places are known
+        figure = Picture(figsize=(11, 8.2), layout="none")  # type: ignore[arg-type]  # the places are known: drawn once
         colour = INK if solution.status == SOLVED else VERMILION
         figure.text(0.015, 0.985, _headline(solution), fontsize=11, va="top", color=colour)
         draw_filmstrip(figure.add_axes((0.015, 0.76, 0.97, 0.135)), solution)

@@ -19,7 +19,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from colloc.gaits.limits import of_each_angle
 from colloc.gaits.problem import Problem
@@ -146,6 +145,8 @@ def _descended(problem: Problem, start: np.ndarray, value: float) -> float:
 
     def room(x: np.ndarray) -> np.ndarray:
         return x[-1] - _shares(problem, limits, *_instants(problem, x[:-1, None]))[:, 0] / value
+
+    from scipy.optimize import minimize
 
     def room_slopes(x: np.ndarray) -> np.ndarray:
         angles, rates = _instants(problem, x[:-1, None])

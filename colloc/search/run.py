@@ -162,14 +162,17 @@ class Run:
 
     @contextmanager
     def under_way(self, seconds: float) -> Iterator[None]:
-        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds."""
+        """A block whose stages keep what they find here. It ends in KeyboardInterrupt at Ctrl-C, and after so many seconds, and
+        then all of it is written: where there is an end, nothing can be lost."""
         token = _CURRENT.set(self)
         try:
             with interruptible(polled=False), time_limit(seconds):
                 yield
+        except BaseException:
+            self.write()
+            raise
         finally:
             _CURRENT.reset(token)
-            self.write()
 
 
 _CURRENT: ContextVar[Run] = ContextVar("run")

@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
@@ -77,6 +76,8 @@ def heading_map(
     >>> [(round(float(ran.headings[0]), 2), ran.stable) for ran in found.lasting]
     [(-3.13, True), (-0.01, False)]
     """
+    from scipy.optimize import brentq
+
     on = gait_on_slope(body, friction, gait, delta, grade, breaks)
     check_finite(positive=True, tolerance=tolerance, count=count)
     course = on.course(tolerance)

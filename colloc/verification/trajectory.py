@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import Path
@@ -131,6 +130,8 @@ def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: s
 
 def _level(slowest: np.ndarray, period: float) -> float:
     """The even pace that lower bounds are raised to so that the mean of the larger of both is `period`."""
+
+    from scipy.optimize import brentq
 
     def excess(level: float) -> float:
         return float(np.maximum(level, slowest).mean()) - period

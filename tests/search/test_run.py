@@ -223,8 +223,14 @@ def series():
     return colloc.Fourier([0.2, 0.0, -0.1], [[1.0], [0.2], [-0.8]], [[0.3], [1.1], [0.5]])
 
 
+@pytest.fixture
+def at_once(monkeypatch):
+    """What is found is written as it appears."""
+    monkeypatch.setattr("colloc.search.run.EVERY", 0.0)
+
+
 @pytest.mark.parametrize("problem", list(problems()), ids=lambda problem: problem.name)
-def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tmp_path):
+def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tmp_path, at_once):
     path = tmp_path / "x.run.sqlite"
     first = Run(path, problem)
     with first.under_way(np.inf):
@@ -240,7 +246,7 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
     np.testing.assert_array_equal(again.program().rows(again.v), found.program().rows(found.v))
 
 
-def test_a_relaxed_gait_is_kept_too(tmp_path):
+def test_a_relaxed_gait_is_kept_too(tmp_path, at_once):
     problem = Problem("mixed", gait=Relaxed(3, "both"), delta=1e-2, joint_limit=2.5, intervals=8)
     first = solve(problem, 1, keep=tmp_path / "x.run.sqlite")
     again = solve(problem, 1, keep=tmp_path / "x.run.sqlite")
@@ -264,12 +270,11 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     assert not run.exists()
 
 
-def test_a_run_that_cannot_be_written_is_told_once_and_the_solve_goes_on(tmp_path, monkeypatch):
+def test_a_run_that_cannot_be_written_is_told_once_and_the_solve_goes_on(tmp_path, monkeypatch, at_once):
     def full(*_):
         raise StoreError("cannot write: no space left on device.")
 
     monkeypatch.setattr("colloc.search.run.put_rows", full)
-    monkeypatch.setattr("colloc.search.run.EVERY", 0.0)
     with pytest.warns(ReadOnlyRunWarning, match="no space left") as told:
         solution = solve(QUICK, 2, keep=tmp_path / "x.run.sqlite")
     assert solution.certificate.replayed
@@ -313,7 +318,7 @@ def test_a_problem_file_says_how_many_starts(undisturbed):
     assert read_problem_file(undisturbed[0]).starts is None
 
 
-def test_friction_of_any_size_is_kept_in_the_units_of_the_problem(tmp_path):
+def test_friction_of_any_size_is_kept_in_the_units_of_the_problem(tmp_path, at_once):
     light = QUICK.with_(friction=Friction(1e-3, 1e-3, 1e-3))
     solution = solve(light, 1, keep=tmp_path / "x.run.sqlite")
     assert solution.value == solve(light, 1, keep=tmp_path / "x.run.sqlite").value
