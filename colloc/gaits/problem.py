@@ -326,12 +326,16 @@ class Problem:
                 "a froude."
             )
 
-    def __repr__(self) -> str:
+    @property
+    def asked(self) -> str:
+        """What is asked, in a line: the objective if it is not the efficiency, joints, friction, scene and class of gaits."""
         coordinates = f"{self.body.n_joint} {self.body.coordinate}{'s' * (self.body.n_joint > 1)}"
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         grade = f", grade {self.grade:g}" if self.grade else f", Froude number {self.froude:g}" if self.froude else ""
-        scene = f"{coordinates}, {self.law.label}{grade}, {self.gait.describe()}"
-        return f"<Problem {self.name}: {best}{scene}, delta {self.delta:.0e}>"
+        return f"{best}{coordinates}, {self.law.label}{grade}, {self.gait.describe()}"
+
+    def __repr__(self) -> str:
+        return f"<Problem {self.name}: {self.asked}, delta {self.delta:.0e}>"
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""

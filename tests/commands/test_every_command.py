@@ -72,6 +72,7 @@ REFUSED = {
     "pareto": ["", "nope.py", "fails.py", "empty.py", "good.h5"]
     + [f"problem.py --{option}" for option in ("points 1", "points x", "starts 0", "objectives speed no", "output x.txt")],
     "sensitivity": ["", "nope.h5", "text.h5", "problem.py", "good.h5 --no-such"],
+    "referee": ["--table nope.json", "--table text.h5", "--add good.h5", "--add nope.h5 --by me", "--only nobody"],
     "completion": ["--no-such", "x"],
 }
 

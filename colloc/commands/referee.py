@@ -1,0 +1,82 @@
+"""Command line: check the table of known gaits from the gaits alone, and take in what is better.
+
+Exit codes: 0 every row holds, 2 bad table or result, or one that is not better, 4 a row does not hold, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from importlib import resources
+
+from colloc.commands.ending import FAILED, OK, run
+from colloc.commands.options import add_printing, new_parser, tell
+from colloc.system.errors import CollocError, ProblemError
+from colloc.system.progress import StatusLine
+
+_EPILOG = """\
+A row is a problem, a gait and a value; the referee replays the gait, and believes nothing else. A result is taken in if it is
+certified, and better than what is known of the same question: body, friction, class of gaits, objective, limits and delta.
+
+  colloc referee
+  colloc referee --only three_link
+  colloc referee --add results/mine.h5 --by "colloc solve mine.py" --table known.json"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("referee", "Check the best gaits that are known, from the gaits alone; take in better ones.", _EPILOG)
+    parser.add_argument("--table", metavar="FILE.json", help="another table than the one that comes with colloc")
+    parser.add_argument("--only", metavar="NAME", help="rows of the problem of this name")
+    parser.add_argument("--add", metavar="FILE.h5", help="a result to take in")
+    parser.add_argument("--by", metavar="COMMAND", help="with --add: the command that anyone can find it with")
+    add_printing(parser)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    return run(_parser(), _referee, arguments)
+
+
+def _referee(options: argparse.Namespace) -> int:
+    if (options.add is None) != (options.by is None):
+        raise ProblemError("--add and --by go together: a result, and the command that finds it.")
+    from colloc.studies.known import known
+
+    return _taken_in(options) if options.add else _checked(options, known(options.table))
+
+
+def _checked(options: argparse.Namespace, rows: Sequence) -> int:
+    chosen = [row for row in rows if options.only in (None, row.statement["name"])]
+    if not chosen:
+        raise ProblemError(f"the table has no row of {options.only}.")
+    told, lines = [], []
+    with StatusLine(enabled=not (options.quiet or options.json)) as progress:
+        for number, row in enumerate(chosen):
+            name = row.statement["name"]
+            progress.say(f"{name}: replaying, {number + 1} of {len(chosen)}")
+            try:
+                complaint = row.complaint(row.certificate())
+            except CollocError as error:
+                complaint = str(error)
+            told.append({"name": name, "value": row.value, "value_error": row.value_error, "complaint": complaint})
+            lines.append(f"  {'NO ' if complaint else 'ok '} {name:<28s} {row.value:.8f} +- {row.value_error:.0e}  {complaint}")
+    failed = sum(bool(each["complaint"]) for each in told)
+    verdict = f"{len(told) - failed} of {len(told)} rows hold"
+    tell(options, {"rows": told, "failed": failed}, [verdict, *(line.rstrip() for line in lines)])
+    return FAILED if failed else OK
+
+
+def _taken_in(options: argparse.Namespace) -> int:
+    from colloc.commands.verify import check_trusted
+    from colloc.results.store import load
+    from colloc.studies.known import known, row_of, save_known, with_row
+
+    solution = load(options.add)
+    check_trusted(solution, options.add)
+    new = row_of(solution, options.by)
+    table = options.table or str(resources.files("colloc.studies") / "known.json")
+    save_known(with_row(known(table), new), table)
+    said = f"{new.statement['name']}: {new.value:.8f} +- {new.value_error:.0e} is the best that is known; saved {table}"
+    tell(options, {"name": new.statement["name"], "value": new.value, "table": table}, [said])
+    return OK

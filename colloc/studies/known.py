@@ -1,0 +1,194 @@
+"""The best gaits that are known, as a table that a referee checks from the gaits alone, and that anyone can beat.
+
+A row states a problem, a member of its class of gaits by the class's own parameters, and what the gait achieves. Nothing that a
+solver said is in it: `Known.certificate` replays the gait, and that is what counts.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.results.checks import Certificate
+from colloc.results.solution import Solution
+from colloc.search.certify import gait_certificate
+from colloc.system.errors import ProblemError, StoreError
+from colloc.system.replaced_file import replaced_file
+from colloc.system.versions import version_of
+
+_HOW = ("name", "guess", "delta_start", "intervals", "scheme", "formulation", "mesh_tolerance", "shrinking")
+"""Of a problem: how its answer is sought. The rest is the question."""
+_AGREEMENT = 3.0
+"""A replay may differ from a row by so many times the sum of their estimated errors, and by `_ROUNDING`."""
+_ROUNDING = 1e-9
+_NUMBERS = "value", "value_error", "value_at_zero_delta", "value_error_at_zero_delta"
+
+
+@dataclass(frozen=True)
+class Known:
+    """One row: the best gait that is known of a problem.
+
+    Attributes
+    ----------
+    statement : dict
+        Fields of the problem, as `Problem.to_dict` gives them.
+    parameters, edges : tuple of float
+        Of the class of gaits, as `member` takes them: in the class by construction.
+    value, value_error : float
+        The problem's objective at its delta.
+    value_at_zero_delta, value_error_at_zero_delta : float
+        The same for delta -> 0.
+    command, version : str
+        What found it, with which version of colloc.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> row = next(row for row in colloc.known() if row.statement["name"] == "three_link")
+    >>> row.complaint(row.certificate())
+    ''
+    """
+
+    statement: dict[str, Any]
+    parameters: tuple[float, ...]
+    edges: tuple[float, ...]
+    value: float
+    value_error: float
+    value_at_zero_delta: float
+    value_error_at_zero_delta: float
+    command: str
+    version: str
+
+    @property
+    def problem(self) -> Problem:
+        return Problem.from_dict(self.statement)
+
+    @property
+    def gait(self) -> AnyGait:
+        problem = self.problem
+        return problem.gait.member(np.array(self.parameters), problem.body.n_joint, np.array(self.edges))
+
+    @property
+    def question(self) -> str:
+        """What is asked, however it is answered: rows of equal questions are rivals."""
+        return json.dumps({name: value for name, value in self.statement.items() if name not in _HOW}, sort_keys=True)
+
+    def certificate(self) -> Certificate:
+        """The verdict of an independent replay of the gait as it stands here."""
+        gait = self.gait
+        problem = self.problem.with_(guess=gait)  # which has to be admissible
+        return gait_certificate(problem, gait, problem.delta * gait.delta_unit, gait.corner_phases)
+
+    def complaint(self, certificate: Certificate) -> str:
+        """What a certificate has against the row, in a sentence; empty if it holds."""
+        if not certificate.passed:
+            return f"the gait fails on {', '.join(check.name for check in certificate.failures)}"
+        allowed = _AGREEMENT * (self.value_error + certificate.value_error) + _ROUNDING
+        if not abs(certificate.value - self.value) <= allowed:
+            return f"the table says {self.value:.8f}, the replay {certificate.value:.8f} +- {certificate.value_error:.0e}"
+        return ""
+
+    def __repr__(self) -> str:
+        return f"<Known {self.statement['name']}: {self.value:.8g} +- {self.value_error:.0e}, by {self.command}>"
+
+
+def known(table: str | os.PathLike[str] | None = None) -> tuple[Known, ...]:
+    """The best gaits that are known, one a question.
+
+    Parameters
+    ----------
+    table : path-like, optional
+        Another table than the one that comes with colloc.
+
+    Raises
+    ------
+    StoreError
+        If there is no such table, or it is damaged.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> row = next(row for row in colloc.known() if row.problem.name == "three_link")
+    >>> round(row.value, 4), row.command
+    (0.26, 'colloc solve problems/three_link.py')
+    """
+    path = resources.files("colloc.studies") / "known.json" if table is None else Path(table)
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+        return tuple(Known(**row | {name: tuple(row[name]) for name in ("parameters", "edges")}) for row in rows)
+    except OSError as error:
+        raise StoreError(f"cannot read {path}: {error.strerror or error}.") from None
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"{path} is no table of known gaits: {error}.") from None
+
+
+def row_of(solution: Solution, command: str) -> Known:
+    """A solution as a row.
+
+    Raises
+    ------
+    ProblemError
+        If it is not certified, or no member of its own class (a prescribed motion, or near a relaxed gait).
+    """
+    problem, answer = solution.problem, solution.answer
+    if not solution.success or not problem.gait.free or problem.gait.mixes:
+        raise ProblemError(f"{problem.name} is not the certified gait of a class: a row of the table has to be.")
+    edges = answer.edges if answer.knots is None else answer.knots
+    return Known(
+        problem.with_(guess=None).to_dict(),
+        tuple(answer.x[answer.layout.parameters[:, 0]].tolist()),
+        tuple(np.asarray(edges).tolist()) if problem.gait.unit_speed else (),
+        **{name: float(getattr(solution.certificate, name)) for name in _NUMBERS},
+        command=command,
+        version=version_of("colloc"),
+    )
+
+
+def with_row(rows: Sequence[Known], new: Known) -> tuple[Known, ...]:
+    """A table with one more row, in place of the rival that it beats.
+
+    Raises
+    ------
+    ProblemError
+        If its own replay does not hold, or a rival is as good within the errors of both.
+    """
+    if why := new.complaint(new.certificate()):
+        raise ProblemError(f"{new.statement['name']} is not accepted: {why}.")
+    rival = next((row for row in rows if row.question == new.question), None)
+    if rival is None:
+        return (*rows, new)
+    if not new.value - rival.value > new.value_error + rival.value_error + _ROUNDING:
+        raise ProblemError(
+            f"{new.statement['name']} is not accepted: {rival.value:.8f} +- {rival.value_error:.0e} is known already "
+            f"({rival.command}), and {new.value:.8f} +- {new.value_error:.0e} is not better."
+        )
+    return tuple(new if row is rival else row for row in rows)
+
+
+def save_known(rows: Iterable[Known], table: str | os.PathLike[str]) -> None:
+    """Write a table, a row a line; an existing one is replaced only once the new one is complete."""
+    lines = ",\n".join(json.dumps(asdict(row), sort_keys=True) for row in rows)
+    with replaced_file(Path(table)) as temporary:
+        Path(temporary).write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+
+
+def markdown(rows: Iterable[Known]) -> str:
+    """The table as people read it."""
+    heads = "| problem | what is asked | best known | for delta → 0 | found by |\n|---|---|---|---|---|\n"
+
+    def line(row: Known) -> str:
+        problem = row.problem
+        told = f"{row.value:.6f} ± {row.value_error:.0e}"
+        limit = f"{row.value_at_zero_delta:.6f} ± {row.value_error_at_zero_delta:.0e}" if problem.law.regularised else ""
+        return f"| {problem.name} | {problem.asked} | {told} | {limit} | `{row.command}` |\n"
+
+    return heads + "".join(map(line, rows))

@@ -1,0 +1,96 @@
+"""The table of known gaits: what it says comes out of a replay, and only what is certified and better gets in."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import colloc
+from colloc.commands.main import main
+from colloc.studies.known import known, markdown, row_of, save_known, with_row
+from colloc.system.errors import ProblemError, StoreError
+
+ROWS = known()
+PAGE = Path(__file__).parents[2] / "docs" / "known.md"
+QUICK = [row for row in ROWS if row.statement["name"] in ("three_link", "two_link", "three_link_uphill", "three_link_fast")]
+PROBLEM = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+
+
+@pytest.fixture(scope="module")
+def best():
+    return colloc.solve(PROBLEM, starts=1)
+
+
+@pytest.mark.parametrize("row", QUICK, ids=lambda row: row.statement["name"])
+def test_a_row_comes_out_of_its_own_replay(row):
+    assert row.complaint(row.certificate()) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.statement["name"])
+def test_every_row_comes_out_of_its_own_replay(row):
+    assert row.complaint(row.certificate()) == ""
+
+
+def test_no_two_rows_answer_one_question_and_the_page_shows_them_all():
+    assert len({row.question for row in ROWS}) == len(ROWS) == len({row.statement["name"] for row in ROWS})
+    assert markdown(ROWS) in PAGE.read_text(encoding="utf-8")
+
+
+def test_a_value_that_the_gait_does_not_have_is_seen(best):
+    row = row_of(best, "colloc solve quick.py")
+    false = replace(row, value=row.value * (1 + 1e-4))
+    assert "the table says" in false.complaint(false.certificate())
+    with pytest.raises(ProblemError, match="not accepted: the table says"):
+        with_row([], false)
+
+
+def test_a_gait_that_breaks_a_limit_is_not_accepted(best):
+    row = row_of(best, "colloc solve quick.py")
+    false = replace(row, statement={**row.statement, "joint_limit": 1.0})
+    with pytest.raises(ProblemError, match="beyond the limit 1"):
+        with_row([], false)
+    false = replace(row, statement={**row.statement, "at_least": [[colloc.Objective("distance").fields(), 1.0]]})
+    with pytest.raises(ProblemError, match="fails on"):
+        with_row([], false)
+
+
+def test_only_what_is_better_takes_the_place_of_a_rival(best):
+    good = row_of(best, "colloc solve quick.py")
+    wide = PROBLEM.with_(gait=colloc.Harmonic(2, "bilateral"), guess=best.gait)
+    poor = row_of(colloc.solve(PROBLEM.with_(joint_limit=2.0), starts=1), "by hand")
+    poor = replace(poor, statement=good.statement)  # an answer to the same question
+    assert poor.value < good.value - 1e-3
+    assert with_row([poor], good) == (good,)
+    with pytest.raises(ProblemError, match="is known already"):
+        with_row([good], poor)
+    with pytest.raises(ProblemError, match="is known already"):
+        with_row([good], good)
+    other = row_of(colloc.solve(wide, starts=1), "colloc solve wide.py")
+    assert with_row([good], other) == (good, other)  # another class is another question
+
+
+def test_what_is_not_certified_or_of_no_class_is_no_row(best):
+    failed = replace(best, certificate=colloc.Solution(PROBLEM, best.answer).certificate)
+    with pytest.raises(ProblemError, match="has to be"):
+        row_of(failed, "by hand")
+
+
+def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
+    table, result = tmp_path / "known.json", tmp_path / "quick.h5"
+    save_known([], table)
+    colloc.save(best, result)
+    arguments = ["referee", "--table", str(table)]
+    assert main([*arguments, "--add", str(result), "--by", "colloc solve quick.py"]) == 0
+    assert main(arguments) == 0
+    assert "1 of 1 rows hold" in capsys.readouterr().out
+    assert main([*arguments, "--only", "other"]) == 2
+    assert main([*arguments, "--add", str(result)]) == 2
+    false = replace(known(table)[0], value=0.27)
+    save_known([false], table)
+    assert main(arguments) == 4
+    table.write_text("[{}]")
+    with pytest.raises(StoreError, match="no table of known gaits"):
+        known(table)
+    with pytest.raises(StoreError, match="cannot read"):
+        known(tmp_path / "none.json")
