@@ -12,6 +12,7 @@ collocates a motion asks it, and not whether there is a slope.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -234,7 +235,7 @@ class SlowOnSlope:
     ) -> np.ndarray:
         at_points = on_out.reshape(*on_out.shape[:2], -1)
         of_theta = on_theta.reshape(len(on_theta), 1, -1) + np.einsum("mrt,rkt->mkt", at_points, on_states[OUTPUTS])
-        on_begin, on_rates = CollocatedStates(mesh).pulled_back(on_states[None, OMEGA], of_theta)
+        on_begin, on_rates, _ = CollocatedStates(mesh).pulled_back(on_states[None, OMEGA], of_theta)
         on_out[:, 0] += on_rates.reshape(on_theta.shape)
         return on_begin
 
@@ -300,11 +301,24 @@ class WithInertia(SlowOnLevel):
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
-            out, slopes = momenta_along_states(self._chain, self.friction, shapes[:3], states, self._froude_at(shapes))
-            return Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
+            out, found = self._rates(shapes, states)
+            return found
 
         states, _, held = self._equations(mesh, shapes.unit).solved(rates, near[:, 0], near)
         return states, out, held
+
+    def alone(
+        self, mesh: Mesh, shapes: Shapes, begins: np.ndarray, near: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Every interval by itself, from given momenta at its begin ``(3, n)``: what the body does with those at the points,
+        the momenta at its end ``(3, n)``, and where there are any, ``(n,)``; sought near momenta at the points."""
+        equations = self._equations(mesh, shapes.unit)
+        states, ends, found = equations.alone(lambda states: self._rates(shapes, states)[1], begins, near)
+        return self._rates(shapes, states)[0], ends, found
+
+    def _rates(self, shapes: Shapes, states: np.ndarray) -> tuple[np.ndarray, Rates]:
+        out, slopes = momenta_along_states(self._chain, self.friction, shapes[:3], states, self._froude_at(shapes))
+        return out, Rates(out[_MORE], slopes[_MORE], bool(np.isfinite(out).all()))
 
     def _equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         return CollocatedStates(mesh, np.ones(len(STATES), dtype=bool), self._image, unit)
@@ -321,10 +335,33 @@ class WithInertia(SlowOnLevel):
         self, mesh: Mesh, pose: CollocatedPose, on_theta: np.ndarray, on_out: np.ndarray, on_states: np.ndarray
     ) -> np.ndarray:
         on_out[:, 0] += pose.on_rates(on_theta)
-        given, more = np.split(on_out.reshape(*on_out.shape[:2], -1), [-len(STATES)], axis=1)
-        of_states = np.einsum("mrt,rkt->mkt", given, on_states[OUTPUTS][: -len(STATES)])
-        more[:] = self._equations(mesh).pulled_back(on_states[_MORE], of_states)[1]
+        on_out[:, 4:] = self._pulled_back(mesh, on_out, on_states)[1].reshape(on_out[:, 4:].shape)
         return np.empty((len(on_out), 0))
+
+    def on_ends(self, mesh: Mesh, on_out: np.ndarray, on_states: np.ndarray) -> np.ndarray:
+        """Derivatives ``(m, 3, n)`` of m numbers with respect to what is added to the momenta at the ends of the intervals,
+        from those of `through_pose`."""
+        return self._pulled_back(mesh, on_out, on_states)[2]
+
+    def _pulled_back(self, mesh: Mesh, on_out: np.ndarray, on_states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        given = on_out[:, :4].reshape(len(on_out), 4, -1)
+        of_states = np.einsum("mrt,rkt->mkt", given, on_states[OUTPUTS][:4])
+        return self._equations(mesh).pulled_back(on_states[_MORE], of_states)
+
+
+def through_motion(
+    kind: Kind, mesh: Mesh, pose: CollocatedPose, shares: Iterable[Share], on_states: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of m numbers of a period with respect to (rotation rate, velocity of the centre, power, rates of states) at
+    the stages, ``(m, 4 + more, n, s)``, and to the begins that are told, ``(m, n_told)``; `on_states` as of `Kind.slopes`."""
+    side, rotation, _, work = (np.array(column) for column in zip(*shares, strict=True))
+    weight = stage_weights(mesh)
+    on_theta, on_centre = pose.on_pose(side)
+    rows = np.zeros((side.size, len(on_states[OUTPUTS]), *weight.shape))
+    rows[:, 0], rows[:, 3] = (part[:, None, None] * weight for part in (rotation, work))
+    rows[:, 1:3] = on_centre
+    on_begin = kind.through_pose(mesh, pose, on_theta, rows, on_states)
+    return rows, on_begin
 
 
 def kind_of_motion(dynamics: Dynamics) -> Kind:

@@ -24,6 +24,8 @@ _ROUNDED = 1e-11
 """Newton's step that counts as none: where rates are steep, rounding leaves more of the equations than `_CLOSED`."""
 _ASTRAY = 5
 """Steps in a row of which no part leads nearer, after which there is no motion near here."""
+_ALONE, _FOUND = 60, 1e-9
+"""Steps by which the states of single intervals are found, and what their equations may be off by then."""
 _SHARES = 0.5 ** np.arange(7)
 """Of Newton's step, tried until the equations are off by less."""
 
@@ -64,7 +66,7 @@ class CollocatedStates:
         stages = rates.reshape(len(rates), *self._shape)
         gained = np.cumsum((self._b * stages).sum(axis=2), axis=1)
         before = np.concatenate([np.zeros((len(rates), 1)), gained[:, :-1]], axis=1)
-        return (before[:, :, None] + np.einsum("nij,anj->ani", self._a, stages)).reshape(rates.shape), gained[:, -1]
+        return (before[:, :, None] + self._within(stages)).reshape(rates.shape), gained[:, -1]
 
     def solved(
         self,
@@ -116,6 +118,38 @@ class CollocatedStates:
             states, start, off = after, begin, off_then
         return states, start, bool(now.known and off < _CLOSED)
 
+    def alone(
+        self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States at the points of every interval by itself, from given ones at its begin ``(n_state, n)``; those at its end,
+        ``(n_state, n)``; and where they were found, ``(n,)``. `near` is where Newton's method begins, as in `solved`."""
+        n, s = self._shape
+        begin, share = np.repeat(begins, s, axis=1), np.ones(n)
+
+        def residual(states: np.ndarray) -> tuple[Rates, np.ndarray, np.ndarray]:
+            now = rates(states)
+            left_over = states - begin - self._within(now.value.reshape(-1, n, s)).reshape(states.shape)
+            return now, left_over, np.abs(left_over).reshape(-1, n, s).max(axis=(0, 2))
+
+        (now, left_over, off), states = residual(near), near
+        for _ in range(_ALONE):
+            if (off < _CLOSED).all():
+                break
+            linear = _Linear(self._a, self._b, now.on_states)
+            step = np.repeat(share, s) * linear.at_points(linear.own(left_over), np.zeros_like(begins.T))
+            trial = states - step
+            *_, off_then = residual(trial)
+            nearer = (off_then < off) | (np.abs(step).reshape(-1, n, s).max(axis=(0, 2)) < _ROUNDED)
+            states = np.where(np.repeat(nearer, s), trial, states)
+            share = np.where(nearer, np.minimum(2.0 * share, 1.0), 0.25 * share)
+            now, left_over, off = residual(states)
+        found = now.value.reshape(-1, n, s)
+        return states, begins + (self._b * found).sum(axis=2), off < _FOUND
+
+    def _within(self, stages: np.ndarray) -> np.ndarray:
+        """What states gain from the begin of an interval to its stages, of rates ``(n_state, n, s)`` there."""
+        return np.einsum("nij,anj->ani", self._a, stages)
+
     def _residual(
         self, rates: Callable[[np.ndarray], Rates], states: np.ndarray, start: np.ndarray
     ) -> tuple[Rates, np.ndarray, np.ndarray, float]:
@@ -144,7 +178,7 @@ class CollocatedStates:
         image = np.eye(len(through)) if self._image is None else self._image
         return (through - image)[np.ix_(self._free, self._free)]
 
-    def pulled_back(self, on_states: np.ndarray, of_states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def pulled_back(self, on_states: np.ndarray, of_states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Derivatives of numbers by way of the states.
 
         Parameters
@@ -160,18 +194,20 @@ class CollocatedStates:
             With respect to the start; 0 of free states, whose start follows.
         on_rates : (m, n_state, n_point)
             With respect to the rates at given states.
+        on_ends : (m, n_state, n)
+            With respect to what is added to the states at the end of every interval.
         """
         within = _Linear(self._a, self._b, on_states)
-        on_start, on_rates = within.pulled_back(of_states)
+        on_start, on_rates, on_ends = within.pulled_back(of_states)
         if self._free.size:
             free = self._free
-            through, _ = within.pulled_back(np.zeros((on_start.shape[1], *of_states.shape[1:])), np.eye(on_start.shape[1]))
+            through, *_ = within.pulled_back(np.zeros((on_start.shape[1], *of_states.shape[1:])), np.eye(on_start.shape[1]))
             closing = np.zeros_like(on_start)
             closing[:, free] = -np.linalg.solve(self._open(through).T, on_start[:, free].T).T
             image = np.eye(len(through)) if self._image is None else self._image
-            on_start, on_rates = within.pulled_back(of_states, closing)
+            on_start, on_rates, on_ends = within.pulled_back(of_states, closing)
             on_start -= closing @ image
-        return on_start, on_rates
+        return on_start, on_rates, on_ends
 
 
 class _Linear:
@@ -198,11 +234,15 @@ class _Linear:
             *by_interval.shape[:-2], k, n * s
         )
 
+    def own(self, right: np.ndarray) -> np.ndarray:
+        """What stages have of a right side ``(k, n_point)`` alone, ``(n, s k)``."""
+        return (self._inverse @ self._by_interval(right)[:, :, None])[:, :, 0]
+
     def handed_on(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """``(I - H R) x = begin + right``: what stages have of the right side ``(k, n_point)`` alone, ``(n, s k)``, and the
-        states at the edges as ``through @ begin + gained``, ``(n + 1, k, k)`` and ``(n + 1, k)``."""
+        """``(I - H R) x = begin + right``: `own` of the right side ``(k, n_point)``, and the states at the edges as
+        ``through @ begin + gained``, ``(n + 1, k, k)`` and ``(n + 1, k)``."""
         n, _, k = self._shape
-        own = (self._inverse @ self._by_interval(right)[:, :, None])[:, :, 0]
+        own = self.own(right)
         more, edges = self._gain @ own[:, :, None], np.empty((n + 1, k, k + 1))
         edges[0] = now = np.eye(k, k + 1)
         for interval, through in enumerate(self._through):
@@ -215,9 +255,10 @@ class _Linear:
         """x ``(k, n_point)``, from the states at the begins of the intervals, ``(n, k)``."""
         return self._by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
 
-    def pulled_back(self, of_states: np.ndarray, of_end: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def pulled_back(self, of_states: np.ndarray, of_end: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of numbers with derivatives ``(m, k, n_point)`` with respect to the states and ``(m, k)`` to those at the end: to
-        their begin, ``(m, k)``, and to the rates, ``(m, k, n_point)``, as ``H'(I - H R)'^-1``."""
+        their begin, ``(m, k)``, to the rates, ``(m, k, n_point)``, as ``H'(I - H R)'^-1``, and to the states at the ends of
+        the intervals, ``(m, k, n)``."""
         (n, s, k), given = self._shape, self._by_interval(of_states)
         through = np.einsum("mni,nia->mna", given, self._response)
         later = np.empty_like(through)
@@ -228,4 +269,4 @@ class _Linear:
         mu = np.einsum("mni,nij->mnj", given + np.einsum("mna,nai->mni", later, self._gain), self._inverse)
         stages = mu.reshape(-1, n, s, k)
         on_rates = np.einsum("mnia,nij->mnja", stages, self._a) + self._b[:, :, None] * later[:, :, None]
-        return now, self._by_point(on_rates.reshape(-1, n, s * k))
+        return now, self._by_point(on_rates.reshape(-1, n, s * k)), later.transpose(0, 2, 1)

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from colloc.motion.collocated import CollocatedPose, point_weights, stage_weights
-from colloc.motion.kinds import OMEGA, OUTPUTS, Along, Kind, Passed, first_theta
+from colloc.motion.kinds import OMEGA, OUTPUTS, Along, Kind, Passed, first_theta, through_motion
 from colloc.motion.kinds import Shapes as Moving
 from colloc.numerics.mesh import Mesh
 
@@ -136,12 +136,8 @@ class ReducedMotion:
         slopes, on_states = kind.slopes(Moving(s.angles, s.rates, delta), s.along)
         self._near = (s, slopes)
         shares = kind.shares(s.passed)
-        side, rotation, bend, work = (np.array(column) for column in zip(*shares.values(), strict=True))
-        on_theta, on_centre = s.pose.on_pose(side)
-        rows = np.zeros((side.size, len(slopes[OUTPUTS]), *self._weight.shape))
-        rows[:, 0], rows[:, 3] = (part[:, None, None] * self._weight for part in (rotation, work))
-        rows[:, 1:3] = on_centre
-        on_begin = kind.through_pose(mesh, s.pose, on_theta, rows, on_states)
+        bend = np.array([share.bend for share in shares.values()])
+        rows, on_begin = through_motion(kind, mesh, s.pose, shares.values(), on_states)
         on_out = np.zeros((*rows.shape[:2], mesh.n_point))
         for stage, points in enumerate(mesh.points.T):  # neighbours may share a point
             on_out[:, :, points] += rows[..., stage]

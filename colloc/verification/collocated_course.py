@@ -17,7 +17,18 @@ from colloc.gaits.sloped import checked_chain
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.inertia import checked_mass
 from colloc.motion.collocated import CollocatedPose, stage_weights
-from colloc.motion.kinds import OMEGA, Along, Kind, Passed, Shapes, begin_of, first_theta, kind_of_motion
+from colloc.motion.kinds import (
+    OMEGA,
+    Along,
+    Kind,
+    Passed,
+    Shapes,
+    WithInertia,
+    begin_of,
+    first_theta,
+    kind_of_motion,
+    through_motion,
+)
 from colloc.numerics.mesh import Mesh
 from colloc.verification.adaptive_motion import path_lengths
 from colloc.verification.gait_on_slope import GaitOnSlope
@@ -41,8 +52,8 @@ class Defects(NamedTuple):
 
 
 class CourseOfGait(NamedTuple):
-    """A gait's motion by the differential equation: theta, place, work against friction, ``(4, n)``, at phases in order; and
-    about the error of these."""
+    """A gait's motion by the differential equation: momenta if they are states, theta, place, work against friction,
+    ``(4 or 7, n)``, at phases in order; and about the error of these."""
 
     at: Callable[[np.ndarray], np.ndarray]
     error: float
@@ -58,7 +69,7 @@ def course(dynamics: Dynamics, gait: Any, delta: float, mesh: Mesh, error: float
         return CourseOfGait(lambda t: ran.at(t)[:4], error)
     played = GaitWithInertia(checked_mass(body), friction, gait, delta, froude=froude)
     ran = played.settled(_along(kind_of_motion(dynamics), mesh, gait, delta).edges[:, 0], error)
-    return CourseOfGait(lambda t: ran.at(t)[3:], error)
+    return CourseOfGait(ran.at, error)
 
 
 def _along(kind: Kind, mesh: Mesh, gait: Any, delta: float) -> Along:
@@ -71,30 +82,40 @@ def course_defects(control: ControlProblem, mesh: Mesh, gait: Any, delta: float,
     kind, objective = kind_of_motion(control.dynamics), control.aims.objective
     own = _along(kind, mesh, gait, delta)
     pose = CollocatedPose.on_mesh(mesh, own.z[OMEGA], own.now.centre, first_theta(kind, own.begin))
-    passed = np.linalg.norm(gait(mesh.times)[1], axis=0)
+    angles, rates = gait(mesh.times)
+    passed = np.linalg.norm(rates, axis=0)
     spent, run = ((stage_weights(mesh) * rate[mesh.points]).sum(axis=1) for rate in (own.now.power, passed))
-    if not own.held.all():
-        spent = np.nan * spent
     at_edges = exact.at(mesh.edges)
-    theta, x, y, work = np.diff(at_edges, axis=1)
+    momenta, (angle, *place) = at_edges[:-4], at_edges[-4:-1]
+    theta, x, y, work = np.diff(at_edges[-4:], axis=1)
     length, periods = path_lengths(gait, mesh.edges[:-1], mesh.edges[1:], 4), kind.periods
-    rotation, energy, way = pose.rotations - theta, spent - work, np.diff(pose.place)
     true = Passed(complex(x.sum(), y.sum()), float(theta.sum()), 0.0, float(work.sum()))
     found = Passed(complex(pose.place[-1]), float(pose.rotations.sum()), 0.0, float(spent.sum()))
-    displacement = way - (x + 1j * y)
-    if "theta" not in kind.states:
-        # an error of rotation turns everything after it, and by half of it the direction that counts
-        place = (at_edges[1] - at_edges[1, 0]) + 1j * (at_edges[2] - at_edges[2, 0])
-        turned_back = np.exp(1j * (at_edges[0, :-1] - at_edges[0, 0] - pose.theta[:-1]))
-        displacement = way * turned_back - (x + 1j * y) + 1j * rotation * (0.5 * place[-1] - place[1:])
     period = kind.counted(true) | {"length": periods * float(length.sum()), "driven_work": np.nan}
     other = kind.counted(found) | {"length": periods * float(run.sum()), "driven_work": np.nan}
     aims, value = objective.shares(period), np.zeros(mesh.n)
+    rotation, energy, displacement = pose.rotations - theta, spent - work, np.diff(pose.place) - (x + 1j * y)
+    turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
+    if isinstance(kind, WithInertia):
+        shapes = Shapes(angles, rates, delta)
+        out, ends, alone = kind.alone(mesh, shapes, momenta[:, :-1], exact.at(mesh.times)[:-4])
+        local = CollocatedPose.on_mesh(mesh, out[OMEGA], out[3:5])
+        here, spent_alone = np.exp(1j * angle[:-1]), (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
+        # an error of rotation turns everything after it, and by half of it the direction that counts
+        rest = (place[0] - place[0][0]) + 1j * (place[1] - place[1][0])
+        rotation, energy = local.rotations - theta, spent_alone - work
+        displacement = here * local.displacements - (x + 1j * y) + 1j * rotation * (0.5 * rest[-1] - rest[1:])
+        shares, (_, on_states) = kind.shares(true), kind.slopes(shapes, own)
+        rows, _ = through_motion(kind, mesh, pose, shares.values(), on_states)
+        weights = np.array([aims.get(name, 0.0) for name in shares])
+        value += np.einsum("m,mkn,kn->n", weights, kind.on_ends(mesh, rows, on_states), ends - momenta[:, 1:])
+        value[~alone] = 1.0
     for name, share in kind.shares(true).items():
         turns = rotation if name == "rotation" else 0.0
         value += aims.get(name, 0.0) * ((np.conj(share.side) * displacement).real + turns + share.work * energy)
     value += aims["length"] * periods * (run - length)
-    turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
+    if not own.held.all():
+        value = np.nan * value
     return Defects(
         rotation,
         displacement,

@@ -15,6 +15,7 @@ halved, which gives them more such instants.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,7 +145,7 @@ def planned_mesh(
     if accurate:
         return MeshPlan(mesh.scheme.name, np.unique(np.concatenate([mesh.edges, knots])), error.estimate, True, knots)
     if kind_of_motion(control.dynamics).states:
-        return _halved(known, mesh.scheme, knots, tolerance, aim, most_points)
+        return _fewest(_halved(known, rule, knots, tolerance, aim, most_points) for rule in _family(scheme(control.scheme)))
     given = scheme(control.scheme)
     kinks = kink_knots(control, gait, delta, fine)
     switches = not control.dynamics.law.reversible
@@ -158,7 +159,15 @@ def planned_mesh(
         edges = moved_knots(first, np.union1d(on_knots, _beside(mesh, on_knots)), snap)
         budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
         plan = _split(known, rule, edges, knots, on_knots, tolerance, aim, budget)
-        if best is None or (plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best))):
+        best = plan if best is None else _fewest([best, plan])
+    return best
+
+
+def _fewest(plans: Iterable[MeshPlan]) -> MeshPlan:
+    """The one with the fewest points of those that reach what is asked for; the first one, if none does."""
+    best, *others = plans
+    for plan in others:
+        if plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best)):
             best = plan
     return best
 

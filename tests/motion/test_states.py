@@ -80,7 +80,7 @@ def test_the_adjoint_has_the_slopes_of_differences(k, free):
         return (weight * states).sum(), states
 
     _, states = number(0.0)
-    on_start, on_rates = equations.pulled_back(on_states(mesh.times, states), weight[None])
+    on_start, on_rates, _ = equations.pulled_back(on_states(mesh.times, states), weight[None])
     difference = (number(1e-5)[0] - number(-1e-5)[0]) / 2e-5
     assert (on_rates[0] * more).sum() + on_start[0] @ moved == pytest.approx(difference, rel=1e-7)
     np.testing.assert_allclose(on_start[0, mask], 0.0, atol=1e-12)
@@ -100,7 +100,7 @@ def test_interval_by_interval_it_is_the_one_large_system(name):
     np.testing.assert_allclose(whole @ states.ravel(), 1 + integral @ push.ravel(), atol=1e-10)
     of_states = rng.normal(size=(3, k, n))
     mu = np.linalg.solve(whole.T, of_states.reshape(3, -1).T).T
-    on_start, on_rates = equations.pulled_back(matrix, of_states)
+    on_start, on_rates, _ = equations.pulled_back(matrix, of_states)
     np.testing.assert_allclose(on_start, mu.reshape(3, k, n).sum(axis=2), atol=1e-10)
     np.testing.assert_allclose(on_rates.reshape(3, -1), mu @ integral, atol=1e-10)
 
