@@ -3,7 +3,8 @@
     python -m benchmarks.numbers
     python -m benchmarks.numbers --stages explore refine --problems 4 6 7 12 14 21 22 24
 
-A number is what a module of `colloc/search` states by name in capitals, each entry of a tuple or of an `Effort` for itself.
+A number is what a module of `colloc/search` states by name in capitals, each entry of a tuple or of an `Effort` for itself,
+unless it stands in another module already.
 Printed for both: how many problems are still solved, the worst loss of value and of time over what the stated number gives. One
 that changes nothing either way, on problems that use its stage, is no number that anyone needs to set.
 """
@@ -11,6 +12,7 @@ that changes nothing either way, on problems that use its stage, is no number th
 from __future__ import annotations
 
 import argparse
+import ast
 import dataclasses
 import importlib
 import pkgutil
@@ -43,9 +45,10 @@ def modules(stages: list[str]) -> list[ModuleType]:
 
 def numbers(module: ModuleType) -> Iterator[tuple[str, str, Callable[[float], Any]]]:
     """Every number of a module: what it is called, the name it stands in, and what that holds with the number so many times."""
-    for name, value in sorted(vars(module).items()):
-        if not name.isupper() or _home(name, value) is not module:
-            continue
+    names = _stated(module)
+    others = [value for name, value in vars(module).items() if name.isupper() and name not in names]
+    for name in names:
+        value = vars(module).get(name)
         if isinstance(value, tuple):
             parts: Any = enumerate(value)
         elif isinstance(value, dict):
@@ -53,7 +56,8 @@ def numbers(module: ModuleType) -> Iterator[tuple[str, str, Callable[[float], An
         else:
             parts = vars(value).items() if dataclasses.is_dataclass(value) else [("", value)]
         for key, entry in parts:
-            if _is_number(entry):
+            elsewhere = isinstance(entry, float) and any(entry is other for other in others)
+            if _is_number(entry) and not elsewhere and str(key)[:1] != "_":
                 yield f"{name}[{key}]" if key != "" else name, name, partial(_with_part, value, key, entry)
 
 
@@ -75,15 +79,16 @@ def _holders(name: str, value: Any) -> list[ModuleType]:
     return [m for key, m in sys.modules.items() if key.startswith("colloc.") and vars(m).get(name) is value]
 
 
-def _home(name: str, value: Any) -> ModuleType:
-    """The module that states it, and does not import it: the one whose source has an assignment."""
-    held = _holders(name, value)
-    return next((m for m in held if f"\n{name}" in _source(m) or f", {name}" in _source(m)), held[0])
-
-
-def _source(module: ModuleType) -> str:
-    lines = Path(module.__file__ or "").read_text(encoding="utf-8").splitlines()
-    return "\n" + "\n".join(line.split("=")[0] for line in lines if line[:1].isupper() or line[:1] == "_")
+def _stated(module: ModuleType) -> list[str]:
+    """Names in capitals that the module itself gives a value."""
+    found = []
+    for node in ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign):
+            names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+            found += [name for name in names if name.isupper()]
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.target.id.isupper():
+            found.append(node.target.id)
+    return sorted(found)
 
 
 def results(problems: list[int]) -> tuple[np.ndarray, np.ndarray]:

@@ -19,29 +19,23 @@ from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import MixedPath, Path, Replay
 from colloc.verification.replayer import replayer
 
-KKT, VIOLATION, RESIDUAL, CLOSURE, ROTATION, ADMISSIBLE, GAP, WORK = 1e-6, 1e-8, 1e-6, 1e-9, 1e-4, 1e-6, 1e-4, 1e-7
-"""Largest values that pass. ROTATION: the distance of a body that turns depends on the point of it that is followed, to first
-order; so the rotation is limited by what it changes there, to as much as collocation may be wrong by (GAP). What delta may
-change is the body's own (`colloc.mechanics.bodies.Usual`)."""
-MOTIONS = 1e-2
-"""Where the law leaves the motion open, no mesh decides it: as much as the other limit of the law, delta, may change."""
-
-_ANY_LEAN = 1.0
-"""Body lengths: reported, not judged. A real body would shift its weight between its feet, which the model does not."""
-ASTRAY, SEVERAL = 1e-3, 1e-3
-"""On a slope: angle off the direction that was asked for; part of the period at which the motion is left open."""
-
-SADDLE, FLAT = 1e-2, 1e-4
-"""Curvatures of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains
-5e-5, what the mesh may be wrong by; less than FLAT is called flat."""
-
-_BALANCED = "net force and torque at all replayed instants", "what a period changes of the momenta"
-_FINE_PHASES = 20000
-TRIVIAL_ROTATION = 1e-3
-"""Rotation a period [rad] from which a gait that goes nowhere turns."""
+EXACT, VIOLATION, CLOSURE, WORK = 1e-6, 1e-8, 1e-9, 1e-7
+"""Largest values that pass of what holds but for rounding and the ends of iterations. EXACT: gradient of the Lagrangian,
+balance of forces, penetration of links [body lengths]."""
+GAP = 1e-4
+"""As much as collocation may be wrong by, relative. The distance of a body that turns depends on the point of it that is
+followed, to first order; so its rotation is limited by what that changes there."""
+ANGLE, SEVERAL = 1e-3, 1e-3
+"""An angle that counts [rad]: on a slope off the direction that was asked for, or turned in a period by a gait that goes
+nowhere. Part of the period at which the motion on a slope may be left open."""
+SADDLE = 1e-2
+"""Curvature of the objective over its value [1/rad^2]: a saddle rises by so much, as a tenth of a radian along it gains 5e-5,
+what the mesh may be wrong by."""
 NOWHERE = 1e-4
 """Efficiency times the smallest friction coefficient (at most 1), or on a slope the value of the objective in units of the
 friction, up to which a gait goes nowhere."""
+_FINE_PHASES = 20000
+_BALANCED = "net force and torque at all replayed instants", "what a period changes of the momenta"
 
 
 class Certified(NamedTuple):
@@ -71,7 +65,7 @@ def is_trivial(answer: Answer) -> bool:
     if not goes_nowhere(answer):
         return False
     theta = answer.x[answer.layout.theta[0]]
-    return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > TRIVIAL_ROTATION)
+    return not (problem.gait.symmetry == NONE and abs(theta[-1] - theta[0]) > ANGLE)
 
 
 def goes_nowhere(answer: Answer) -> bool:
@@ -187,9 +181,9 @@ def gait_certificate(
 def _first_order(answer: Answer) -> list[Check]:
     residual = np.abs(answer.motion.at_points.force).max() / answer.problem.law.largest
     return [
-        Check("KKT error", max(answer.kkt_error, answer.complementarity), KKT, "gradient of the Lagrangian, complementarity"),
+        Check("KKT error", max(answer.kkt_error, answer.complementarity), EXACT, "gradient of the Lagrangian, complementarity"),
         Check("constraint violation", answer.violation, VIOLATION, "largest violated equation or bound"),
-        Check("balance at nodes", float(residual), RESIDUAL, "net force and torque by the closed-form law"),
+        Check("balance at nodes", float(residual), EXACT, "net force and torque by the closed-form law"),
     ]
 
 
@@ -201,7 +195,7 @@ def _second_order(answer: Answer) -> Check:
     value = max(-found.smallest - found.error, 0.0)
     if found.n_free == 0:
         verdict = "a vertex: what binds leaves no direction free"
-    elif found.smallest > max(found.error, FLAT):
+    elif found.smallest > found.error:
         verdict = f"an optimum: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
     elif value > SADDLE:
         verdict = f"a saddle: smallest curvature {found.smallest:.1e} in {found.n_free} free directions"
@@ -219,16 +213,16 @@ def _motion(
     beyond = max(float(body.largest_angles(stretched).max()) - limit, 0.0)
     depth = max(float(body.crossing_depth(angles).max()), body.passing_depth(angles))
     checks = [
-        Check("balance in replay", fine.residual, RESIDUAL, _BALANCED[bool(problem.froude)]),
+        Check("balance in replay", fine.residual, EXACT, _BALANCED[bool(problem.froude)]),
         Check("closure", float(np.abs(ends[:, 1] - ends[:, 0]).max()), CLOSURE, f"{body.quantity}s after one period [rad]"),
         *_rotation(problem, fine),
         Check(body.usual.limit_name, beyond, body.usual.excess, "excess between nodes [rad]"),
-        Check("self-contact", depth, ADMISSIBLE, "penetration of links between nodes [body lengths]"),
+        Check("self-contact", depth, EXACT, "penetration of links between nodes [body lengths]"),
         *_speeds(problem, rates),
     ]
     if (lean := float(body.imbalance(angles).max())) > BALANCED:
         beside = "way from the centre of mass to where its weights press [body lengths]; reported, not judged"
-        checks.append(Check("statics", lean, _ANY_LEAN, beside))
+        checks.append(Check("statics", lean, np.inf, beside))
     if fine.multipliers:
         meaning = "largest Floquet multiplier: what a period leaves of a small change of the momenta"
         checks.append(Check("stability", float(np.abs(fine.multipliers).max()), 1.0, meaning))
@@ -258,7 +252,7 @@ def _rotation(problem: Problem, fine: Replay) -> list[Check]:
         return []
     which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a period"
     value = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
-    return [Check("net rotation", value, ROTATION, f"{which}, times the body's reach over the distance")]
+    return [Check("net rotation", value, GAP, f"{which}, times the body's reach over the distance")]
 
 
 def _reached(problem: Problem, fine: Replay) -> list[Check]:
@@ -283,7 +277,7 @@ def _direction(problem: Problem, fine: Replay) -> list[Check]:
     """Where the way leads, if that is asked for."""
     if problem.towards is None:
         return []
-    return [Check("direction", fine.across / fine.distance, ASTRAY, "of the way, off the one that was asked for [rad]")]
+    return [Check("direction", fine.across / fine.distance, ANGLE, "of the way, off the one that was asked for [rad]")]
 
 
 def _beyond(value: float, unknown: float) -> float:
@@ -292,7 +286,8 @@ def _beyond(value: float, unknown: float) -> float:
 
 
 def _one_motion(problem: Problem, fine: Replay) -> Check:
-    """How far the objective depends on which of several balanced motions the body takes."""
+    """How far the objective depends on which of several balanced motions the body takes: where the law leaves it open, no mesh
+    decides it, and as much is allowed as the law's other limit, delta, may change."""
     if problem.slope is not None:
         meaning = "part of the period at which several motions are balanced; what they would change is not measured"
         return Check("one motion", fine.several, SEVERAL, meaning)
@@ -306,7 +301,7 @@ def _one_motion(problem: Problem, fine: Replay) -> Check:
         meaning = f"relative; no other balanced motion was found at {fine.instants} instants"
     else:
         meaning = f"relative; several motions are balanced at {fine.several:.2g} of the period"
-    return Check("one motion", fine.ambiguity, MOTIONS, meaning)
+    return Check("one motion", fine.ambiguity, problem.body.usual.delta_influence, meaning)
 
 
 def _class(answer: Answer) -> list[Check]:

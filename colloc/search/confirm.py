@@ -26,7 +26,7 @@ from colloc.numerics.sqp import Stationarity, stationarity
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.results.answer import NOT_MEASURED, REDUCED, Answer, SecondOrder
-from colloc.search.certify import ADMISSIBLE, VIOLATION
+from colloc.search.certify import EXACT, VIOLATION
 from colloc.search.converge import NOT_STATIONARY, STATIONARY, with_kink
 from colloc.search.diagnosis import explanation
 from colloc.search.effort import ROUGH
@@ -119,7 +119,7 @@ def _outcome(optimum: Optimum, reduced: ReducedProgram, conditions: Stationarity
         return _Outcome(Verdict.ON_KINK, program, here)
     result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), RADIUS)
     own = program.layout.parameters[space.own, 0]
-    for allowed in (*_ROUNDS * (VIOLATION,), ADMISSIBLE):
+    for allowed in (*_ROUNDS * (VIOLATION,), EXACT):
         if not result.optimal:
             break
         if reduced.place_rows(result.x[own]) <= allowed:

@@ -23,8 +23,8 @@ from colloc.numerics.kinks import stationarity_around
 from colloc.numerics.sqp import NonlinearProgram, Stationarity, minimised, stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
-from colloc.search.certify import ADMISSIBLE
-from colloc.search.effort import ITERATIONS, ROUGH, SKETCH, Effort
+from colloc.search.certify import EXACT, VIOLATION
+from colloc.search.effort import ROUGH, SKETCH, Effort
 from colloc.search.optimum import Optimum, replace_keeping_space
 from colloc.search.run import this_run
 from colloc.search.spaces import with_far
@@ -34,16 +34,13 @@ FIRST_RADIUS, NEXT_RADIUS = 1.0, 0.5
 """Boxes round the last gait [rad], at the first level and later: far enough for an optimum to move, not so far that a step ends
 in another world. A gait that ends on the edge of its box goes on from there."""
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
-_AT_REST = 1e-8
-"""By how much checks may be exceeded where a gait rests, by how much it may still move [rad], and penetration of links that
-counts as contact, not as crossing [body lengths]."""
-_ALIKE = 1e-3
-"""Relative change of the violation below which moving the checks does not help."""
-_SWINGS = 0.1
-"""Part of the way of a round that the gait does not come back in the next, where it only goes to and fro."""
-KINK_RADIUS, _WIDEST, _MISSED = 1e-6, 1e-5, 1e-8
+_SLOW = 0.1
+"""A round that changes the violation by less than this part of it, or ends nearer than this part of its way to where the one
+before began, is the last: the rows contradict each other, or the gait goes to and fro between two worst instants of a cell."""
+KINK_RADIUS, _WIDEST = 1e-6, 1e-5
 """Radius [rad] of the ball in which gradients are sampled at a suspected kink: an optimum without a kink may be missed by as
-much. It is larger, up to the second, where the slopes are so small that the objective is missed by no more than the third."""
+much. It is larger, up to the second, where the slopes are so small that the objective is missed by less than an equation may be
+violated."""
 PHASES = 1000
 """Phases of the solved part of the period at which all pairs of links are checked; the certificate checks 20000 a period."""
 _FRACTIONS = np.linspace(1.0, 0.0, 21)
@@ -80,7 +77,8 @@ def at_rest(
     effort: Effort,
     curvature: np.ndarray | None = None,
 ) -> Rested:
-    """Optimise from v ``(n,)`` until rows, box and gait rest, or for as many rounds as the effort allows."""
+    """Optimise from v ``(n,)`` until rows, box and gait rest, as exactly as an equation has to hold, or for as many rounds as
+    the effort allows."""
     iterations = evaluations = 0
     program.place_rows(v)
     violation, ends = np.inf, [v]
@@ -92,20 +90,20 @@ def at_rest(
             program.follow_worst()
         if fresh and effort.accuracy < SKETCH.accuracy:
             curvature = program.space.metric(v)
-        result = minimised(program, v, radius, effort.accuracy, ITERATIONS, curvature)
+        result = minimised(program, v, radius, effort.accuracy, curvature=curvature)
         v, iterations, evaluations = result.v, iterations + result.iterations, evaluations + result.evaluations
-        admissible = program.place_rows(v) <= _AT_REST
+        admissible = program.place_rows(v) <= VIOLATION
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < effort.kkt_error
         # what was learned across kinks may end the search too early: then it begins anew
         curvature = result.curvature if stationary else None
-        if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < _AT_REST)):
+        if admissible and not result.on_edge and (stationary or (fresh and np.abs(v - before).max() < VIOLATION)):
             break
         violation = conditions.violation
-        if violation > ROUGH.kkt_error and abs(violation - worse) < _ALIKE * worse and not result.on_edge:
+        if violation > ROUGH.kkt_error and abs(violation - worse) < _SLOW * worse and not result.on_edge:
             break  # the rows contradict each other near here
         ends.append(v)
-        if len(ends) > 2 and np.abs(v - ends[-3]).max() < _SWINGS * np.abs(v - before).max():
+        if len(ends) > 2 and np.abs(v - ends[-3]).max() < _SLOW * np.abs(v - before).max():
             break  # between two worst instants of one cell, where only finer cells help
     return Rested(v, result.objective, conditions, iterations, evaluations, curvature)
 
@@ -220,9 +218,9 @@ def _rested(
 def conditions_on_kink(program: NonlinearProgram, v: np.ndarray, effort: Effort) -> Stationarity | None:
     """First-order conditions that hold by the gradients around v, where they do not hold by that at v: it lies on a kink."""
     conditions = stationarity(program, v)
-    radius = min(max(KINK_RADIUS, _MISSED / conditions.kkt_error), _WIDEST)
+    radius = min(max(KINK_RADIUS, VIOLATION / conditions.kkt_error), _WIDEST)
     around = stationarity_around(program, v, conditions, radius, enough=effort.kkt_error)
-    holds = max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < ADMISSIBLE
+    holds = max(around.kkt_error, around.complementarity) < effort.kkt_error and around.violation < EXACT
     return around if holds else None
 
 
@@ -265,7 +263,7 @@ def crossing_pairs(space: Members, v: np.ndarray) -> Pairs:
     return tuple(
         pair
         for pair in body.far_pairs
-        if max(body.crossing_depth(angles, [pair]).max(), body.passing_depth(angles, [pair])) > _AT_REST
+        if max(body.crossing_depth(angles, [pair]).max(), body.passing_depth(angles, [pair])) > VIOLATION
     )
 
 

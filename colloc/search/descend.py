@@ -20,8 +20,8 @@ from colloc.search.run import this_run
 
 FACTOR = 0.2
 """Of one delta to the one before."""
-_STEPS = (0.1, 0.01)
-"""Along the direction of smallest curvature, over the length of the parameters' vector: the first that leads down."""
+_STEP = 0.1
+"""Along the direction of smallest curvature, over the length of the parameters' vector; its square where that leads up."""
 _LOST = 0.5
 """A gait that loses this part of its value at the next delta owes it to delta."""
 
@@ -77,7 +77,7 @@ def below_saddle(optimum: Optimum) -> Optimum | None:
         return None
     lagrangian, length = Lagrangian(program, optimum.v), np.linalg.norm(optimum.v)
     value = lagrangian.value(optimum.v)
-    for step in _STEPS:
+    for step in (_STEP, _STEP**2):
         for side in (1.0, -1.0):
             beside = optimum.v + side * step * length * here.direction
             if lagrangian.value(beside) >= value:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from colloc.search.certify import KKT
+from colloc.search.certify import EXACT
 
 
 @dataclass(frozen=True)
@@ -13,24 +13,24 @@ class Effort:
 
     Attributes
     ----------
-    accuracy : float
-        Of the objective, at which SQP stops.
     kkt_error : float
-        What the first-order conditions have to keep to then; the objective is off by about its square.
+        What the first-order conditions have to keep to; the objective is off by about its square.
     rounds : int
         Times that the shape checks are moved to the worst instants, and the gait optimised again, at most.
     """
 
-    accuracy: float
     kkt_error: float
-    rounds: int
+    rounds: int = 12
+
+    @property
+    def accuracy(self) -> float:
+        """Of the objective, at which SQP stops: well below what the conditions leave."""
+        return 0.01 * self.kkt_error**2
 
 
-SKETCH = Effort(1e-5, 1e-1, 2)
+SKETCH = Effort(1e-1, 2)
 """Enough to tell gaits apart. A start that needs more is told apart as it is."""
-ROUGH = Effort(1e-8, 1e-3, 12)
+ROUGH = Effort(1e-3)
 """On the way: delta, or the mesh, will move the gait by more."""
-FINE = Effort(1e-14, KKT, 12)
+FINE = Effort(EXACT)
 """At the final delta on the final mesh."""
-ITERATIONS = 150
-"""Of SQP in a round, at most."""

@@ -11,7 +11,7 @@ from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
-from colloc.search.certify import ROTATION, certify, goes_nowhere
+from colloc.search.certify import GAP, certify, goes_nowhere
 from colloc.search.prescribed import evaluated_answer
 from colloc.system.errors import NotConvergedError, ProblemError
 
@@ -74,7 +74,7 @@ def _evaluated(problem: Problem, fitted: FittedGait) -> Solution:
     usual = {"guess": None, "delta_start": None, "intervals": None}
     stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
     answer = evaluated_answer(stated, fitted.gait)
-    if abs(answer.motion.rotation) < ROTATION * answer.distance:
+    if abs(answer.motion.rotation) < GAP * answer.distance:
         stated = stated.with_(rotation=0.0)
         answer = replace(answer, problem=stated)
     if goes_nowhere(answer):

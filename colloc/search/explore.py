@@ -43,10 +43,10 @@ the zoo that ends 44 of 99 searches early and loses no best gait (`python -m ben
 FOLLOWED, PROMISING, CLOSE = 3, 0.8, 0.01
 """How many gaits are followed to the final delta, and of small loops; the share of the best value that they need at the coarse
 one, and how far they may be from the best at the final one to be optimised on the whole mesh."""
-_HOP_SIZES = 0.2, 0.4, 0.8
-"""How far hops from the best gait known go [rad], in turn; half as many as usual starts take turns with as many hops. At 0.2 a
-hop mostly falls back, at 0.8 it lands where any start would; which of them leads on differs from problem to problem. What start
-k is depends on what came before alone: more starts go wherever fewer do."""
+_HOP = 0.4
+"""How far hops from the best gait known go [rad], in turn half as far, as far and twice as far; half as many as usual starts
+take turns with as many hops. At 0.2 a hop mostly falls back, at 0.8 it lands where any start would; which of them leads on
+differs from problem to problem. What start k is depends on what came before alone: more starts go wherever fewer do."""
 _KNOWN = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
 """The two best ellipses of three equal links under isotropic friction: without them one harmonic of other bodies is missed at
 times, as that of `problems/purcell.py`."""
@@ -224,7 +224,7 @@ def _best(optima: Sequence[Optimum]) -> Optimum | None:
 
 def _shaken(problem: Problem, gait: AnyGait, number: int) -> AnyGait:
     """What stands for a gait with every coefficient moved by chance: where the next hop from basin to basin lands."""
-    size = _HOP_SIZES[number % len(_HOP_SIZES)]
+    size = _HOP * 2.0 ** (number % 3 - 1)
     return problem.gait.seeds.moved(gait, size, 1, np.random.default_rng([1, number]))
 
 

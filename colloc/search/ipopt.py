@@ -12,7 +12,7 @@ from scipy import sparse
 from colloc.collocation.program import GaitProgram
 from colloc.numerics.blocks import Oracles, as_sparse, oracles
 from colloc.numerics.multiplier_estimate import estimated_multipliers
-from colloc.search.certify import KKT
+from colloc.search.certify import EXACT
 from colloc.search.stop_request import StopRequest
 from colloc.system.interruption import interruptible
 
@@ -70,7 +70,7 @@ class NlpResult:
     @property
     def optimal(self) -> bool:
         """First-order conditions hold as a certificate asks for, by our own measure."""
-        return max(self.kkt_error, self.violation, self.complementarity) < KKT
+        return max(self.kkt_error, self.violation, self.complementarity) < EXACT
 
 
 _REGIONS = 20

@@ -13,7 +13,7 @@ from colloc.gaits.problem import Problem
 from colloc.reduced.given import Given
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
-from colloc.search.certify import ADMISSIBLE
+from colloc.search.certify import EXACT
 from colloc.search.effort import Effort
 from colloc.search.spaces import space_of
 
@@ -94,7 +94,7 @@ class Optimum:
     @property
     def optimal(self) -> bool:
         """Whether the first-order conditions hold, as far as the effort asks for."""
-        return max(self.kkt_error, self.complementarity) < self.effort.kkt_error and self.violation < ADMISSIBLE
+        return max(self.kkt_error, self.complementarity) < self.effort.kkt_error and self.violation < EXACT
 
     def after(self, *before: Step) -> Optimum:
         """The same with steps that led to it."""

@@ -20,7 +20,7 @@ from colloc.gaits.problem import Problem
 from colloc.results.answer import Answer
 from colloc.results.solution import Solution
 from colloc.search.actuator_demand import check_actuators_suffice
-from colloc.search.certify import SADDLE, Certified, certify, is_trivial
+from colloc.search.certify import GAP, SADDLE, Certified, certify, is_trivial
 from colloc.search.choose import choose, promised, solution_of
 from colloc.search.confirm import confirm, unconfirmed
 from colloc.search.converge import as_it_is
@@ -45,8 +45,6 @@ _SMALL = 2.0
 """A gait is small up to so many times the bound on the shape speed."""
 _EXPLORING = 0.6
 """The share of the time allowed that is spent on starts; the rest is for the answer."""
-_ROUGHLY = 1e-3
-"""Relative error to which a gait is replayed that is no optimum: exactly may take minutes."""
 
 
 def solve(
@@ -191,7 +189,8 @@ def certified(answer: Answer) -> Certified:
     if problem.gait.free and is_trivial(answer):
         return Certified(answer)
     run.told("certify", 0, 1)
-    roughly: dict[str, Any] = {} if answer.optimal else {"tolerance": _ROUGHLY, "instants": problem.body.usual.instants}
+    # exactly may take minutes, for what is no optimum
+    roughly: dict[str, Any] = {} if answer.optimal else {"tolerance": GAP, "instants": problem.body.usual.instants}
     try:
         return Certified(answer, run.kept("certify", (answer,), lambda: certify(answer, **roughly)))
     except NotConvergedError as error:

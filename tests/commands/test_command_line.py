@@ -96,7 +96,7 @@ def test_bad_options_and_files(problem, tmp_path, capsys):
 def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(problem, tmp_path, capsys, monkeypatch):
     good = tmp_path / "quick.h5"
     good.write_bytes(b"a good result")
-    monkeypatch.setattr("colloc.search.ipopt.KKT", 1e-30)
+    monkeypatch.setattr("colloc.search.ipopt.EXACT", 1e-30)
     assert main([problem(GOOD), "--output", str(tmp_path), "--no-figure"]) == 3
     assert "not converged" in capsys.readouterr().out
     assert good.read_bytes() == b"a good result"

@@ -319,7 +319,7 @@ def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
         return next(check.meaning for check in certify(solution.answer).checks if check.name == "second order")
 
     assert "a saddle" in meaning(curved(-0.02, 0.0))
-    assert "flat" in meaning(curved(1e-5, 1e-6))
+    assert "flat" in meaning(curved(1e-6, 1e-5))
     assert "flat" in meaning(curved(0.02, 0.03))
     assert "an optimum" in meaning(curved(0.5, 0.01))
     assert "a vertex" in meaning(curved(np.inf, 0.0, 0))
